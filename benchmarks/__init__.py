@@ -1,4 +1,4 @@
-"""Measurements of a checkout, which are no part of the package.
+"""Measurements of a checkout, which are not part of the package.
 
 `python -m benchmarks NAME` measures a speed against a reference in the same run: `commands` reads the options, each
 module that it names has a function `measure` that returns the figures of `--json`, and `report` words and draws them.

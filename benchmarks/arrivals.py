@@ -3,10 +3,10 @@
 python benchmarks/arrivals.py --studies 100
 
 People come one by one, read and fill in pages for random times, and some leave at a random moment before their session.
-Whoever has been in the waiting room for the time of the study file waits in vain. Roles are given at the consent, by
-number and free again after half an hour (as up to version 0.1); by the rules of the package, at the instructions; or at
-pairing, which no study with instructions for each role can do, and which is the reference. The package's own functions
-give roles, change them and form groups. Not a measurement of speed.
+A person who has been in the waiting room for the study file's time has waited in vain. Roles are given at the consent,
+by number and free again after half an hour (as up to version 0.1); by the rules of the package, at the instructions; or
+at pairing, which no study with instructions for each role can do, and which is the reference. The package's own
+functions give roles, change them and form groups. Not a measurement of speed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PAGES: Final = {
 """Shortest and longest time that people spend at the stages before the waiting room [s]; an assumption."""
 
 FORMERLY_FREE: Final = 1800.0
-"""Time after which the role of a person who had left was given to somebody else, up to version 0.1 [s]."""
+"""Time after which the role of a person who had left was given to another person, up to version 0.1 [s]."""
 
 WAYS: Final = "at consent", "package", "at pairing"
 
@@ -89,7 +89,7 @@ class Visitor:
     turn: int = 0
 
     def is_there(self, now: float, patience: float) -> bool:
-        """Returns whether the person counts as present, who has left for less than `patience` [s]."""
+        """Returns whether the person counts as present: has been away for less than `patience` [s]."""
         return not self.done and now < self.leaves + patience
 
 
@@ -179,7 +179,7 @@ class Arrivals:
             self._pair(now)
 
     def _give_formerly(self, visitor: Visitor, now: float) -> None:
-        """Gives a role by the first number that nobody has who plays or left less than half an hour ago."""
+        """Gives a role the first number that no person has who plays or left less than half an hour ago."""
         used = {each.ticket for each in self.visitors if each.done or now < each.leaves + FORMERLY_FREE}
         visitor.ticket = next(number for number in count() if number not in used)
         block, place = divmod(visitor.ticket, 2)

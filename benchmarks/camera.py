@@ -59,10 +59,10 @@ _SHORTEST = 30.0  # lanes with a place [m]
 
 @dataclass(frozen=True)
 class Shot:
-    """What a picture is drawn of.
+    """Content of a picture.
 
     Attributes:
-        pose: of the camera.
+        pose: pose of the camera.
         arrays: bodies.
         weather: weather and light.
         time: simulated time [s].
@@ -93,13 +93,13 @@ def measure(
 
     Args:
         town: name or file of a town.
-        sizes: of the pictures.
-        outputs: parts of the pictures; RGB alone is measured without antialiasing, too.
+        sizes: sizes of the pictures.
+        outputs: parts of the pictures; RGB alone is also measured without antialiasing.
         vehicles: number of vehicles.
         pedestrians: number of pedestrians.
         seed: seed of the session.
         seconds: length of the drive [s].
-        cold: whether to measure the first picture with an empty cache, too, which compiles for minutes.
+        cold: whether to measure also the first picture with an empty cache, which compiles for minutes.
         repeats: number of pictures at a place, and of first pictures; the median counts.
         progress: callback for the progress.
 
@@ -167,7 +167,7 @@ def measure(
 
 
 def _drive(engine: SessionEngine, seed: int) -> list[Shot]:
-    """Returns what the camera sees in a session of the scripted participant and Co-Wizard, at each decision."""
+    """Returns the camera's view at each decision of a session of the scripted participant and Co-Wizard."""
     shots: list[Shot] = []
     config = CameraConfig()
 
@@ -274,7 +274,7 @@ print(time.process_time() - start)
 
 
 def _first_picture(town: str, cache: str | None = None) -> float:
-    """Returns what the first picture of a process takes after a session has begun [s of the processor]."""
+    """Returns the processor time of the first picture of a process after a session has begun [s]."""
     environment = {**os.environ, "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
     if cache is not None:
         environment[CACHE_VARIABLE] = cache

@@ -1,8 +1,8 @@
-"""Replaces one part of the learned Co-Wizard at a time, and plays the same sessions with what is left.
+"""Replaces one part of the learned Co-Wizard at a time, and plays the same sessions with the rest.
 
 Each row is a rollout with its own folder in the work folder, and resumes there. The sessions are those of
-`dorothie-gym rollout` with the same towns, number and seed. The weights are not fitted again: a row says what the
-trained network does without a part, not what another training would have made of that.
+`dorothie-gym rollout` with the same towns, number and seed. The weights are not fitted again: a row shows the trained
+network without a part, not the result of training without that part.
 """
 
 import json
@@ -67,7 +67,7 @@ class RuledCommands(LearnedCoWizard):
 
 
 def ruled_command(memory: Memory, view: CoWizardView) -> int:
-    """Returns the index of the first allowed command among: stop, what was asked for, the route, go on, speed, lights.
+    """Returns the index of the first allowed command among: stop, requested action, route, driving on, speed, lights.
 
     Args:
         memory: working memory after listening.
@@ -133,7 +133,7 @@ class WithoutAnswers(LearnedCoWizard):
 
 
 class WithoutRules(LearnedCoWizard):
-    """No rule decides what may be said: the first remark that is drawn is said."""
+    """No rule restricts the remarks: the first remark that is drawn is said."""
 
     def _draw(
         self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
@@ -145,7 +145,7 @@ class WithoutRules(LearnedCoWizard):
 
 
 class RandomRemarks(LearnedCoWizard):
-    """The network decides when to speak; what is said is drawn evenly among the remarks that the rules leave."""
+    """The network decides when to speak; the remark is drawn uniformly from those that the rules allow."""
 
     def _draw(
         self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,

@@ -28,7 +28,7 @@ def main(
     maps: Annotated[Path | None, typer.Option(help="folder of the OpenDRIVE files of imported towns")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
 ) -> None:
-    """Prints shares and numbers of cases, and what was wrong by predicate."""
+    """Prints shares and numbers of cases, and errors by predicate."""
     for folder in rollouts:
         found, wrong = TalkChecks(), Counter[str]()
         for entry in Corpus.load(folder / "sessions", maps=maps).entries:
@@ -50,7 +50,7 @@ def main(
 
 
 def _add_statements(found: TalkChecks, wrong: Counter[str], world: SessionWorld, role: Role) -> None:
-    """Holds what the role states against the world; arrival times are left out, as in `dorothie-gym stats --talk`."""
+    """Compares the role's statements with the world; arrival times are omitted, as in `dorothie-gym stats --talk`."""
     for move in world.session.moves(role):
         for said in move.meaning if move.act.move in checks._FACTUAL else ():
             right = is_true(world, said, move.start, role)
@@ -63,7 +63,7 @@ def _add_statements(found: TalkChecks, wrong: Counter[str], world: SessionWorld,
 
 
 def _add_answers(found: TalkChecks, wrong: Counter[str], session: Session, role: Role) -> None:
-    """Checks whether the answers of the role are about what was asked."""
+    """Checks whether the answers of the role are about the question."""
     asked: MoveRecord | None = None
     for move in session.moves():
         if move.act.move in checks._QUESTIONS and move.meaning:

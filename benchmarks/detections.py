@@ -53,7 +53,7 @@ def corners(space: NDArray[np.float64], pitch: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What is found in a picture.
+    """Detections in a picture.
 
     Attributes:
         total: sum of the scores.

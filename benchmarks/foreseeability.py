@@ -37,7 +37,7 @@ NEVER: Final = 1e4
 
 
 def history(columns: Columns, table: PointTable) -> NDArray[np.float64]:
-    """Returns moves, actions and times (n, 26): what a listener without words has.
+    """Returns moves, actions and times (n, 26): the information of a listener without words.
 
     Columns: the last moves, newest first, each with its speaker, and their ages [s]; the last actions, their angles
     [degrees] and ages [s]; the time [s]; the number of earlier acts of the point's own utterance.

@@ -36,7 +36,7 @@ def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
     """Returns highway-env's own network, lanes and IDM vehicles at the places of those of a world.
 
     Args:
-        network: of the town.
+        network: network of the town.
         world: its vehicles, cyclists too, become `IDMVehicle`s at the same places, headings and speeds.
     """
     plain = RoadNetwork()
@@ -86,7 +86,7 @@ class StockIntersection:
 
     Attributes:
         seconds_per_step: simulated time of a step [s].
-        substeps_per_step: of its physics.
+        substeps_per_step: substeps per step of its physics.
     """
 
     def __init__(self, seed: int = 0) -> None:

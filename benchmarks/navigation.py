@@ -29,7 +29,7 @@ WARM_UP_DECISIONS: Final = 40
 """Decisions before the measurement."""
 
 KERNEL_DECISIONS: Final = 8
-"""Decisions for which the physics of a repetition goes on alone."""
+"""Decisions for which a repetition runs the physics alone."""
 
 PARTS: Final = ("physics", "actions", "guidance", "other")
 """Parts of a step: physics; actions and paths; instructor, rewards, observations and masks; resets and the rest."""

@@ -1,7 +1,8 @@
-"""Compares the two models of perception: what they show of the surroundings, and what comes of it in scripted sessions.
+"""Compares the two models of perception: the objects that they show, and the outcomes of scripted sessions.
 
 Sessions with the symbolic model are looked at every four seconds: for each object that it shows, whether the picture
-shows it too, and if not, why. A reason is found by drawing again: the body alone, and all bodies without the town.
+    also shows it, and otherwise why not. A reason is found by drawing again: the body alone, and all bodies without the
+    town.
 """
 
 import json
@@ -58,7 +59,7 @@ COLOURS: Final = ("#2f6f4f", "#c9c4b8", "#8a6d5a", "#c98a4b", "#d9c25a", "#6f88a
 
 
 class Census:
-    """Counts, by distance, of the objects that the symbolic model shows, and of what the picture makes of each."""
+    """Counts, by distance, of the objects that the symbolic model shows, and of their visibility in the picture."""
 
     def __init__(self, engine: SessionEngine) -> None:
         scene = town_scene(engine.town)
@@ -163,7 +164,7 @@ def main(
 
 
 def played(engine: SessionEngine, seeds: Sequence[int], census: Census | None) -> Iterator[dict[str, object]]:
-    """Plays scripted sessions; yields what came of each."""
+    """Plays scripted sessions; yields the outcome of each."""
     policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
     for seed in seeds:
         before, begun = census.seconds if census else 0.0, time.process_time()
@@ -204,7 +205,7 @@ def summary(town: str, model: PerceptionModel, rows: Sequence[dict[str, object]]
 
 
 def object_rows(town: str, census: Census) -> list[dict[str, object]]:
-    """Returns a row for each class of distance: the number of objects, and the shares of what became of them."""
+    """Returns a row for each class of distance: the number of objects, and the shares of their visibilities."""
     rows: list[dict[str, object]] = []
     for k in range(LAST + 1):
         count = sum(census.counts[k, what] for what in (SHOWN, *REASONS))

@@ -43,8 +43,8 @@ class Senses:
     """Random outputs of frozen encoders: a row of a table for each text, frame or utterance.
 
     Args:
-        seed: of the tables.
-        rows: of each table.
+        seed: seed of the tables.
+        rows: rows of each table.
     """
 
     def __init__(self, seed: int = 0, rows: int = 64):

@@ -49,7 +49,7 @@ def measure(
     Args:
         env: id of the environment.
         algorithm: one that learns from rollouts: ppo, maskable_ppo or a2c.
-        observation: what a driver of the navigation environments observes: "vector" or "camera".
+        observation: observation of a driver of the navigation environments: "vector" or "camera".
         environments: number of parallel environments; None for 256, or 16 with pictures.
         workers: number of processes that step them in training; None for none where they are a batch, else one per
             processor.

@@ -46,7 +46,8 @@ def measure(
 
     Args:
         corpus: folder of sessions.
-        threads: of torch; None takes all cores. With one, CPU time is measured, which other programs disturb little.
+        threads: number of torch threads; None takes all cores. With one, CPU time is measured, which other programs
+            disturb little.
         batch_size: points of one of our steps.
         repeats: how often each is measured; the median counts.
         progress: called with the name of each measurement and the share done.

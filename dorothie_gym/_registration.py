@@ -20,7 +20,7 @@ class RegisteredEnvironment:
     Attributes:
         name: id without namespace.
         entry_point: "module:class".
-        description: what the agent does.
+        description: task of the agent.
         kwargs: arguments that the id sets.
         parallel: whether it is an environment of PettingZoo, with the agents in parallel and in turns (AEC).
         vector_entry_point: "module:class" of the vectorised environment.
@@ -42,7 +42,7 @@ class RegisteredEnvironment:
 
     @property
     def api(self) -> str:
-        """Library whose interface it has."""
+        """Library whose interface it implements."""
         return "PettingZoo" if self.parallel else "Gymnasium"
 
     @property

@@ -1,4 +1,4 @@
-"""Exceptions of dorothie_gym: one root, and one class for each kind of thing that can be wrong.
+"""Exceptions of dorothie_gym: one root, and one class for each kind of error.
 
 Every class also derives from the built-in exception that callers expect (`ValueError` for bad input, `RuntimeError`
 for an environment that does not allow the work), so that `except ValueError` keeps working.
@@ -61,7 +61,7 @@ class InputFileError(DorothieGymError, ValueError):
 
     Attributes:
         where: the file, or the file and line.
-        reason: what is wrong, and what to do about it.
+        reason: the error and its remedy.
         place: line and column, or the field, where it is known; else empty.
     """
 
@@ -85,7 +85,7 @@ class TownError(DorothieGymError, ValueError):
     Attributes:
         source: the map's file or name.
         element: the offending element, with its line where the format has lines.
-        reason: what is wrong, and what to do about it.
+        reason: the error and its remedy.
     """
 
     def __init__(self, source: str, element: str, reason: str) -> None:
@@ -108,7 +108,7 @@ class StoryboardError(DorothieGymError, ValueError):
     Attributes:
         template: name (or path) of the storyboard template.
         field: where in the template, such as "subgoals[2].after" or "variables.P1".
-        reason: what is wrong, and what to do about it.
+        reason: the error and its remedy.
     """
 
     def __init__(self, template: str, field: str, reason: str) -> None:
@@ -137,7 +137,7 @@ class PolicyLoadError(DorothieGymError, ValueError):
 
 
 class PredictionError(DorothieGymError, ValueError):
-    """Predictions cannot be scored; the message names the file, the row or point, and what to do."""
+    """Predictions cannot be scored; the message names the file, the row or point, and the remedy."""
 
 
 class FeatureStoreError(DorothieGymError, ValueError):
@@ -145,7 +145,7 @@ class FeatureStoreError(DorothieGymError, ValueError):
 
 
 class RolloutError(DorothieGymError, ValueError):
-    """A file of rollout results cannot be read; the message names the file and what to do."""
+    """A file of rollout results cannot be read; the message names the file and the remedy."""
 
 
 class StateError(DorothieGymError, ValueError):
@@ -161,7 +161,7 @@ class ModelFileError(DorothieGymError, ValueError):
 
 
 class CheckpointError(DorothieGymError, RuntimeError):
-    """A checkpoint is damaged, or of another model or corpus; the message names the file and what to do."""
+    """A checkpoint is damaged, or of another model or corpus; the message names the file and the remedy."""
 
 
 class EncoderError(DorothieGymError, RuntimeError):

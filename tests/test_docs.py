@@ -265,7 +265,7 @@ def test_the_counts_of_the_data_sheet_are_those_of_the_shipped_storyboards_and_t
         sum(any(subgoal.change for subgoal in board.subgoals) for board in boards),
         sum(bool(board.hidden) for board in boards),
     )
-    assert stated(r"at (\d+) Hz; the surrounding .* at each decision, (\d+) in a second") == (
+    assert stated(r"at (\d+) Hz; the surrounding .* at each decision, (\d+) per second") == (
         FRAME_RATE,
         EnvConfig().decision_frequency,
     )

@@ -27,7 +27,7 @@ class Difference:
     """First difference of two recordings.
 
     Attributes:
-        frame: the first frame at which they differ; -1 for what is known before the session begins.
+        frame: the first frame at which they differ; -1 for data from before the beginning of the session.
         field: the field, such as "frames.x", "actors.speed of number 7", "events[12].data.text".
         recorded: value in the first recording, as text.
         replayed: value in the second, as text.

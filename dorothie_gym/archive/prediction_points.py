@@ -317,7 +317,7 @@ def unpointed_events(session: Session) -> tuple[tuple[int, str], ...]:
 
 
 def _why_no_point(event: Event, action: ActionRecord | None) -> str:
-    """Returns why a flagged event is no point; empty if it is one."""
+    """Returns why a flagged event is not a point; empty if it is one."""
     if action is not None:
         if action.action not in NAVIGATION_ACTIONS:
             return f"{action.action.label} is no navigation action"

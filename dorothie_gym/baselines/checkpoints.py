@@ -143,7 +143,7 @@ class ModelCard:
     seconds: float
 
     def __post_init__(self) -> None:
-        """Checks what the types do not."""
+        """Checks conditions that the types do not express."""
         if Path(self.weights).name != self.weights:
             raise ValueError(f"weights is {short_repr(self.weights)}; it must be the name of a file in the folder")
         if self.spread is not None and not 0.0 < self.spread < math.inf:

@@ -103,7 +103,7 @@ class Dataset:
 
         Raises:
             SessionError: it cannot be read, or lacks a fold.
-            EncoderError: the encoder is unknown, or what it needs is not here.
+            EncoderError: the encoder is unknown, or its requirements are missing.
         """
         cache = cache_folder()
         return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES, corpus)

@@ -164,7 +164,7 @@ def _read_result(path: Path) -> dict[str, Any]:
 
 
 def _describe(job: Experiment, model: TOTO, material: Dataset, *, steps: int, seconds: float) -> None:
-    """Writes the model card beside the weights."""
+    """Writes the model card next to the weights."""
     pairs = material.byte_pairs(model.config.vocabulary) if needs_pieces(job.row, model.config) else None
     ModelCard(
         row=job.row.command,

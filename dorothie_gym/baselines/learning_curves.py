@@ -20,7 +20,7 @@ def draw_loss_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:
     """Draws training and validation loss into a PNG file; the epoch that is kept is marked.
 
     Args:
-        epochs: at least one.
+        epochs: at least one epoch.
         title: name of the model.
         path: file to write, whole or not at all.
 
@@ -64,7 +64,7 @@ DOTS_PER_INCH = 150
 
 @contextmanager
 def sheet(path: Path) -> Iterator[Figure]:
-    """Yields an empty figure, which is written to a PNG file afterwards.
+    """Yields an empty figure, and writes it to a PNG file at the end.
 
     Raises:
         OSError: the file cannot be written.
@@ -80,7 +80,7 @@ def draw_reward_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path)
     """Draws success with its interval, and the reward, over the steps into a PNG file.
 
     Args:
-        rows: evaluations, as `training.TrainingEvaluation.as_json` has them.
+        rows: evaluations, as from `training.TrainingEvaluation.as_json`.
         title: above the picture.
         path: file to write.
 

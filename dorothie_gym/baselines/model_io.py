@@ -80,7 +80,7 @@ class Examples:
 
     Attributes:
         inputs: fields (N, ...).
-        labels: of the N points.
+        labels: labels of the N points.
     """
 
     inputs: Inputs
@@ -204,12 +204,12 @@ def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Pre
 
 
 def likeliest(scores: Tensor, allowed: Tensor | None) -> Tensor:
-    """Returns the class (B,) with the highest score (B, n) among those allowed (B, n); among all where None."""
+    """Returns the class (B,) with the highest score (B, n) among the allowed ones (B, n), or among all if None."""
     return (scores if allowed is None else scores.masked_fill(~allowed, -torch.inf)).argmax(-1)
 
 
 def allowed_angle(action: Tensor, angle: Tensor) -> Tensor:
-    """Returns angles (B,) as the actions (B,) take them: 0 for one that takes none, a lane switch's 90 or -90."""
+    """Returns angles (B,) valid for the actions (B,): 0 for actions without an angle, 90 or -90 for a lane switch."""
     any_angle = torch.tensor(TAKES_ANGLE, device=action.device)[action]
     side = torch.tensor(TAKES_SIDE, device=action.device)[action]
     wrapped = (angle + 180.0) % 360.0 - 180.0

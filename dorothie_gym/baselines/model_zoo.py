@@ -1,4 +1,4 @@
-"""Models of the table by names that say what they are, and their construction."""
+"""Models of the table by name, and their construction."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
     ModelEntry(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
 """Counterparts of the paper's rows, in its order; then TOTO with another clock, shallow models, policies, and the
-Junction Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
+Junction Reader. TOTO without the current utterance is compared with the paper's row without its sound."""
 
 _SEEN: Final[Mapping[str, Objects]] = MappingProxyType({"oracle boxes": "boxes", "detections": "detections"})
 
@@ -136,7 +136,7 @@ CAMERA_ROWS: Final = (
         if row.command in ("toto", "objects")
     ),
 )
-"""Models whose objects are those that the camera on the car shows, or that a trained detector finds in its pictures; or
+"""Models whose objects are visible to the car's camera, or found by a trained detector in its pictures; or
 all queries of the detector at the point, as in the paper. They are trained where they are named: pictures of a corpus
 take minutes."""
 
@@ -164,8 +164,9 @@ SOUND_ROWS: Final = (
         name="Text + Log-mel", command="text-sound", change=_only(Channel.TRANSCRIPT, Channel.SPEECH), sound="log-mel"
     ),
 )
-"""Models of spoken corpora, whose current utterance is heard as sound. In TOTO without the current speech, the words of
-the current utterance stay, as in the paper's row. They are trained where they are named."""
+"""Models of spoken corpora, whose current utterance is heard as sound. TOTO without the current speech keeps the words
+of the current utterance, as in the paper's row. They are trained where they are named.
+"""
 
 
 ALL_ROWS: Final = (*ROWS, *CAMERA_ROWS, *SOUND_ROWS)
@@ -193,8 +194,9 @@ FORMER_COMMANDS: Final[Mapping[str, str]] = MappingProxyType(
         if now + source in {row.command for row in ALL_ROWS}
     }
 )
-"""Commands of this version by those of versions up to 0.1, which were the paper's words; `model.json` files of such
-versions have them."""
+"""Commands of this version by the commands of versions up to 0.1, which used the paper's names and wrote them to
+`model.json`.
+"""
 
 
 def find_row(name: str) -> ModelEntry:

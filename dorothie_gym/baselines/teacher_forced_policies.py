@@ -115,9 +115,9 @@ def run_policy(
     Args:
         corpus: folder of the corpus.
         kind: "ppo" or "cloning".
-        seed: of weights and order.
+        seed: seed of weights and order.
         folder: gets the policies.
-        name: of the row.
+        name: name of the row.
         strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
 
     Raises:

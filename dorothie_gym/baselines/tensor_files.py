@@ -82,7 +82,7 @@ class StoredTensor:
     Attributes:
         dtype: type of the numbers, as safetensors names it.
         shape: sizes of the axes.
-        data_offsets: first byte of the numbers, and the one behind them, behind the header.
+        data_offsets: first byte of the numbers, and the byte after the last, counted from the end of the header.
     """
 
     dtype: str
@@ -116,7 +116,7 @@ def read_header(path: Path, limit: int = MAX_WEIGHTS) -> TensorHeader:
         limit: largest size of the file [bytes].
 
     Raises:
-        InputFileError: it is no regular file, too large, cut off, or its header is damaged; the message names the
+        InputFileError: it is not a regular file, too large, cut off, or its header is damaged; the message names the
             tensor.
         OSError: it is missing or cannot be read.
     """
@@ -162,7 +162,7 @@ def _entry(path: Path, name: str, value: object) -> StoredTensor:
 
 
 def _check_places(path: Path, tensors: Mapping[str, StoredTensor], size: int) -> None:
-    """Checks that the tensors lie one behind the other and fill the bytes behind the header."""
+    """Checks that the tensors are contiguous and fill the bytes after the header."""
     at = 0
     for name, found in sorted(tensors.items(), key=lambda item: item[1].data_offsets):
         first, end = found.data_offsets
@@ -206,7 +206,7 @@ def check_tensors(path: Path, found: Mapping[str, Tensor], wanted: Mapping[str, 
         path: the file.
         found: tensors of the file by name.
         wanted: tensors of the network by name.
-        prefix: what stands before both names in the file.
+        prefix: prefix of both names in the file.
 
     Raises:
         InputFileError: a tensor is missing, unknown, or has another shape or type; the message names it.
@@ -247,7 +247,7 @@ def check_optimiser(
         path: the file.
         found: tensors by name: number of the parameter, `mark`, quantity.
         parameters: parameters of the optimiser in their order.
-        prefix: what stands before the names in the file.
+        prefix: prefix of the names in the file.
         mark: character between number and quantity.
 
     Raises:

@@ -75,7 +75,7 @@ class Epoch:
     """Pass over the training points.
 
     Attributes:
-        number: from 1.
+        number: number, from 1.
         training: mean loss of its steps.
         validation: mean loss of the validation points after it.
         best: number of the epoch with the lowest validation loss so far.

@@ -1,4 +1,4 @@
-"""Simulated speech recognition (ASR): transcripts with word errors, and the acts that follow from them."""
+"""Simulated speech recognition (ASR): transcripts with word errors, and the acts derived from them."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ class OpenMoves:
         return move if utterance.start - end < ANSWER_TIMEOUT else None
 
     def note(self, utterance: Utterance) -> None:
-        """Notes the last move of an utterance, which awaits an answer."""
+        """Records the last move of an utterance, which awaits an answer."""
         self._open[utterance.speaker] = (utterance.spans[-1].act.move, utterance.end)
 
 

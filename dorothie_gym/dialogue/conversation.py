@@ -1,4 +1,4 @@
-"""Utterances and their timing: spoken while they are in the air, delivered when the last word is over."""
+"""Utterances and their timing: in progress while they are spoken, delivered after the last word."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHORTEST_SPAN = 0.6
 
 
 INAUDIBLE = "..."
-"""Sign in a transcript for words that were not understood, and transcript of speech of which nothing was."""
+"""Sign in a transcript for words that were not understood, and transcript of speech without any recognised word."""
 
 
 def is_partly_inaudible(text: str) -> bool:
@@ -106,7 +106,7 @@ class Utterance:
 
 
 def _ended(utterance: Utterance) -> Utterance:
-    """Returns the utterance with a full stop for the comma of a speaker who meant to go on."""
+    """Returns the utterance with a full stop for the comma of a speaker who meant to continue."""
     last = utterance.spans[-1]
     if not last.text.endswith(",") or not last.text.strip(","):
         return utterance

@@ -19,7 +19,7 @@ _BACK = re.compile(
 )
 _AFTER_NEXT = re.compile(r"\b(the one after|one after the next|after next)\b")
 _RIGHT_OPENS = frozenset({"you", "so", "well", "ho", "i"})
-"""Words after which an initial "right" is no direction: "right you are"."""
+"""Words after which an initial "right" is not a direction: "right you are"."""
 
 _DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
 _CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
@@ -131,7 +131,7 @@ def _directions(clause: Sequence[str], lists: WordLists) -> list[Direction]:
 
 
 def _is_denied(before: Sequence[str], lists: WordLists) -> bool:
-    """Returns whether the preceding words negate a direction ("not right"); doubt is no negation."""
+    """Returns whether the preceding words negate a direction ("not right"); doubt is not a negation."""
     return _DOUBT.isdisjoint(before) and not lists.denying.isdisjoint(before)
 
 

@@ -2,7 +2,7 @@
 
 Filled pauses stand mostly at the beginning of a phrase, and restarts repeat its first words (Shriberg, Preliminaries to
 a Theory of Speech Disfluencies, 1994; Clark and Fox Tree, Cognition 84, 2002). A withdrawn name ("the KFC, no, the
-Ikea") is a disfluency, too.
+Ikea") is also a disfluency.
 """
 
 from __future__ import annotations

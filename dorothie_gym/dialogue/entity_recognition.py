@@ -148,7 +148,7 @@ def nearest_name(word: str) -> SlotValue | None:
     """Returns the landmark or street that best matches a misspelt or misheard word, or None.
 
     Args:
-        word: lower-case word that is no ordinary English word.
+        word: lower-case word that is not an ordinary English word.
     """
     names = _proper_names()
     found = process.extractOne(word, list(names), scorer=fuzz.ratio, score_cutoff=_SIMILAR_SOUND)

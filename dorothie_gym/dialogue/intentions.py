@@ -1,4 +1,4 @@
-"""Intentions: what a speaker does with a proposition. The dialogue move follows from the intention, not from the words.
+"""Intentions: communicative functions with propositions, which determine the dialogue move.
 
 The functions are those of ISO 24617-2 (Bunt et al., 2012) that occur between passenger and car. Each has a path through
 the decision tree of the annotators (`ontology.DECISION_TREE`), and thereby a move.
@@ -19,13 +19,13 @@ from dorothie_gym.support.copying import shared
 
 
 class CommunicativeFunction(enum.StrEnum):
-    """What a speaker does with a proposition; the names are those of ISO 24617-2 where it has one."""
+    """Communicative function of a proposition, named as in ISO 24617-2 where possible."""
 
     # initiatives
     REQUEST = "request"
     """Asks for an action, directly or indirectly: "turn left", "you should be turning left"."""
     INFORM = "inform"
-    """Says something that nobody has asked for."""
+    """Makes an unsolicited remark."""
     PROPOSITIONAL_QUESTION = "propositional_question"
     """Asks whether the proposition is true."""
     SET_QUESTION = "set_question"
@@ -35,7 +35,7 @@ class CommunicativeFunction(enum.StrEnum):
     OFFER = "offer"
     """Proposes an own action and asks for consent: "shall I find another way?"."""
     FEEDBACK_ELICITATION = "feedback_elicitation"
-    """Asks whether the other one is following: "did you get that?"."""
+    """Asks whether the other speaker is following: "did you get that?"."""
     # responses about the talk
     POSITIVE_FEEDBACK = "positive_feedback"
     """Shows that a message has arrived: "okay", "got it", also by repeating a part of it."""
@@ -45,13 +45,13 @@ class CommunicativeFunction(enum.StrEnum):
     CORRECTION = "correction"
     """Amplifies or repairs what was said before: "I said turn around"."""
     ACCEPT = "accept"
-    """Takes on what was asked for: "will do", "KFC it is"."""
+    """Accepts a request: "will do", "KFC it is"."""
     CONFIRM = "confirm"
-    """Verifies what was checked: "that's it"."""
+    """Confirms a check: "that's it"."""
     AFFIRMATIVE_ANSWER = "affirmative_answer"
     """Answers yes, or consents to an offer."""
     NEGATIVE_ANSWER = "negative_answer"
-    """Answers no, denies what was checked, or declines an offer."""
+    """Answers no, denies a check, or declines an offer."""
     UNCERTAIN_ANSWER = "uncertain_answer"
     """Answers that the answer is unknown or unsure."""
     ANSWER = "answer"
@@ -103,13 +103,12 @@ _MOVES: Final = MappingProxyType({function: walk(answers) for function, answers 
 @shared
 @dataclass(frozen=True, kw_only=True)
 class Intention:
-    """What a speaker wants to do by one span of an utterance.
+    """Intention of a speaker in one span of an utterance.
 
     Attributes:
-        function: what is done.
-        content: the proposition that it is done with: stated, asked, asked for, answered; None where there is none, as
-            in "okay".
-        elided: arguments of the content that the other one knows, and that are left out of the words and the slots:
+        function: communicative function.
+        content: the proposition that is stated, asked, requested or answered; None if there is none, as in "okay".
+        elided: arguments of the content that the other speaker knows, and that words and slots omit:
             the effect in an answer to "why did we stop?".
     """
 
@@ -119,7 +118,7 @@ class Intention:
 
     @property
     def spoken(self) -> Proposition | None:
-        """The content without what is left out of the words."""
+        """The content without elided arguments."""
         return None if self.content is None else self.content.without(*self.elided)
 
     @property

@@ -108,7 +108,7 @@ def strings(where: str, value: object) -> tuple[str, ...]:
     """Returns a list of strings as a tuple.
 
     Raises:
-        PhraseFileError: if `value` is no list of strings (an unquoted `yes` or `on` is a boolean in YAML); names
+        PhraseFileError: if `value` is not a list of strings (an unquoted `yes` or `on` is a boolean in YAML); names
             `where`.
     """
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):

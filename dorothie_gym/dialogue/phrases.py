@@ -151,7 +151,7 @@ def choice(name: str, alternatives: Sequence[Alternative]) -> Phrase:
 
     Args:
         name: key that determines, together with the idiolect, the favourite of a speaker.
-        alternatives: at least one.
+        alternatives: at least one alternative.
     """
     phrases = [alternative.phrase for alternative in alternatives]
     gaps = frozenset.intersection(*(phrase.gaps for phrase in phrases))

@@ -1,4 +1,4 @@
-"""Propositions: what an utterance says, as statements with typed arguments that can be true or false.
+"""Propositions: the content of an utterance, as statements with typed arguments that can be true or false.
 
 A proposition has a predicate, arguments and a polarity: `arrives_in(place=KFC, seconds=60)`,
 `not sees(object=Pedestrian)`, `because(effect=stands(), cause=red())`. Questions leave an argument open (`ASKED`).
@@ -45,7 +45,7 @@ ASKED: Final = Asked.ASKED
 
 
 class Predicate(enum.StrEnum):
-    """Predicate of a proposition. "The car" is the ego with its Co-Wizard, "the speaker" who says it."""
+    """Predicate of a proposition. "The car" is the ego with its Co-Wizard."""
 
     # the world
     SEES = "sees"
@@ -82,17 +82,17 @@ class Predicate(enum.StrEnum):
     ARRIVES_IN = "arrives_in"
     """The car will stop at a landmark after a time."""
     DISTANCE = "distance"
-    """The way to a landmark has a length."""
+    """The route to a landmark has a length."""
     CLOSE = "close"
-    """The way to a landmark is short."""
+    """The route to a landmark is short."""
     KNOWS = "knows"
     """The Co-Wizard knows where a landmark lies."""
     HAS_ROUTE = "has_route"
     """The Co-Wizard has a route to a landmark."""
     RIGHT_WAY = "right_way"
-    """The car is on a way to a landmark that is not much longer than the shortest."""
+    """The car is on a route to a landmark that is not much longer than the shortest."""
     SHORTER = "shorter"
-    """The way over a street is shorter than the present one."""
+    """The route over a street is shorter than the current one."""
     LOCALISED = "localised"
     """The Co-Wizard knows where the car is."""
     LIGHTS_ON = "lights_on"
@@ -110,18 +110,18 @@ class Predicate(enum.StrEnum):
     PASSED = "passed"
     """The car has driven past a landmark, a number of times."""
     TRIED = "tried"
-    """An action, or all that was done to get to the place, has been tried a number of times in vain."""
+    """An action, or every attempt to reach the place, has failed a number of times."""
     NEARER = "nearer"
-    """The way to a landmark is shorter than that to another one."""
+    """The route to a landmark is shorter than that to another one."""
     # the tasks
     TASK = "task"
     """The errand at a landmark has a status."""
     ORDER = "order"
     """An errand comes before another one."""
     PURPOSE = "purpose"
-    """What an errand is for and why, with the person and the item that it concerns."""
+    """Purpose and reason of an errand, with the person and the item that it concerns."""
     GOAL = "goal"
-    """The landmark that the car is to go to now."""
+    """Current destination of the car."""
     TOLD = "told"
     """The other speaker has told the speaker to do something."""
     # reasons and feelings
@@ -201,9 +201,9 @@ class Proposition:
     """Statement about the world, the car, the tasks or a speaker.
 
     Attributes:
-        predicate: what is said.
+        predicate: predicate of the statement.
         arguments: (name, value) pairs of the arguments that are given, by name; see `PARAMETERS`.
-        negated: whether the opposite is said.
+        negated: whether the statement is negated.
 
     Raises:
         ValueError: an argument is unknown, given twice, or of a wrong type.
@@ -241,7 +241,7 @@ class Proposition:
         return Proposition(self.predicate, self.arguments, not self.negated)
 
     def contains(self, other: Proposition) -> bool:
-        """Returns whether all that another proposition says is said by this one."""
+        """Returns whether this proposition includes everything that another one states."""
         same = self.predicate is other.predicate and self.negated is other.negated
         return same and set(other.arguments) <= set(self.arguments)
 

@@ -23,7 +23,7 @@ PROFILE_FILE: Final = "recognition_errors.json"
 """Data file of the measured profile, written by `benchmarks/recognition_errors.py`."""
 
 RARE: Final = 5
-"""Words that stand no more often in the phrases of the grammar are rare."""
+"""Words that occur at most this often in the phrases of the grammar are rare."""
 
 MODERATE_BELOW: Final = 20.0
 LOUD_BELOW: Final = 16.0
@@ -47,9 +47,9 @@ class WordClass(enum.StrEnum):
     """Class of a spoken word."""
 
     COMMON = "common"
-    """Word that stands more than `RARE` times in the phrases of the grammar, or a single letter."""
+    """Word that occurs more than `RARE` times in the phrases of the grammar, or a single letter."""
     RARE = "rare"
-    """Other word that is no name."""
+    """Other word that is not a name."""
     NAME = "name"
     """Word of the name of a landmark or street."""
 
@@ -76,7 +76,7 @@ class ErrorProfile:
     word_classes: Mapping[WordClass, float]
 
     def circumstances(self, speaker: Role, noise: Loudness) -> float:
-        """Returns the error rate of a speaker in a noise relative to `rate`; the factors are taken as independent."""
+        """Returns the error rate of a speaker in a noise relative to `rate`; assumes independent factors."""
         return self.speakers.get(speaker, 1.0) * self.noises.get(noise, 1.0)
 
 
@@ -120,6 +120,6 @@ def proper_words() -> Mapping[str, str]:
 
 @functools.cache
 def _common_words() -> frozenset[str]:
-    """Returns the words that stand often in the phrases of the grammar; names are never among them."""
+    """Returns the words that occur often in the phrases of the grammar, without names."""
     counts = Counter(re.findall(r"\b[a-z][a-z']+\b", " ".join(read_talk_files().values()).lower()))
     return frozenset(word for word, count in counts.items() if count > RARE) - set(proper_words())

@@ -97,7 +97,7 @@ class SlotRealizer:
             style: style of the speaker.
             scene: dialogue history and objects in view.
             names: largest number of names per slot.
-            of_rider: whether the speaker is the one whose friends and home are spoken of.
+            of_rider: whether the friends and home in question are the speaker's.
         """
         self.random = draw
         self.values = values_by_slot(act.slots)
@@ -289,7 +289,7 @@ _NAMELESS = frozenset({"Unknown", "Queried"})
 
 @functools.lru_cache(maxsize=1024)
 def _agreements(phrase: str) -> tuple[tuple[re.Pattern[str], str], ...]:
-    """Returns patterns of singular verbs beside a plural noun phrase, with what they become."""
+    """Returns patterns of singular verbs next to a plural noun phrase, with their plural forms."""
     noun = re.escape(phrase)
     forms = (
         (rf"\bthere's(?= {noun}\b)", "there are"),

@@ -32,7 +32,7 @@ class BatchedEnv(Restorable, Generic[C, B]):
 
     Attributes:
         num_envs: number of environments.
-        autoreset_mode: when environments that are over begin anew, as `gymnasium.vector.SyncVectorEnv` has it.
+        autoreset_mode: when finished environments are reset, as in `gymnasium.vector.SyncVectorEnv`.
         towns: town of each environment.
         config: settings.
         batches: a batch for each town.
@@ -100,11 +100,11 @@ class BatchedEnv(Restorable, Generic[C, B]):
     # --- States -------------------------------------------------------------------------------------------------------
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environments."""
+        """Returns the changing values of the environments."""
         return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self.batches]}
 
     def apply_values(self, values: dict[str, object]) -> None:
-        """Applies the values of the environments; pictures begin anew."""
+        """Applies the values of the environments; pictures are started again."""
         parts = values.pop("batches")
         assert isinstance(parts, list)  # of `mutable_values`
         for batch, part in zip(self.batches, parts, strict=True):

@@ -134,7 +134,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         """Begins a session.
 
         Args:
-            seed: seed of the session; without one, the next of the series that the last given seed began.
+            seed: seed of the session; by default, the next number after the seed of the previous session.
             options: `scenario` plays a given `Scenario`; other options are ignored, as PettingZoo's API test expects.
 
         Returns:
@@ -203,7 +203,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         return np.concatenate(([session.world.time, *car.position, car.heading, car.speed], padded))
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environment and in its engine, and where the agents take turns."""
+        """Returns the changing values of the environment, its engine, and the turn-based wrapper if there is one."""
         turns = None if self.turns is None else self.turns.turn_values()
         return {**super().mutable_values(), "engine": self.engine.mutable_values(), "turns": turns}
 
@@ -218,7 +218,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
             self.turns.apply_turn_values(turns)
 
     def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment, whether its agents take turns, and what has to be equal in the engine."""
+        """Returns the kind of environment, whether its agents take turns, and engine values that must be equal."""
         form = "parallel" if self.turns is None else "turn-based"
         return {**self.engine.compatibility(), **super().compatibility(), "the form": form}
 

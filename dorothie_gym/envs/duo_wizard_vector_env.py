@@ -49,19 +49,20 @@ Flags: TypeAlias = NDArray[np.bool_]
 class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     """Many sessions of `DuoWizardEnv` in one batch, by agent as in PettingZoo and stacked as in Gymnasium.
 
-    Worlds, observations and masks of all sessions lie in arrays, which compiled code steps on threads; talk stays in
-    Python. A session depends on its seed and its actions, and neither on the others, nor on its place among them, nor
+    Worlds, observations and masks of all sessions lie in arrays, which compiled code steps on threads; the dialogue is
+    computed in Python. A session depends on its seed and its actions, and neither on the others, nor on its place among
+    them, nor
     on the number of threads: it is that of a `DuoWizardEnv`.
 
     Everything is by agent. Of one agent, the values of a field of its observation are an array (num_envs, ...) or, for
-    a text, a tuple of `num_envs` texts, as `gymnasium.vector.utils.batch_space` has it:
+    a text, a tuple of `num_envs` texts, as `gymnasium.vector.utils.batch_space` arranges it:
     `{name: values[k] for name, values in observations[agent].items()}` is the observation in environment `k`.
     All agents of a session end together.
 
     Attributes:
         num_envs: number of environments.
         possible_agents: names of the agents.
-        autoreset_mode: when sessions that are over begin anew, as `gymnasium.vector.SyncVectorEnv` has it.
+        autoreset_mode: when finished sessions are reset, as in `gymnasium.vector.SyncVectorEnv`.
         towns: town of each environment.
         config: settings of the sessions.
         limits: sizes of the spaces, which all towns of the batch share.
@@ -170,8 +171,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         """Begins new sessions.
 
         Args:
-            seed: of the first environment; the others have the numbers that follow. Or one for each. Without one, the
-                next of the series that the environment's last given seed began.
+            seed: seed of the first environment; the others have the numbers that follow. A sequence has one for each.
+                By default, the next number after the environment's previous seed.
             options: `reset_mask`, a bool array (num_envs,): which environments, by default all; `scenario` as in
                 `DuoWizardEnv`, for all of them; other options are ignored.
 
@@ -194,7 +195,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     ) -> tuple[
         dict[str, Stacked], dict[str, NDArray[np.float64]], dict[str, Flags], dict[str, Flags], dict[str, Infos]
     ]:
-        """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
+        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: by agent the fields of its action, each an array (num_envs, ...) or a sequence of `num_envs`
@@ -273,7 +274,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     def _begin_at_once(
         self, last: Mapping[str, Stacked], outcomes: Mapping[int, StepOutcome]
     ) -> tuple[dict[str, Stacked], dict[str, Infos]]:
-        """Begins sessions anew that are over; returns observations and infos as in the mode `SAME_STEP`."""
+        """Resets finished sessions; returns observations and infos as in the mode `SAME_STEP`."""
         over = self._over.copy()
         ended = self._infos(over, outcomes)
         self._begin(over, [None] * self.num_envs, None)
@@ -367,7 +368,7 @@ def rows_of(actions: object, count: int, agents: Sequence[str]) -> Sequence[Mapp
         agents: names of the agents.
 
     Raises:
-        ValueError: `actions` has another form, or not as many values as there are environments.
+        ValueError: `actions` has another form, or does not have one value per environment.
     """
     if isinstance(actions, Mapping):
         if missing := [agent for agent in agents if agent not in actions]:

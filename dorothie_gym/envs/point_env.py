@@ -74,7 +74,7 @@ class PointRules(ABC, Generic[PointT]):
     @property
     @abstractmethod
     def no_label(self) -> Label:
-        """What stands for the correct prediction before there was one: -1 for numbers of classes, and zeros."""
+        """Placeholder for the correct prediction before the first one: -1 for numbers of classes, and zeros."""
 
 
 class ActRules(PointRules[InferencePoint]):
@@ -223,10 +223,10 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
 
     @abstractmethod
     def _info(self) -> StepInfo:
-        """Returns the entries of the infos besides the score."""
+        """Returns the entries of the infos except the score."""
 
     def _judge(self, action: ActionMapping, point: Point) -> None:  # most have nothing to note
-        """Notes a prediction."""
+        """Records a prediction."""
 
     def _metrics(self) -> StepInfo:
         """Returns the entries of the infos that follow from all predictions so far."""

@@ -77,14 +77,14 @@ class SessionView(CachedViews):
         return cls(render_mode, frames_per_second=frames_per_second, role=seen, render_view=render_view)
 
     def begin(self, session: LiveSession) -> None:
-        """Begins a session; what was noted of the last one is forgotten."""
+        """Begins a session; the notes of the previous one are dropped."""
         self._heard = []
         if self._mode is not None and self._role is not None:
             self._seen = pictures.RoleView(self._role, session.world.town)
 
     @property
     def notes(self) -> tuple[pictures.RoleView | None, list[pictures.SpokenLine]]:
-        """What was noted of the session, for a state of the environment."""
+        """Notes on the session, for a state of the environment."""
         return self._seen, self._heard
 
     def apply_values(self, notes: object, session: LiveSession) -> None:
@@ -97,12 +97,12 @@ class SessionView(CachedViews):
         self._heard = heard
 
     def note(self, seen: Observation) -> None:
-        """Notes the role's observation of a decision."""
+        """Records the role's observation at a decision."""
         if self._seen is not None:
             self._seen.note(seen)
 
     def note_instruction(self, time: float, text: str, acts: str) -> None:
-        """Notes an instruction of the participant that is not an utterance of the session; its time is in seconds."""
+        """Records an instruction of the participant that is not an utterance of the session; its time is in seconds."""
         if self._mode is None:
             return
         self._heard.append(pictures.SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
@@ -124,7 +124,7 @@ class SessionView(CachedViews):
         return None
 
     def _windscreen(self, session: LiveSession, size: tuple[int, int]) -> NDArray[np.uint8] | None:
-        """Returns what a camera of this width and height sees [px], otherwise with the settings of the session's."""
+        """Returns the picture of a camera like the session's, but of this width and height [px]."""
         if self._camera is None or self._camera[0] is not session:
             self._camera = (
                 session,

@@ -52,7 +52,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
 
     ## Episode End
     Terminates when the destination is reached; truncates after `config.max_seconds` or `max_cycles` decisions.
-    `info["is_success"]` tells at the end whether every live subgoal was reached without a collision caused by the ego,
+    `info["is_success"]` states at the end whether every live subgoal was reached without a collision caused by the ego,
     and is False before.
 
     ## Arguments
@@ -152,7 +152,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         return observation, reward, outcome.terminated, outcome.truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws what the role observes, or the session (see `view`), as `DuoWizardEnv.render`."""
+        """Draws the role's observation, or the session (see `view`), as `DuoWizardEnv.render`."""
         return self._view.render(self.engine.session)
 
     def _show(self, observation: Observation) -> None:
@@ -165,7 +165,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         self._view.close()
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environment, its engine and its partners."""
+        """Returns the changing values of the environment, its engine and its partners."""
         states = {role: Unchanged(state) for role, state in self._states.items()}
         return {
             **super().mutable_values(),
@@ -185,7 +185,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
             self._view.apply_values(notes, self.engine.session)
 
     def compatibility(self) -> dict[str, object]:
-        """Returns role and partners, and what has to be equal in the engine."""
+        """Returns role and partners, and the values of the engine that must be equal."""
         partners = {str(role): type(policy).__name__ for role, policy in self.partners.items()}
         return {
             **self.engine.compatibility(),

@@ -17,7 +17,7 @@ def is_warm() -> bool:
 
 
 def warm_up(progress: Progress | None = None) -> None:
-    """Compiles what batches need and is not yet in the cache; `progress` as in `engine.warm_up.warm_up`."""
+    """Compiles the functions of batches that are not yet in the cache; `progress` as in `engine.warm_up.warm_up`."""
     with reporting(progress):
         env = NavigationVectorEnv(1, TOWN, threads=1)
         env.reset(seed=0)

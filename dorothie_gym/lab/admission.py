@@ -87,10 +87,10 @@ def network_of(host: str | None) -> str:
     """Returns the address by which visitors are counted: one of IPv4, or the /64 network of one of IPv6.
 
     Args:
-        host: address of a connection, or what a proxy says about it.
+        host: address of a connection, or the address reported by a proxy.
 
     Returns:
-        A short text; an empty one for what is no address.
+        A short text; empty if it is not an address.
     """
     try:
         address = ipaddress.ip_address((host or "").partition("%")[0])
@@ -180,7 +180,7 @@ class Visitors:
                 del self._addresses[visitor.address]
 
     def recognise(self, visitor: Visitor) -> None:
-        """Notes that a connection has shown a valid secret."""
+        """Records that a connection has presented a valid secret."""
         if visitor in self._strangers and len(self._known) < self._most_known:
             self.leave(visitor)
             self._known.add(visitor)
@@ -194,7 +194,7 @@ class Visitors:
             self._end(visitor)
 
     def close(self) -> None:
-        """Ends all strangers, and admits nobody from now on: the server stops."""
+        """Ends the connections of all strangers, and admits no more: the server stops."""
         self._closed = True
         for visitor in list(self._strangers):
             self._end(visitor)

@@ -18,15 +18,15 @@ LOCAL_NAMES: Final = frozenset({"localhost", "localhost.localdomain", "ip6-local
 
 
 class ForeignHosts:
-    """Refuses browsers that came by a name which is not of this machine ("DNS rebinding").
+    """Refuses browsers that used a name that does not belong to this machine ("DNS rebinding").
 
     The owner of a name can let it point to the server, and pages of the owner then count as pages of the server. This
     takes a name, so addresses are safe. It takes a page without TLS, as nobody has a certificate for the name of
     somebody else, so requests of pages with TLS are safe: they came through a proxy. Otherwise the name must be
     one of this machine, or the one at which it was told to listen (`app.state.host_names`).
 
-    Websockets and requests that change something have an `Origin`, which scripts cannot change. Programs that are no
-    browsers have none, and are not refused. A page is refused only to tell the person why.
+    Websockets and requests that change something have an `Origin`, which scripts cannot change. Programs other than
+    browsers send none, and are not refused. A page is refused only to inform the person.
 
     Args:
         app: the application.
@@ -87,7 +87,7 @@ def is_address(name: str) -> bool:
 
 
 def is_cleartext_browser(headers: Headers) -> bool:
-    """Returns whether a request is of a browser whose page was loaded without TLS, as far as one can know."""
+    """Returns whether a request is of a browser whose page was loaded without TLS, as far as this is known."""
     origin = headers.get("origin")
     if origin is not None:
         return not origin.lower().startswith("https://")

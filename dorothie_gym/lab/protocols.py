@@ -38,7 +38,7 @@ _GUARD: Final = "dorothie_gym.guard"
 
 @dataclass(frozen=True)
 class Guard:
-    """What all connections of a server share, and the connection of a request."""
+    """Shared state of all connections of a server, and the connection of a request."""
 
     visitors: Visitors
     turns: Turns
@@ -46,7 +46,7 @@ class Guard:
 
 
 def recognise(connection: HTTPConnection) -> None:
-    """Notes that a request, or a websocket, has shown a valid secret: its connection is kept in a flood.
+    """Records that a request, or a websocket, has presented a valid secret: its connection is kept in a flood.
 
     Does nothing if another web server runs the application.
     """
@@ -71,7 +71,7 @@ class GuardedHttp(H11Protocol):
     """Connection for requests, which are read in turns.
 
     Args:
-        guard: what all connections share.
+        guard: shared state of all connections.
         config, server_state, app_state, _loop: as for uvicorn's protocol.
     """
 
@@ -106,11 +106,11 @@ class GuardedHttp(H11Protocol):
         self._let_go()
 
     def _let_go(self) -> None:
-        """Drops what leads back to this object, so that it needs no search for garbage, which stops all threads."""
+        """Drops references to this object, so that it needs no garbage collection, which stops all threads."""
         self.flow = self.cycle = None  # type: ignore[assignment]
 
     def data_received(self, data: bytes) -> None:
-        """Keeps what was received until it is this connection's turn."""
+        """Keeps received data until it is this connection's turn."""
         self._unset_keepalive_if_required()
         self._unread += data
         if len(self._unread) >= PART:
@@ -127,7 +127,7 @@ class GuardedHttp(H11Protocol):
         super().on_response_complete()
 
     def take_turn(self) -> None:
-        """Reads a part of what was received."""
+        """Reads a part of the received data."""
         self._asked = False
         if self._unread:  # h11 takes empty data for the end of the connection
             self.conn.receive_data(bytes(self._unread[:PART]))
@@ -179,7 +179,7 @@ class GuardedHttp(H11Protocol):
 
 
 class GuardedSocket(WebSocketsSansIOProtocol):
-    """Websocket that is read in turns, and may send little, until it has joined; it learns why it is refused."""
+    """Websocket that is read in turns, and may send little, until it has joined; it gets the reason of a refusal."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -198,7 +198,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Reads what was received, or keeps what a stranger sends until it is this connection's turn."""
+        """Reads received data, or keeps the data of a stranger until it is this connection's turn."""
         if self._refused:
             return
         if not self._unread and (self.visitor.known or not self.handshake_initiated):
@@ -211,14 +211,14 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self._ask()
 
     async def receive(self) -> ASGIReceiveEvent:
-        """Returns the next message; the rest of what was received is read after it."""
+        """Returns the next message; the rest of the received data is read after it."""
         message = await super().receive()
         if self._unread and not self.read_paused:
             self._ask()
         return message
 
     def take_turn(self) -> None:
-        """Reads a slice of what was received; refuses a stranger who has sent more than is needed to join."""
+        """Reads a slice of the received data; refuses a stranger who has sent more data than joining needs."""
         self._asked = False
         part = bytes(self._unread[:SLICE])
         del self._unread[:SLICE]
@@ -248,14 +248,14 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self.transport.abort()
 
     async def send(self, message: ASGISendEvent) -> None:
-        """Sends what the application wants to, unless the websocket was refused meanwhile."""
+        """Sends the application's message, unless the websocket has been refused."""
         await self.writable.wait()
         if self._refused:
             raise ClientDisconnected
         await super().send(message)
 
     def handle_parser_exception(self) -> None:
-        """Sends the reason of a refusal; what the browser still sends is dropped until it has read the reason."""
+        """Sends the reason of a refusal; further data of the browser are dropped until it has read the reason."""
         sent = self.conn.close_sent
         assert sent is not None
         self._refused = self.close_sent = True

@@ -61,10 +61,10 @@ FREEZES: Final = 0, 50, 100, 300, 600
 and the objects of libraries, of which a session loads some when it begins, would stop all threads for 0.3 s."""
 
 LOGGERS: Final = "uvicorn.error", "asyncio", __name__
-"""Loggers whose messages others can cause by what they send."""
+"""Loggers whose messages can be triggered by incoming data."""
 
 FORWARDED: Final = "FORWARDED_ALLOW_IPS"
-"""Variable of uvicorn with the addresses of proxies whose `X-Forwarded-For` is believed; by default of none."""
+"""Variable of uvicorn with the addresses of proxies whose `X-Forwarded-For` is trusted; none by default."""
 
 HEADERS: Final = {
     "Content-Security-Policy": (
@@ -103,7 +103,7 @@ class WebServer(Server):
             listener.listen(BACKLOG)  # asyncio has set it to the number of connections that it accepts at once
 
     async def on_tick(self, counter: int) -> bool:
-        """Ends connections whose time is over; returns whether the server is to stop."""
+        """Ends connections whose time is over; returns whether the server must stop."""
         if counter in FREEZES:
             gc.freeze()
         self._visitors.sweep()

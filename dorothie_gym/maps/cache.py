@@ -136,7 +136,7 @@ def _column(values: list[object], arrays: list[Array]) -> _Column:
 
 
 def _plain(value: object) -> object:
-    """Converts what JSON does not support: numpy scalars and nested dataclasses."""
+    """Converts values that JSON does not support: numpy scalars and nested dataclasses."""
     if isinstance(value, np.generic):
         return value.item()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -211,7 +211,7 @@ def _frozen(value: object) -> object:
 
 
 def _faults(town: Town) -> Iterator[str]:
-    """Yields what no compiled town has: references to missing elements, and arrays of other shapes or numbers."""
+    """Yields faults of a town: references to missing elements, and arrays of wrong shapes or lengths."""
     for part in ("lanes", "streets", "sites", "crosswalks", "sidewalks"):
         if [element.id for element in getattr(town, part)] != list(range(len(getattr(town, part)))):
             yield f"{part} are not numbered from 0"
@@ -290,7 +290,7 @@ def towns_folder() -> Path | None:
 
 @functools.cache
 def compiler_digest() -> str | None:
-    """Returns a digest of everything besides the source file that determines the compiled town.
+    """Returns a digest of everything except the source file that determines the compiled town.
 
     It covers the sources of this package and of the arithmetic that it uses (`angles`, `portable_math`,
     `portable_arrays` and their compilation), and the versions of numpy and scipy, which may round differently. None if

@@ -82,7 +82,7 @@ class RightOfWay:
         successive connectors do not conflict: vehicles follow each other there.
 
         Returns:
-            Ids in ascending order; none for a lane that is no connector. The relation is symmetric.
+            Ids in ascending order; empty for a lane that is not a connector. The relation is symmetric.
         """
         return self._foes.get(connector, ())
 

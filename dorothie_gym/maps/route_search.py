@@ -336,7 +336,7 @@ def _is_clear(closed: NDArray[np.bool_], edges: RecordArray[RoutingEdge], number
 
 @compiled
 def _reach(search: RouteSearch, size: int, number: int, edge: int, cost: float) -> int:
-    """Notes an edge to a node if no cheaper one was found before; returns the size of the heap."""
+    """Records an edge to a node if no cheaper one was found before; returns the size of the heap."""
     heap, nodes = search.heap, search.nodes
     node = nodes[number]
     at = int(node.place)

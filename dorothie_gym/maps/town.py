@@ -1,4 +1,4 @@
-"""Town: lanes, links and everything beside the roads, with the queries that the simulation asks."""
+"""Town: lanes, links and everything along the roads, with the queries of the simulation."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def check_extent(town: Town, source: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class TownIdentity:
-    """What distinguishes a town from others.
+    """Identity of a town.
 
     Attributes:
         name: its name.

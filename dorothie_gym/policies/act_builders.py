@@ -15,7 +15,7 @@ QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove
 
 
 def destination(place: LandmarkName | None, street: StreetName | None = None) -> Proposition:
-    """Returns that the car is to go to a place now, and on which street that lies, if the street is known."""
+    """Returns the proposition that the car should go to a place now, with the street of the place if it is known."""
     return Proposition.of(Predicate.GOAL, place=place, street=named(street))
 
 
@@ -44,8 +44,8 @@ def action(
         value: the action; None where only the street is said.
         words: words of the other speaker that give direction and speed.
         direction: direction, where no words give it.
-        street: street on which, or onto which.
-        place: place at which.
+        street: street of the action, or street to enter.
+        place: place of the action.
         speed: speed [km/h], where no words give it.
     """
     if words is not None:
@@ -69,7 +69,7 @@ def named_streets(act: DialogueAct) -> tuple[StreetName, ...]:
 
 
 def arguments_of(content: Proposition, *kept: str) -> tuple[str, ...]:
-    """Returns the names of the arguments of a content, without some: what is left out of a short answer."""
+    """Returns the names of the arguments of a content, except some: those that a short answer omits."""
     return tuple(name for name, _ in content.arguments if name not in kept)
 
 

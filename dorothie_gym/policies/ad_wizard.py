@@ -289,7 +289,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 def idle_until(policy: ScriptedAdWizard, state: AdWizardState, story: str) -> float:
     """Returns the earliest time at which the next step may do more than count a decision [s].
 
-    Who knows that the time has not come need not observe: `state.advanced()` is the state after the step.
+    A caller that knows that the time has not come need not observe: `state.advanced()` is the state after the step.
 
     Args:
         policy: the policy.

@@ -1,4 +1,4 @@
-"""Noticing of the scripted agents: the ten parameters of the weather, crowds, and what limits the view."""
+"""Conditions that the scripted agents notice: the ten parameters of the weather, crowds, and limits of the view."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = complete(
     "CONSPICUOUS",
     __name__,
 )
-"""How conspicuous each parameter is; it is noticed from 1 on, and its end below `OVER`. The sun is noticed when it is
-within 15 degrees of the horizon, or stands elsewhere than at noon."""
+"""Conspicuousness of each parameter, which is noticed from 1 on, and whose end is noticed below `OVER`. The sun is
+noticed when it is within 15 degrees of the horizon, or stands elsewhere than at noon."""
 
 OVER: Final = 0.6
 
@@ -60,7 +60,7 @@ CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTR
 """Least number of objects in a crowd."""
 
 MORE_THAN_USUAL: Final = 1.5
-"""Least number of objects by which a crowd exceeds what is usual."""
+"""Least number of objects by which a crowd exceeds the usual number."""
 
 USUAL_TIME: Final = 30.0
 """Time over which the usual number of objects is averaged [s]."""
@@ -89,7 +89,7 @@ HIDDEN: Final[Mapping[Limit, tuple[ObjectClass, ...]]] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class Noticed:
-    """What an agent has noticed.
+    """Conditions that an agent has noticed.
 
     Attributes:
         weather: parameters that have become conspicuous and are still so.
@@ -129,7 +129,7 @@ class Noticed:
         return replace(self, usual=usual, looked_at=now)
 
     def after_hearing(self, words: ParsedText, now: float) -> Noticed:
-        """Records what the other speaker has just mentioned at a time [s], which then needs no mention."""
+        """Records conditions that the other speaker has just mentioned at a time [s], which then need no mention."""
         told = words.told
         if told is None:
             return self
@@ -152,15 +152,14 @@ def notice(
     """Looks around, and perhaps mentions a change of the weather or a crowd.
 
     Args:
-        noticed: what has been noticed before.
+        noticed: conditions noticed before.
         observation: observation of the agent.
         objects: objects in sight.
         rng: random generator of the decision.
-        chance: probability that what is noticed is mentioned.
+        chance: probability that a noticed condition is mentioned.
         handled: parameters whose beginning the agent reacts to elsewhere.
 
-    Returns:
-        The remark, or None, and what has been noticed now.
+    Returns: The remark, or None, and the noticed conditions.
     """
     for parameter, high in changes(observation, noticed.weather):
         told = (parameter, high) in noticed.mentioned
@@ -189,7 +188,7 @@ def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tu
 
 
 def crowds_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> list[ObjectClass]:
-    """Returns those of pedestrians and vehicles of which conspicuously many are near, and more than usual."""
+    """Returns the classes of which conspicuously many objects, and more than usual, are near."""
     return [
         kind
         for (kind, least), mean in zip(CROWDS.items(), usual, strict=True)
@@ -210,10 +209,10 @@ def weather_change_remark(parameter: W, *, high: bool) -> Remark:
 
 
 def view_remark(limit: Limit, distance: float, rng: np.random.Generator) -> Remark:
-    """Returns a remark about what limits the view: the condition, an object that it hides, or how far one sees.
+    """Returns a remark about the limit of the view: the condition, an object that it hides, or the sight distance.
 
     Args:
-        limit: what limits it.
+        limit: cause of the limit.
         distance: range of sight [m].
         rng: random generator of the decision.
     """

@@ -114,7 +114,7 @@ class SeenObject:
 
     @property
     def prop(self) -> PropKind | None:
-        """The kind of prop whose size this is; None for what is no prop."""
+        """The kind of prop whose size this is; None for objects other than props."""
         if self.kind is not ObjectClass.STATIC:
             return None
         return min(PropKind, key=lambda kind: abs(kind.length - self.length) + abs(kind.width - self.width))

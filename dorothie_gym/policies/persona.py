@@ -22,7 +22,7 @@ class Directions(enum.StrEnum):
     TURNS = "turns"
     """By turns, with ordinals and the names of streets."""
     LANDMARKS = "landmarks"
-    """By what is to be seen on the way and at the goal."""
+    """By visible objects along the route and at the goal."""
     VAGUE = "vague"
     """Late and without details, so that the car has to ask."""
 
@@ -42,13 +42,14 @@ class Persona:
     """Lasting traits of a speaker. Without a unit, a trait is in [0, 1], and its average is 0.5.
 
     Attributes:
-        talkativeness: how much is said beside what is needed.
-        patience: how long standstills and silence are borne.
+        talkativeness: amount of optional remarks.
+        patience: tolerance of standstills and silence.
         politeness: from blunt to polite.
-        certainty: how rarely the speaker hesitates, checks, and asks to repeat.
-        knowledge: how well the participant knows the town: names of streets, and the way.
-        attention: how much of weather, crowds and the way is noticed; below `INATTENTIVE` nothing is remarked on.
-        humour: how much small talk there is.
+        certainty: rarity of hesitations, checks, and requests to repeat.
+        knowledge: the participant's knowledge of the town: names of streets, and the route.
+        attention: attention to weather, crowds and the route; below `INATTENTIVE`, the speaker makes no remarks on
+            them.
+        humour: amount of small talk.
         directions: way of giving directions (participant).
         driving: driving style (Co-Wizard).
         pace: speaking rate relative to the average.

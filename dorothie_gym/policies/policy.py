@@ -29,9 +29,9 @@ else:
     def replace(state, **changes):
         """Returns a copy of a frozen state with other values in some of its fields.
 
-        Does what `dataclasses.replace` does for dataclasses without ``__post_init__``, ``InitVar`` and slots, in a
-        quarter of the time, as agents change a dozen groups of their state in every decision. Type checkers see the
-        original, which checks names and types of the fields.
+        Replaces fields like `dataclasses.replace`, for dataclasses without ``__post_init__``, ``InitVar`` and slots, in
+        a quarter of the time, because agents change a dozen groups of their state in every decision. Type checkers see
+        the original, which checks names and types of the fields.
         """
         copy = object.__new__(type(state))
         copy.__dict__.update(state.__dict__)
@@ -81,7 +81,7 @@ class Policy(ABC, Generic[State]):
         return None
 
     def usage_of(self, state: State) -> Mapping[str, object] | None:
-        """Returns what a session has cost so far (calls, tokens), in JSON types, for the record; None for nothing."""
+        """Returns the costs of a session so far (calls, tokens), in JSON types, for the recording; None for nothing."""
         return None
 
     @abstractmethod

@@ -21,7 +21,7 @@ END_ROOM = 6.0
 """Distance to the end of a lane within which a car waits there and no longer turns round [m]."""
 
 SAME_WAY = 25.0
-"""Difference in angle within which an exit of the own lane is taken instead of that of a neighbour [degrees]."""
+"""Difference in angle within which an exit of the car's lane is taken instead of that of a neighbour [degrees]."""
 
 RIGHT_BEHIND = 70.0
 """Distance from a junction to a goal within which there may be no room to change lanes [m]."""
@@ -118,8 +118,8 @@ def needs_switch(
 ) -> bool:
     """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
-    Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
-    own lane and come out beside a goal that is right behind it.
+    Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its own
+    lane and end up next to a goal right behind the junction.
 
     Args:
         tables: lanes and exits.

@@ -171,7 +171,7 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
 
 
 def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
-    """Returns the lanes of the same direction beside a lane, the nearest first."""
+    """Returns the adjacent lanes of the same direction, the nearest first."""
     found: list[int] = []
     for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
         beside = town.neighbour(lane, side)
@@ -184,7 +184,7 @@ def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
 def find_exit(
     town: Town, choice: Choice, direction: Direction | None, streets: frozenset[int] = frozenset()
 ) -> Exit | None:
-    """Returns the exit meant by a direction and perhaps a street; lanes beside count where the own has no such exit.
+    """Returns the exit meant by a direction and perhaps a street, if necessary from an adjacent lane.
 
     Args:
         town: the map.
@@ -314,8 +314,8 @@ class RouteProgress:
     def needs_switch(self, town: Town, lane: int, station: float, crossing: RouteJunction) -> bool:
         """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
-        Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
-        own lane and come out beside a goal that is right behind it.
+        Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its
+        own lane and end up next to a goal right behind the junction.
         """
         tables = route_tables(town)
         wanted = int(tables.rows[crossing.lane]) + town.exits(crossing.lane).index(crossing.exit)
@@ -342,7 +342,7 @@ MOST_AVOIDED = 3
 
 @dataclass(frozen=True, kw_only=True)
 class RouteState:
-    """Route of an agent, and what it knows about places that the planner must not use.
+    """Route of an agent, and known places that the planner must not use.
 
     Attributes:
         progress: route to the goal and the progress on it; None without a place to go to.
@@ -375,7 +375,7 @@ class RouteState:
         return replace(self, progress=self.progress.replanned(town, start, self.closed))
 
     def has_missed(self, before: float, station: float) -> bool:
-        """Returns whether the goal, `before` metres ahead on the former route, now needs a long way round."""
+        """Returns whether the goal, `before` metres ahead on the former route, now needs a long detour."""
         assert self.progress is not None
         return before < NEAR_MISS and self.progress.left(station) > before + WAY_ROUND
 
@@ -386,7 +386,7 @@ class RouteState:
         return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted
 
     def avoiding(self, town: Town, start: Place, place: Place) -> RouteState:
-        """Excludes a place, besides the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
+        """Excludes a place, in addition to the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
         return replace(self, avoided=(*self.avoided, place)[-MOST_AVOIDED:]).replanned(town, start)
 
     def knows_roadblock(self, place: Place) -> bool:

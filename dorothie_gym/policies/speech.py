@@ -48,7 +48,7 @@ class Remark:
     Attributes:
         act: move and slots.
         wording: particulars for the words.
-        meaning: propositions that are stated, asked or asked for.
+        meaning: propositions that are stated, asked or requested.
         text: the words, if they are chosen already.
         joined: whether it is said in the same breath as the remark before.
         urgent: whether it may be said without leaving the other speaker time to answer.
@@ -95,8 +95,8 @@ def intend(
     """Returns the remark that carries out an intention.
 
     Args:
-        function: what is done with the content.
-        content: what is stated, asked, asked for or answered; None where there is no content.
+        function: communicative function of the content.
+        content: proposition that is stated, asked, requested or answered; None where there is no content.
         also: further contents of the same span: "forget KFC, go to Ikea".
         elided: arguments of the contents that are left out of the words.
         wording: further particulars for the words; where no topic is given it is the predicate of the content, with
@@ -122,7 +122,7 @@ def intend(
 
 
 def repeated(item: Remark, function: CommunicativeFunction) -> Remark:
-    """Returns a remark that says again, by another function, what `item` says: "I said the second left"."""
+    """Returns a remark that repeats the content of `item` with another function: "I said the second left"."""
     return Remark(act=DialogueAct(function.move, item.act.slots), wording=item.wording, meaning=item.meaning)
 
 
@@ -201,7 +201,7 @@ class SpeechState:
         return replace(self, queue=())
 
     def without_told(self, told: Proposition | None) -> SpeechState:
-        """Drops the queued statements of what the other speaker has just said; what is joined to them stays."""
+        """Drops queued statements that the other speaker has just made; keeps remarks joined to them."""
         if told is None:
             return self
         return self._without(
@@ -209,7 +209,7 @@ class SpeechState:
         )
 
     def without_statements(self, predicates: Collection[Predicate]) -> SpeechState:
-        """Drops the queued remarks about some predicates; what is joined to them stays."""
+        """Drops the queued remarks about some predicates; keeps remarks joined to them."""
         return self._without(lambda item: any(said.predicate in predicates for said in item.meaning))
 
     def _without(self, drops: Callable[[Remark], bool]) -> SpeechState:
@@ -258,7 +258,7 @@ class SpeechState:
 
         Args:
             now: time [s].
-            speaking: remaining duration of the own utterance [s].
+            speaking: remaining duration of its own utterance [s].
             rng: random generator for the words.
             scene: context that the words may refer to; the latest acts are added.
             interval: time to the next decision [s].

@@ -1,4 +1,4 @@
-"""Timing of speech: speaking rate, the gap before a reply, and the pauses between own utterances."""
+"""Timing of speech: speaking rate, the gap before a reply, and the pauses between utterances of one speaker."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Delivery:
 
     Attributes:
         pace: speaking rate relative to `WORDS_PER_SECOND`.
-        gap: median of the time between the other's last word and the own first one [s]; 0 replies at once.
-        pause: median of the silence between two own utterances [s].
+        gap: median of the time between the other's last word and the speaker's first one [s]; 0 replies at once.
+        pause: median of the silence between two utterances of the speaker [s].
         patience: silence after a move that wants an answer [s].
     """
 
@@ -51,7 +51,7 @@ class Delivery:
         return _skewed(self.gap, rng)
 
     def draw_pause(self, rng: np.random.Generator, *, wants_answer: bool) -> float:
-        """Draws the silence after an own utterance [s]."""
+        """Draws the silence after an utterance of the speaker [s]."""
         usual = self.patience if wants_answer else self.pause
         return usual if self.gap == 0.0 else _skewed(usual, rng, SPREAD / 2.0)
 

@@ -30,7 +30,7 @@ class DrawCount:
 
 
 class SilentPolicy(Policy[None]):
-    """Says and does nothing."""
+    """Policy that neither speaks nor acts."""
 
     observes = False
 
@@ -67,9 +67,9 @@ class RandomPolicy(Policy[DrawCount]):
 
 
 class LaneFollowPolicy(Policy[None]):
-    """Co-Wizard that drives and never talks; a baseline for what driving achieves without dialogue.
+    """Co-Wizard that drives and never talks; a baseline for driving without dialogue.
 
-    It follows its lane, takes the straightest exit where it has to choose, and turns round at a dead end. It acts only
+    It follows its lane, takes the straightest exit if it has to choose, and turns round at a dead end. It acts only
     where the car has been stopped or waits at the end of its lane.
     """
 

@@ -1,7 +1,7 @@
-"""The range of sight of an agent: what limits it, whether the camera fails, and which speed suits it.
+"""The sight distance of an agent: its limits, failures of the camera, and a suitable speed.
 
 No role observes the fault of a camera. A car knows how far its camera should see in the weather and light that it
-measures; from what is missing, it infers that the picture is blurred, or that there is none.
+measures; from the difference, it infers that the picture is blurred, or that there is none.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ DECELERATION: Final = 3.4
 
 
 class Limit(enum.StrEnum):
-    """What limits the view."""
+    """Cause of a limited view."""
 
     FOG = "fog"
     RAIN = "rain"
@@ -53,7 +53,7 @@ def sight_in_weather(observation: ObservationMapping) -> float:
 
 
 def camera_fault(observation: ObservationMapping) -> Sensor | None:
-    """Returns what the car infers about its camera: no picture, a blurred one, or (None) no fault."""
+    """Returns the car's inference about its camera: no picture, a blurred one, or (None) no fault."""
     seen, expected = sight(observation), sight_in_weather(observation)
     if seen >= LOSS * expected:
         return None
@@ -61,7 +61,7 @@ def camera_fault(observation: ObservationMapping) -> Sensor | None:
 
 
 def limit_of(observation: ObservationMapping) -> Limit | None:
-    """Returns what limits the view; None if nothing does."""
+    """Returns the cause of a limited view; None if nothing does."""
     if camera_fault(observation) is not None:
         return Limit.CAMERA
     if is_foggy(observation):

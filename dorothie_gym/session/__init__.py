@@ -1,1 +1,1 @@
-"""A session: its engine, exceptions, dialogue and beliefs, what the roles observe and do, and its recording."""
+"""A session: its engine, exceptions, dialogue, beliefs, observations and actions of the roles, and its recording."""

@@ -29,7 +29,7 @@ class CameraMount:
     """Place of the camera on the car.
 
     Attributes:
-        forward: of the middle of the car [m].
+        forward: distance in front of the middle of the car [m].
         up: above the road [m].
         pitch: upwards [degrees].
 
@@ -58,8 +58,8 @@ class CameraConfig:
     """Settings of a camera.
 
     Attributes:
-        width: of the picture [pixels].
-        height: of the picture [pixels].
+        width: width of the picture [pixels].
+        height: height of the picture [pixels].
         field_of_view: horizontal [degrees].
         mount: place on the car.
         outputs: parts of a picture; all but `CameraOutput.RGB` are privileged.

@@ -6,7 +6,7 @@ import enum
 
 
 class ChannelKind(enum.StrEnum):
-    """What carries the words between participant and Co-Wizard."""
+    """Channel of the words between participant and Co-Wizard."""
 
     TEXT = "text"
     """Text with simulated recognition errors, `EnvConfig.word_error_rate`."""

@@ -29,11 +29,11 @@ class EnvConfig:
         world: settings of traffic, pedestrians and sensing.
         rewards: weights of the reward terms.
         camera: first-person camera on the car, whose pictures the participant and the Co-Wizard observe; None for none.
-            It changes nothing else in a session.
-        perception: what the participant and the Co-Wizard see. With `PerceptionModel.CAMERA` they observe the objects
-            that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The car's own
-            safety functions stay as they are.
-        channel: what carries the words between participant and Co-Wizard. With `ChannelKind.SPEECH` they are
+            It affects nothing else in a session.
+        perception: perception model of the participant and the Co-Wizard. With `PerceptionModel.CAMERA` they observe
+            the objects that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The
+            car's own safety functions are not affected.
+        channel: channel of the words between participant and Co-Wizard. With `ChannelKind.SPEECH` they are
             synthesised, mixed with the noise of the car and recognised; `word_error_rate` is then not used, and
             utterances take as long as their audio. Needs the extra `speech`.
     """

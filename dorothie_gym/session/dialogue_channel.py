@@ -162,7 +162,7 @@ class DialogueChannel:
 
     @property
     def recordings(self) -> Mapping[str, Samples]:
-        """Audio of the spans that were delivered last, by file name; none if the channel is text."""
+        """Audio of the spans that were delivered last, by file name; empty for a text channel."""
         return {} if self._spoken is None else self._spoken.recordings
 
     @property

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 class StepBegun(NamedTuple):
-    """What the end of a decision needs to know of its beginning.
+    """State from the beginning of a decision that its end needs.
 
     Attributes:
         message: message of the Ad-Wizard.
@@ -93,7 +93,7 @@ class LiveSession:
         limits: SpaceLimits,
         arrays: WorldArrays | None = None,
     ) -> None:
-        """Begins a session, or takes over one of which only the world has been played.
+        """Begins a session, or takes over a session of which only the world has been simulated.
 
         Args:
             town: the map.
@@ -259,7 +259,7 @@ class LiveSession:
     # --- consequences -----------------------------------------------------------------------------------------------
 
     def note_place(self) -> None:
-        """Notes the place of the ego at a decision."""
+        """Records the place of the ego at a decision."""
         self.trail.append(self._ego_position())
 
     def note_arrivals(self) -> None:

@@ -38,7 +38,7 @@ class ActionMasks(CachedViews):
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_exceptions",)
 
     def __init__(self, views: SessionViews, task: TaskState) -> None:
-        """Writes what stays the same in the session.
+        """Writes the constant masks of the session.
 
         Args:
             views: the row of the session.

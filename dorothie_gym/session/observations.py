@@ -71,14 +71,14 @@ class DeliveredMessages:
 class ObservationBuilder(CachedViews):
     """Builds the observations of a session, for the roles that are asked for.
 
-    Compiled code writes what changes at every decision (`view_steps`). Constant values are written once, and rarely
-    changing ones when they change.
+    Compiled code writes values that change at every decision (`view_steps`). Constant values are written once, and
+    rarely changing ones when they change.
     """
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_tables",)
 
     def __init__(self, views: SessionViews, scenario: Scenario, task: TaskState, beliefs: BeliefTracker) -> None:
-        """Writes what stays the same in the session.
+        """Writes the constant masks of the session.
 
         Args:
             views: the row of the session.
@@ -113,7 +113,7 @@ class ObservationBuilder(CachedViews):
         return {_NAMES[role]: arrays.observation(role, row) for role in roles}
 
     def write(self, delivered: DeliveredMessages) -> None:
-        """Writes all that the compiled code does not: what is said, and what has changed of the rest."""
+        """Writes all values that the compiled code does not write: utterances, and changes of the rest."""
         self._write_talk(delivered)
         self._write_props()
         weather = tuple(self._world.weather.values.values())
@@ -230,7 +230,7 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
     """Writes the subgoals as rows of `SubgoalColumn`.
 
     Args:
-        table: table of which all rows are written.
+        table: table, all rows of which are written.
         task: present state of the task.
         permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
     """

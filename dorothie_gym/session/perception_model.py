@@ -1,4 +1,4 @@
-"""Models of what the roles see, for settings and for the command line, which imports little."""
+"""Perception models of the roles, in a module that settings and the command line can import quickly."""
 
 from __future__ import annotations
 

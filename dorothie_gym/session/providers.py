@@ -1,7 +1,8 @@
 """Parts of a session that other packages provide: pictures, perception by pictures, and spoken words.
 
-A session knows what these parts do, not how: it imports neither the camera nor speech. Where a configuration asks for a
-part, its class is found by name, as Gymnasium finds environments by the entry points of their registration.
+A session knows the interfaces of these parts, not their implementations: it imports neither the camera nor speech. If a
+    configuration requests a part, its class is found by name, as Gymnasium finds environments by the entry points of
+    their registration.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from dorothie_gym.support.audio import Samples
 
 PICTURES: Final = "dorothie_gym.pictures.camera.session_pictures:SessionPictures"
-"""Entry point of what draws `Pictures`."""
+"""Entry point of the class that draws `Pictures`."""
 
 PERCEPTION: Final = "dorothie_gym.pictures.camera.camera_perception:CameraPerception"
 """Entry point of the `VisiblePerception`."""
@@ -45,7 +46,7 @@ class Pictures(Protocol):
 
 
 class VisiblePerception(Protocol):
-    """What the pictures of a session let the roles perceive (`camera.camera_perception`)."""
+    """Perception of the roles by the pictures of a session (`camera.camera_perception`)."""
 
     @property
     def in_view(self) -> tuple[int, ...]:
@@ -62,11 +63,11 @@ class VisiblePerception(Protocol):
         """Returns the number of visible pixels of a body, by its key."""
 
     def add_to(self, observations: Mapping[str, Observation]) -> None:
-        """Writes what is seen into the observations of the roles that see it, which own their arrays."""
+        """Writes visible objects into the observations of the roles that see them, which own their arrays."""
 
 
 class SpokenChannel(Protocol):
-    """Voices of a session and what is recognised of them (`speech.spoken_dialogue`).
+    """Voices of a session and their recognition (`speech.spoken_dialogue`).
 
     Attributes:
         recordings: audio of the spans that were delivered last, with noise, at 16 kHz, by file name.
@@ -75,13 +76,13 @@ class SpokenChannel(Protocol):
     recordings: dict[str, Samples]
 
     def give_voices(self, pitches: Mapping[Role, float]) -> None:
-        """Gives speakers a pitch of their own, relative to that of the synthesiser, by role."""
+        """Sets the pitch of speakers by role, relative to that of the synthesiser."""
 
     def speak(self, role: Role, text: str, pace: float) -> Samples:
-        """Returns a text as a role says it, at 16 kHz (n,), at a rate relative to that of the session."""
+        """Returns a text spoken by a role, at 16 kHz (n,), at a rate relative to that of the session."""
 
     def begin(self, role: Role, samples: Samples, end: float) -> None:
-        """Notes a span that a role has begun and that ends at a time [s]."""
+        """Records a span that a role has begun and that ends at a time [s]."""
 
     def seconds(self, samples: Samples) -> float:
         """Returns the duration of audio [s]."""
@@ -90,7 +91,7 @@ class SpokenChannel(Protocol):
         """Returns the name of the file with the audio of a span; spans are counted from 0."""
 
     def hear(self, utterance: Utterance, number: int, cabin: CabinState) -> Utterance:
-        """Returns what is recognised of an utterance that is over, the number-th of the session, in a car's noise."""
+        """Returns the recognition of a completed utterance, the number-th of the session, in a car's noise."""
 
 
 def draw_pictures(world: World, scenario: Scenario, config: CameraConfig) -> Pictures:

@@ -209,7 +209,7 @@ class SessionRecorder:
 
         Args:
             actions: actions that were played, by agent.
-            events: events of the decision, with what only the caller knows of them; None: those of the engine.
+            events: events of the decision, with data known only to the caller; None: those of the engine.
 
         Raises:
             SessionError: a value cannot be written.

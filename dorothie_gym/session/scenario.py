@@ -61,7 +61,7 @@ def scenario_option(options: ResetOptions | None) -> Scenario | None:
     """Returns the option `scenario` of a reset, or None; other options are ignored.
 
     Raises:
-        ValueError: the option is no `Scenario`.
+        ValueError: the option is not a `Scenario`.
     """
     scenario = (options or {}).get("scenario")
     if scenario is not None and not isinstance(scenario, Scenario):

@@ -1,4 +1,4 @@
-"""Sessions of one town that are played together: talk in Python, worlds and observations in one call for all.
+"""Sessions of one town that are played together: dialogue in Python, worlds and observations in one call for all.
 
 Pictures of cameras are drawn on the same threads.
 """
@@ -90,7 +90,7 @@ class SessionBatch(CachedViews):
         return worlds
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the sessions."""
+        """Returns the changing values of the sessions."""
         return {"engines": [engine.mutable_values() for engine in self.engines], "views": self.views}
 
     def apply_values(self, values: Mapping[str, object]) -> None:

@@ -121,7 +121,7 @@ class SessionEngine(Restorable):
         """Begins a session.
 
         Args:
-            seed: seed of the scenario; None takes the next number of the series that the last given seed began.
+            seed: seed of the scenario; None takes the next number after the seed of the previous session.
             scenario: played in place of a drawn one; its seed is then the session's.
 
         Raises:

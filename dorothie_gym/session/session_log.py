@@ -43,7 +43,7 @@ class SubgoalCounts(TypedDict):
 
 
 class SessionCounts(TypedDict):
-    """Counts of what the roles did."""
+    """Counts of the roles' actions."""
 
     utterances: int
     acts: int
@@ -86,7 +86,7 @@ class EventLog:
     Attributes:
         events: events of the last decision.
         refusals: reason for the refusal of each kind of action at the last decision, by role; "" where none was.
-        counts: counts of what the roles did so far.
+        counts: counts of the roles' actions so far.
     """
 
     def __init__(self, world: World) -> None:

@@ -50,7 +50,7 @@ class SessionViews(CachedViews):
         self.write(_MASKS)
 
     def write(self, wanted: int) -> None:
-        """Writes what changes at every decision; `wanted` are flags of `view_steps.Wanted`."""
+        """Writes values that change at every decision; `wanted` are flags of `view_steps.Wanted`."""
         arrays = self.world.sensing_arrays
         if arrays is not self._called_with:
             town = self.world.actors.town_arrays, turn_options(self.world.town)

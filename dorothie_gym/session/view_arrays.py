@@ -88,7 +88,7 @@ class MaskArrays(NamedTuple):
 
 
 class ViewArrays(NamedTuple):
-    """What the compiled code writes at a decision: observations of the three roles, and masks."""
+    """Output of the compiled code at a decision: observations of the three roles, and masks."""
 
     participant: ParticipantArrays
     co_wizard: CoWizardArrays
@@ -143,7 +143,7 @@ class RoleArrays(CachedViews):
 
     @cached_property
     def written(self) -> ViewArrays:
-        """What the compiled code writes, in all rows."""
+        """Output of the compiled code, in all rows."""
         observed = {role: buffer.arrays for role, buffer in self.observations.items()}
         return ViewArrays(
             _named(ParticipantArrays, observed[Role.PARTICIPANT]),
@@ -153,7 +153,7 @@ class RoleArrays(CachedViews):
         )
 
     def written_row(self, row: int) -> ViewArrays:
-        """Returns what the compiled code writes in one row, as arrays with a single row."""
+        """Returns one row of the compiled code's output, as arrays with a single row."""
         return ViewArrays._make(type(part)._make(array[row : row + 1] for array in part) for part in self.written)
 
     def observation(self, role: Role, row: int) -> Observation:

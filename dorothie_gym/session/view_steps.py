@@ -184,7 +184,7 @@ def observe_as_participant(world: WorldArrays, views: ParticipantArrays, number:
 
     Args:
         world: arrays of the world.
-        views: observations, of which a row is written.
+        views: observations, one row of which is written.
         number: the row.
     """
     car, plan = world.vehicles[0], world.plan[0]
@@ -206,7 +206,7 @@ def observe_as_co_wizard(
         town: arrays of the town.
         options: exits behind its lanes.
         world: arrays of the world.
-        views: observations, of which a row is written.
+        views: observations, one row of which is written.
         number: the row.
     """
     car, control, plan, belief = world.vehicles[0], world.car[0], world.plan[0], world.localizer[0]
@@ -250,7 +250,7 @@ def observe_as_ad_wizard(world: WorldArrays, views: AdWizardArrays, number: int)
 
     Args:
         world: arrays of the world.
-        views: observations, of which a row is written.
+        views: observations, one row of which is written.
         number: the row.
     """
     car, control, plan = world.vehicles[0], world.car[0], world.plan[0]

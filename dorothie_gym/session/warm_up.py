@@ -60,11 +60,11 @@ def is_warm() -> bool:
 
 
 def warm_up(progress: Progress | None = None, *, everything: bool = False) -> None:
-    """Compiles what sessions need and is not yet in the cache.
+    """Compiles the functions of sessions that are not yet in the cache.
 
     Args:
         progress: called when the compilation of a function begins, perhaps in another thread.
-        everything: whether to compile what `Town-v0` needs, too.
+        everything: whether to compile the functions of `Town-v0` as well.
     """
     with reporting(progress) as report, _helper(report) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))

@@ -47,9 +47,9 @@ class Actors(CachedViews):
         """Shows the actors of a world that has started.
 
         Args:
-            road: of the town.
+            road: road of the town.
             town: its arrays.
-            arrays: of the world.
+            arrays: arrays of the world.
             rng: source of kinds and speeds of new actors.
         """
         self.arrays = arrays
@@ -110,7 +110,7 @@ class Actors(CachedViews):
         """Adds a prop on a lane; the caller has checked that it may stand there.
 
         Args:
-            kind: of prop.
+            kind: kind of the prop.
             lane: it stands on.
             station: distance along the lane [m].
         """

@@ -62,7 +62,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
     Attributes:
         key: identifies the body; a respawned one gets another key.
         kind: `Kind`.
-        height: of the road under it [m].
+        height: height of the road under it [m].
         lane_id: closest lane, its id in the town; `station` [m] along it.
         target_speed: desired speed [m/s].
         standing: duration of its stand, its light not being red [s].
@@ -235,7 +235,7 @@ class Cyclist(TrafficVehicle):
 
 
 class _Thing(BodyView[Record_co]):
-    """A body that is no vehicle: it has no lane of its own, and highway-env never moves it."""
+    """Body other than a vehicle: it has no lane, and highway-env never moves it."""
 
     height: Field[float]
 
@@ -258,7 +258,7 @@ class Pedestrian(_Thing[PedestrianRecord], RoadObject):
     Attributes:
         key: identifies the body.
         state: `Walk`.
-        height: of the ground under it [m].
+        height: height of the ground under it [m].
     """
 
     RECORDS = "pedestrians"
@@ -295,7 +295,7 @@ class Prop(_Thing[PropRecord], Obstacle):
 
     Attributes:
         key: identifies the body.
-        height: of the road under it [m].
+        height: height of the road under it [m].
         lane_id: lane that it stands on; `station` [m] along it.
         crashed: highway-env's mark of a collision; the compiled loops keep none for props.
     """

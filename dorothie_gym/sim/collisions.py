@@ -51,7 +51,7 @@ def overlap(
         dy: [m].
         cos: direction of the first, `sin` likewise.
         sin: see there.
-        length: of the first along its direction [m], `width` across it.
+        length: length of the first along its direction [m], `width` across it.
         width: [m].
         other_cos: direction of the second, and its size.
         other_sin: see there.

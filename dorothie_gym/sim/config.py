@@ -21,7 +21,7 @@ class WorldConfig:
     Attributes:
         vehicles: background vehicles, about one in eight a cyclist, as many as fit.
         pedestrians: pedestrians, as many as fit.
-        cruise_speed: of the ego at the start [km/h], a multiple of 5 in 5..90.
+        cruise_speed: cruise speed of the ego at the start [km/h], a multiple of 5 in 5..90.
         collisions_stop: duration of the ego's stand after a collision [s].
     """
 

@@ -92,7 +92,7 @@ class WorldEventLog(CachedViews):
         return dict(zip(INFRACTION_KINDS, self.counts.tolist(), strict=True))
 
     def note(self, events: int, breaches: int) -> None:
-        """Notes so many events, and breaches of rules, of the last call of `sim.step.step`."""
+        """Records a number of events and infractions of the last call of `sim.step.step`."""
         arrays = self._holder.arrays
         for event in arrays.events[:events]:
             self._note_event(event)
@@ -100,14 +100,14 @@ class WorldEventLog(CachedViews):
             self._note_breach(breach)
 
     def take(self) -> list[WorldEvent]:
-        """Returns the noted events in the order of their frames, and forgets them."""
+        """Returns the recorded events in the order of their frames, and forgets them."""
         if not self._events:
             return []
         events, self._events = sorted(self._events, key=lambda event: (event.frame, event.kind in _RULES)), []
         return events
 
     def _note_event(self, event: EventRecord) -> None:
-        """Notes a hazard stop or a collision."""
+        """Records a hazard stop or a collision."""
         frame, kind = int(event.frame), ObjectClass(int(event.kind))
         if event.code == EventCode.HAZARD_STOP:
             self._add(WorldEventKind.HAZARD_STOP, frame, reason=kind.label, distance=round(float(event.value), 2))
@@ -126,7 +126,7 @@ class WorldEventLog(CachedViews):
             )
 
     def _note_breach(self, breach: BreachRecord) -> None:
-        """Notes a breach of a rule, with the light or sign, or the nearest lane."""
+        """Records an infraction, with the light or sign, or the nearest lane."""
         kind, lane, station = INFRACTION_KINDS[breach.kind], int(breach.lane), float(breach.station)
         x, y = float(breach.x), float(breach.y)
         if lane < 0:

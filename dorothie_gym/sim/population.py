@@ -163,7 +163,7 @@ def add_street_walker(
     Such pedestrians stay at their street, and cross it anywhere but near junctions.
 
     Args:
-        network: of the town.
+        network: network of the town.
         town: its arrays.
         world: arrays of the world.
         lane: id of the lane.
@@ -200,10 +200,10 @@ def add_prop(
     """Adds a prop on a lane, across it.
 
     Args:
-        network: of the town.
+        network: network of the town.
         town: its arrays.
         world: arrays of the world.
-        kind: what it is.
+        kind: kind of the prop.
         lane: id of the lane.
         station: along it [m].
 
@@ -231,10 +231,10 @@ def move_prop(
     """Moves a prop to another place, across a lane; it keeps its key.
 
     Args:
-        network: of the town.
+        network: network of the town.
         town: its arrays.
         world: arrays of the world.
-        number: of the prop.
+        number: number of the prop.
         lane: id of the lane.
         station: along it [m].
     """
@@ -323,10 +323,10 @@ def populate(
     """Adds traffic and pedestrians at random places, as many as fit, none of them close to the ego.
 
     Args:
-        network: of the town.
+        network: network of the town.
         town: its arrays.
         world: arrays of the world; the ego, if there is one, is the first of its vehicles.
-        seed: of the places and the desired speeds.
+        seed: seed of the places and the desired speeds.
         vehicles: how many, cyclists included.
         pedestrians: how many; on pavements, or in a town without them beside the streets.
         cyclists: share of the vehicles; they ride to the right on slow roads.

@@ -110,7 +110,7 @@ class TownRoad(CachedViews, Road):
                 things[i].handle_collisions(things[j], dt)
 
     def _near_pairs(self, things: Sequence[RoadObject], dt: float) -> list[tuple[int, int]]:
-        """Pairs of a vehicle and what comes after it in `things` that may touch within `dt`, in highway-env's order."""
+        """Pairs of a vehicle and a later element of `things` that may touch within `dt`, in highway-env's order."""
         count = len(self.vehicles)
         if not count:
             return []
@@ -161,7 +161,7 @@ class TownRoad(CachedViews, Road):
         """Returns the next bodies ahead of and behind a vehicle; see `neighbours`.
 
         Args:
-            vehicle: whose neighbours.
+            vehicle: vehicle whose neighbours are searched.
             lane_index: lane to look on, by default its own; on another one its place is the closest on that lane.
 
         Returns:
@@ -386,7 +386,7 @@ def enlarged(town: TownArrays, arrays: WorldArrays, vehicles: int) -> WorldArray
 
     Args:
         town: arrays of the town.
-        arrays: of the world; they stay as they are.
+        arrays: arrays of the world; they stay as they are.
         vehicles: number of rows.
     """
     bigger = empty_world(

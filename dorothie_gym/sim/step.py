@@ -48,7 +48,7 @@ def step(
         world: arrays of the world, changed in place.
         substeps: how many.
         dt: time of each [s].
-        acceleration: of vehicles of the kind `Kind.EGO` [m/s^2].
+        acceleration: acceleration of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
 
     Returns:

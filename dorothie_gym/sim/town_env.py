@@ -255,7 +255,7 @@ def config_with_town(config: Mapping[str, object] | None, town: str | Path | Non
     """Returns settings with the town of the argument `town`.
 
     Raises:
-        ValueError: the settings are no dictionary, or name another town.
+        ValueError: the settings are not a dictionary, or name another town.
     """
     if config is not None and not isinstance(config, Mapping):
         raise ValueError(f"config is a {type(config).__name__}; it must be a dictionary of settings")

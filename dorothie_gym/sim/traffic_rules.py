@@ -117,7 +117,7 @@ def _lines_near(town: TownArrays, world: WorldArrays, last: int) -> int:
 
 @inlined
 def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, near: int) -> None:
-    """Notes a stand at pose k - 1, and the line that the front has passed since."""
+    """Records a stand at pose k - 1, and the line that the front has passed since."""
     poses, half = world.poses, 0.5 * world.vehicles[0].length
     c, s = pm.cos(poses[k - 1, HEADING]), pm.sin(poses[k - 1, HEADING])
     before_x, before_y = poses[k - 1, X] + half * c, poses[k - 1, Y] + half * s

@@ -165,7 +165,7 @@ class Wind:
 
     Attributes:
         heading: where it blows to [rad].
-        phases: of the gusts [rad].
+        phases: phases of the gusts [rad].
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
@@ -176,7 +176,7 @@ class Wind:
         """Returns the speed of the wind [m/s], never below 0.
 
         Args:
-            strength: in [0, 1]; 0 is no wind that matters.
+            strength: in [0, 1]; 0 means no wind of relevance.
             time: [s].
         """
         if strength <= 0.0:
@@ -190,10 +190,10 @@ class Wind:
         """Returns the angle of a car's course to its heading, positive right [rad]; 0 without wind and for a stand.
 
         Args:
-            strength: of the wind in [0, 1].
+            strength: strength of the wind in [0, 1].
             time: [s].
-            heading: of the car [rad].
-            speed: of the car [m/s].
+            heading: heading of the car [rad].
+            speed: speed of the car [m/s].
         """
         if strength <= 0.0 or speed <= 0.0:
             return 0.0
@@ -206,7 +206,7 @@ def drift_angle(wind: float, angle: float, speed: float) -> float:
     Args:
         wind: speed of the wind [m/s].
         angle: from the car's heading to where the wind blows to, positive right [rad].
-        speed: of the car [m/s].
+        speed: speed of the car [m/s].
     """
     across, along = wind * pm.sin(angle), wind * pm.cos(angle) - speed
     force = AIR_DENSITY / 2 * FRONTAL_AREA * SIDE_FORCE * pm.hypot(across, along) * across

@@ -179,7 +179,7 @@ class World(CachedViews, Restorable):
         return self._batch
 
     def begin_part(self) -> None:
-        """Writes what the physics needs to know before a part of a step, see `parts_of`."""
+        """Writes the inputs of the physics before a part of a step, see `parts_of`."""
         self.write_weather()
 
     def end_part(self, frames: int) -> Array:
@@ -272,7 +272,7 @@ class World(CachedViews, Restorable):
         return table[: look_around(arrays, self.frame, table)]
 
     def _note_props(self) -> None:
-        """Notes the perceived props for the planner."""
+        """Records the perceived props for the planner."""
         arrays = self.actors.arrays
         if self.actors.has_props:
             self.write_weather()

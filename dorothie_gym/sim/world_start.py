@@ -56,10 +56,10 @@ def start_world(
     """Starts an empty world.
 
     Args:
-        network: of the town.
+        network: network of the town.
         holder: owner of the arrays of the world, with room for its bodies.
         config: settings.
-        seeds: of its random numbers.
+        seeds: seeds of its random numbers.
         departure: lane and distance along it [m] of the ego.
     """
     town, (lane, station) = town_arrays(network), departure

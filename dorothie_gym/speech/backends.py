@@ -29,7 +29,7 @@ def find_synthesizer(name: str = SYNTHESIZER_NAMES[0]) -> Synthesizer:
     """Returns a synthesiser by name, the same one for every call of a process.
 
     Raises:
-        SpeechError: there is none of that name, or a package or program is missing.
+        SpeechError: there is none with that name, or a package or program is missing.
     """
     if name not in _SYNTHESIZERS:
         known = ", ".join(SYNTHESIZER_NAMES)
@@ -42,7 +42,7 @@ def find_recognizer(name: str = RECOGNIZER_NAMES[0]) -> Recognizer:
     """Returns a recogniser by name, the same one for every call of a process.
 
     Raises:
-        SpeechError: there is none of that name, or a package is missing.
+        SpeechError: there is none with that name, or a package is missing.
     """
     if name not in _RECOGNIZERS:
         known = ", ".join(RECOGNIZER_NAMES)

@@ -1,7 +1,7 @@
 """Sentences for the recogniser's language model: transcripts of played sessions, and samples of the grammar.
 
-Transcripts have the frequencies of talk, the grammar has what they lack. Names are exchanged in both, because which of
-the streets is named is not a matter of language.
+Transcripts have the frequencies of real sessions, and the grammar adds sentences that they lack. Names are exchanged in
+both, because which of the streets is named is not a matter of language.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class HttpRecognizer:
         timeout: time for an answer [s].
 
     Raises:
-        ValueError: `url` is no address.
+        ValueError: `url` is not an address.
         SpeechError: httpx is not installed.
     """
 

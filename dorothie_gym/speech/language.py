@@ -97,7 +97,7 @@ def _punctuation() -> dict[str, str]:
 
 
 def _content() -> str:
-    """Returns the text that the models are made of: transcripts, grammar and lexicon."""
+    """Returns the text that the models are built from: transcripts, grammar and lexicon."""
     data = (read_data(name) for name in ("lexicon.yaml", "styles.yaml"))
     return json.dumps([*read_talk_files().values(), *data, transcripts()])
 
@@ -107,7 +107,7 @@ def _as_dict(language: SpokenLanguage) -> dict[str, str]:
 
 
 def _cached(kind: str, content: str, build: Callable[[], dict[str, str]]) -> dict[str, str]:
-    """Returns texts by name from the cache, or builds and caches them; `content` is what they are made of."""
+    """Returns texts by name from the cache, or builds and caches them; `content` determines them."""
     folder = cache_folder()
     if folder is None:
         return build()

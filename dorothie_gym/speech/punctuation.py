@@ -2,7 +2,7 @@
 
 A trigram model of words and marks gives the probability of a sentence with its marks. The most probable marks for given
 words are found by dynamic programming. Whether a sentence is a question depends more on the beginning of its last
-clause ("should I", "which way") than on its end, so that is counted, too.
+clause ("should I", "which way") than on its end, so the beginning also counts.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _BETWEEN: Final = ("", ",", ".", "?")
 _BEHIND: Final = (".", "?")
 
 _OPEN: Final = frozenset({"a", "an", "hang", "make", "my", "take", "the", "your"})
-"""Words that no mark follows, as their object does: "take right" lacks its article and is no question for agreement."""
+"""Words that no mark follows, as their object does: "take right" lacks its article and does not ask for agreement."""
 
 _PRIOR: Final = 0.5
 """Weight of the share of questions among all sentences in that of sentences with a certain beginning [sentences]."""
@@ -100,7 +100,7 @@ class PunctuationModel:
     def _extend(
         self, following: dict[tuple[str, str], _Path], ends: tuple[str, str], path: _Path, added: Sequence[str]
     ) -> None:
-        """Adds a path that goes on by some tokens, if it is the best one to its last two tokens."""
+        """Adds a path that is continued by some tokens, if it is the best one to its last two tokens."""
         (first, second), (score, tokens) = ends, path
         for token in added:
             score += self.trigrams.log_probability(first, second, token)

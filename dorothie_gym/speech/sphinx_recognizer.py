@@ -139,7 +139,7 @@ def _with_hints(found: Sequence[Hypothesis], hints: Sequence[str]) -> tuple[Hypo
 
 
 def _padded(audio: Samples) -> Samples:
-    """Returns audio with faint noise around it: digital silence is no frame of any sound."""
+    """Returns audio with faint noise around it: digital silence cannot be a frame of any sound."""
     silence = np.random.default_rng(0).standard_normal(round(PADDING * SAMPLE_RATE)).astype(np.float32) * np.float32(
         1e-4
     )

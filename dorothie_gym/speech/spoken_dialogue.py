@@ -1,4 +1,4 @@
-"""Spoken dialogue of a session: synthesis, noise in the car, crosstalk, and recognition of what is said."""
+"""Spoken dialogue of a session: synthesis, noise in the car, crosstalk, and recognition."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class SpokenSpan:
 
 
 class SpokenDialogue:
-    """Voices of a session and what is recognised of them.
+    """Voices of a session and their recognition.
 
     Attributes:
         recordings: audio of the spans that were delivered last, with noise, at 16 kHz, by file name.
@@ -101,7 +101,7 @@ class SpokenDialogue:
             self._voices[Role.CO_WIZARD] = Voice(pitch=round(moved, 2))
 
     def speak(self, role: Role, text: str, pace: float) -> Samples:
-        """Returns a text as a role says it, at 16 kHz, with silence behind it up to `SHORTEST_SPAN`.
+        """Returns a text spoken by a role, at 16 kHz, with silence behind it up to `SHORTEST_SPAN`.
 
         Args:
             role: the speaker.
@@ -114,7 +114,7 @@ class SpokenDialogue:
         return np.concatenate([samples, np.zeros(silence, dtype=np.float32)])
 
     def begin(self, role: Role, samples: Samples, end: float) -> None:
-        """Notes a span that a role has begun and that ends at a time [s]."""
+        """Records a span that a role has begun and that ends at a time [s]."""
         self._spans[role].append(SpokenSpan(end - len(samples) / SAMPLE_RATE, samples))
 
     @staticmethod
@@ -128,9 +128,9 @@ class SpokenDialogue:
         return f"utterance_{utterance}_{span}.flac"
 
     def hear(self, utterance: Utterance, number: int, cabin: CabinState) -> Utterance:
-        """Returns what is recognised of an utterance that is over, and keeps its audio in `recordings`.
+        """Returns the recognition of a completed utterance, and keeps its audio in `recordings`.
 
-        The act of a span of which every word is right is that of the speaker; else it is read from the words.
+        A span without word errors has the speaker's act; otherwise the act is parsed from the words.
 
         Args:
             utterance: spoken utterance; calls follow the order of utterance ends.
@@ -157,7 +157,7 @@ class SpokenDialogue:
         return find_recognizer().recognize(mixture, SAMPLE_RATE)
 
     def _crosstalk(self, role: Role, audio: SpokenSpan) -> Samples:
-        """Returns what the other speaker says meanwhile, as loud as it is at this speaker's microphone."""
+        """Returns the other speaker's simultaneous speech, at its level at this speaker's microphone."""
         found = np.zeros(len(audio.samples), dtype=np.float32)
         for other in self._spans:
             if other is not role:

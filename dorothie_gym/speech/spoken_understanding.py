@@ -1,4 +1,4 @@
-"""Understanding of recognised speech: marks and capitals are restored, and the hypotheses tell how sure the act is."""
+"""Understanding of recognised speech: restores marks and capitals, and computes the certainty of the act."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DOUBTFUL: Final = 0.2
 are marked by it, of which 6 are wrong; two lost a value: one is marked, and of the other nothing is recognised."""
 
 SHORT: Final = 2
-"""Number of words up to which every doubtful one matters; there is no context that would make up for it."""
+"""Number of words up to which every uncertain word matters, because there is no context to compensate for it."""
 
 COMPARED: Final = 3
 """Number of hypotheses that have to agree about the meaning of longer speech with doubtful words. Of 194 spans of 19
@@ -30,12 +30,12 @@ sessions, most with errors, 9 lost a value; comparing three hypotheses marks 23 
 34 and find the same."""
 
 _UNNAMED: Final = frozenset({"Queried", "Unknown"})
-"""Values that are not lost if a word is: what is asked about follows from the rest of the question."""
+"""Values that are not lost with a single word: the subject follows from the rest of the question."""
 
 _SLIGHT: Final = frozenset(
     {"a", "ah", "an", "and", "er", "hey", "hm", "hmm", "oh", "of", "so", "the", "to", "uh", "um", "well", "yo"}
 )
-"""Words on which no meaning depends, however doubtful they are."""
+"""Words on which no meaning depends, however uncertain they are."""
 
 
 @shared
@@ -64,12 +64,12 @@ def readable(text: str) -> str:
 
 
 def audible(recognition: Recognition) -> str:
-    """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
+    """Returns the recognised words with `INAUDIBLE` in place of uncertain ones, if these may change the meaning.
 
     They may if the best hypotheses name different values, if most words are doubtful, or if the speech is short. Short
     speech without a command is inaudible, however sure, if another hypothesis is a stop ("great", "brake"), which must
-    not be missed; of 110 short spans that were no stop, none was taken for one. Systems of spoken dialogue likewise
-    reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
+    not be missed; of 110 short spans other than a stop, none was mistaken for one. Systems of spoken dialogue likewise
+    reject uncertain input, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     short = len(recognition.words) <= SHORT
     if short and _may_be_stop(recognition):
@@ -98,7 +98,7 @@ def _is_doubtful(word: RecognizedWord) -> bool:
 
 
 def understand_speech(recognition: Recognition, after: DialogueMove | None = None) -> SpokenUnderstanding:
-    """Returns what recognised speech means.
+    """Returns the interpretation of recognised speech.
 
     The act is that of the best hypothesis. Choosing the act with the largest share instead finds it less often, because
     acts without a name have more hypotheses.

@@ -97,7 +97,7 @@ def check_script(text: str, synthesizer: str) -> None:
 
 
 def chosen_voice(voice: str, voices: Sequence[str], synthesizer: str) -> str:
-    """Returns a voice, or the default for an empty name; raises `SpeechError` if there is none of the name."""
+    """Returns a voice, or the default for an empty name; raises `SpeechError` if there is none with the name."""
     if not voice and voices:
         return voices[0]
     if voice not in voices:

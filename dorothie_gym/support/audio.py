@@ -70,7 +70,7 @@ def checked_samples(samples: NDArray[np.generic], sample_rate: int, where: str =
 
 
 def trimmed(samples: Samples, sample_rate: int, margin: float = 0.05) -> Samples:
-    """Returns audio without the silence before and behind it: what is more than 40 dB below its loudest 10 ms.
+    """Returns audio without the silence (40 dB below its loudest 10 ms) before and after it.
 
     Args:
         samples: (n,) float32.

@@ -3,10 +3,11 @@
 `copy.deepcopy` and `pickle` copy every environment exactly, because the classes inside follow two rules:
 
 - An instance that never changes (a town, a path, an utterance) is `shared` by all copies.
-- What was only looked up (a view on the arrays of a world) is dropped from a copy, which looks it up again
+- Cached look-ups (such as views on the arrays of a world) are dropped from a copy, which looks them up again
   (`CachedViews`).
 
-A `State` holds what changes in one object. It is cheaper than a copy, and any number of sessions can continue from it.
+A `State` holds the changing values of one object. It is cheaper than a copy, and any number of sessions can continue
+from it.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def _itself(value: T, memo: dict[int, object]) -> T:
 class CachedViews:
     """Base class of objects that keep looked up values, such as views on arrays that another object owns.
 
-    A copied view would show other memory than the array that is copied beside it. So copies begin without.
+    A copied view would show other memory than the copied array. So copies begin without.
     """
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ()
@@ -61,12 +62,12 @@ class CachedViews:
 
 
 class State:
-    """What changes in an environment, an engine or a world, at one moment: an opaque value that never changes.
+    """Changing values of an environment, an engine or a world at one moment: an opaque, immutable value.
 
     It refers to the things that do not change, such as the town.
 
     Attributes:
-        nbytes: memory of the values, without what is shared [bytes].
+        nbytes: memory of the values, without shared objects [bytes].
     """
 
     __slots__ = ("_fits", "_shared", "_values")
@@ -76,7 +77,7 @@ class State:
 
         Args:
             owner: object that the values belong to; references to it lead to the one that takes them up again.
-            values: what is kept.
+            values: stored values.
             fits: name and value of each property that must be equal in the object that restores the values.
         """
         self._fits = dict(fits)
@@ -84,7 +85,7 @@ class State:
 
     @property
     def nbytes(self) -> int:
-        """Memory of the values, without what is shared [bytes]."""
+        """Memory of the values, without shared objects [bytes]."""
         return len(self._values)
 
     def values(self, owner: object, fits: Mapping[str, object]) -> object:
@@ -107,7 +108,7 @@ class State:
 
 
 def _difference(name: str, found: object, wanted: object) -> str:
-    """Returns what a value is and ought to be, with the first field, key or item in which they differ."""
+    """Returns the actual and the expected value, with the first field, key or item in which they differ."""
     for part, one, other in _parts(found, wanted):
         if one is not other and one != other:
             return _difference(f"{name}, {part}" if "," not in name else f"{name}.{part}", one, other)
@@ -164,23 +165,23 @@ class Unchanged(Generic[T]):
 
 
 class Restorable:
-    """Base class of what can go back to a state of its own, or of another one made with the same arguments."""
+    """Base class of objects that can be restored to a state, also of another object made with the same arguments."""
 
     MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ()
-    """Attributes that hold what changes."""
+    """Attributes that hold changing values."""
 
     def clone_state(self) -> State:
         """Returns the present state, for `restore_state`: an opaque value that later steps do not change.
 
-        Generators' states are part of it; what the spaces draw for `sample()` and what was rendered are not.
+        The states of generators are part of it; those of the spaces (`sample()`) and rendered pictures are not.
         """
         return State(self, self.mutable_values(), self.compatibility())
 
     def restore_state(self, state: State) -> None:
-        """Goes back to a state, any number of times; the state stays as it is.
+        """Restores a state, any number of times; the state does not change.
 
         Args:
-            state: of this object, or of another one that was made with the same arguments.
+            state: state of this object, or of another one that was made with the same arguments.
 
         Raises:
             StateError: the state is of another town or other settings, or not a state.
@@ -192,7 +193,7 @@ class Restorable:
         self.apply_values(values)
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes, by name."""
+        """Returns the changing values by name."""
         return {name: getattr(self, name) for name in self.MUTABLE_ATTRIBUTES}
 
     def apply_values(self, values: dict[str, object]) -> None:
@@ -200,7 +201,7 @@ class Restorable:
         self.__dict__.update(values)
 
     def compatibility(self) -> dict[str, object]:
-        """Returns name and value of what has to be equal where a state is restored."""
+        """Returns names and values that must be equal to restore a state."""
         return {"a": type(self).__name__}
 
 

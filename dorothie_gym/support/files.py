@@ -62,8 +62,8 @@ def replacing(path: Path, *, shared: bool = False, synced: bool = True) -> Itera
     Args:
         path: the file.
         shared: whether several processes may write the file at once: the name of the part is then unique. Otherwise it
-            is `path` with the ending `PART`, so that a later write removes what a killed process left.
-        synced: whether the file is on the disk when the block is left; not needed for what can be made again.
+            is `path` with the ending `PART`, so that a later write removes the remains of a killed process.
+        synced: whether the file is on the disk when the block is left; not needed for data that can be made again.
 
     Raises:
         OSError: the file cannot be written, or a pipe or device is there, which a file must not replace; the error

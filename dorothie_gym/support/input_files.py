@@ -1,8 +1,8 @@
 """Reading of files that users provide: regular files of limited size, strict JSON, schemas, and Parquet tables.
 
-Every reader of the package opens such files here. A file that is no regular file is refused before it is opened, and no
-more than the limit of its kind is read. Faults are `InputFileError`; readers with an error class of their own turn them
-into it (`raising`).
+Every reader of the package opens such files here. A file that is not a regular file is refused before it is opened, and
+no more than the limit of its kind is read. Faults are `InputFileError`; readers with an error class of their own turn
+them into it (`raising`).
 """
 
 from __future__ import annotations
@@ -344,7 +344,7 @@ def read_parquet(path: Path, limits: ParquetLimits, columns: Sequence[str] | Non
         columns: names of the columns that are read, where they exist; all if None.
 
     Raises:
-        InputFileError: it is no Parquet file, damaged, or beyond a limit, or has a column twice.
+        InputFileError: it is not a Parquet file, damaged, or beyond a limit, or has a column twice.
         OSError: it is missing or cannot be read.
     """
     import pyarrow as pa

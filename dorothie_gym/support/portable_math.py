@@ -1,8 +1,9 @@
 """Elementary functions with equal results on every processor and with every C library.
 
 `math` and numpy leave sin, exp and the like to the C library and to vector routines, whose last bits differ between
-processors (fused multiply-add, AVX2, AVX-512) and between versions of the library. What a session depends on is
-computed here instead, from additions, multiplications, divisions and square roots, which IEEE 754 rounds exactly.
+processors (fused multiply-add, AVX2, AVX-512) and between versions of the library. The functions that a session depends
+on are computed here instead, from additions, multiplications, divisions and square roots, which IEEE 754 rounds
+exactly.
 
 The module is imported as `pm`. Its functions run in compiled code and, called from Python, as Python, with equal
 results. Errors are below 1.5 units in the last place, unless stated otherwise. Arguments outside of a function's domain

@@ -111,7 +111,7 @@ def remove_least_used(folder: Path, most: int, used: Collection[str]) -> None:
     """Removes the least recently used entries of a folder of the cache until the others fit into a limit.
 
     Entries are folders, of which each use is marked by `mark_used`. Those that were used within `RECENT` seconds stay,
-    because other processes may read them; files stay, too. What cannot be removed is left.
+    because other processes may read them; files are also kept. Entries that cannot be removed are kept.
 
     Args:
         folder: folder of the cache.

@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 Infos: TypeAlias = dict[str, Any]
-"""Infos of a batch: under `name` an array (num_envs, ...) or the infos of a nested dict, under `_name` who has it."""
+"""Infos of a batch: under `name` an array (num_envs, ...) or the infos of a nested dict, under `_name` a mask of the
+environments that have it.
+"""
 
 
 def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> Sequence[int | None]:
     """Returns a seed for each of `count` environments.
 
     Args:
-        seed: of the first environment, the others have the numbers that follow; or one for each; None for none.
+        seed: seed of the first environment, the others have the numbers that follow; or one for each; None for none.
         count: number of environments.
 
     Raises:

@@ -77,7 +77,7 @@ def catalogue() -> Mapping[LandmarkName, LandmarkKind]:
 
 
 def map_label(name: LandmarkName) -> str:
-    """Returns the name of a landmark on maps, such as "7-Eleven"; that of the ontology where it is no place."""
+    """Returns the name of a landmark on maps, such as "7-Eleven"; the ontology's name if it is not a place."""
     kind = catalogue().get(name)
     return name.label if kind is None else kind.label
 

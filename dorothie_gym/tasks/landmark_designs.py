@@ -46,7 +46,7 @@ class StoreDesign:
     Attributes:
         top: form above the walls.
         wall: colour of the walls.
-        fascia: colour of what is above them, and of the sign.
+        fascia: colour of the part above them, and of the sign.
         accent: colour of smaller parts.
         most: largest length and depth [m].
     """
@@ -94,7 +94,7 @@ COAT: Final[Colour] = (250, 216, 30)
 
 @lru_cache(maxsize=64)
 def features_of(name: LandmarkName) -> tuple[str, ...]:
-    """Returns what can be seen of a landmark, as phrases with an article ("a red roof"); empty for other names."""
+    """Returns the visible features of a landmark, as phrases with an article ("a red roof"); empty for other names."""
     if name is LandmarkName.HOUSE:
         wall, roof, trim = map(colour_name, (HOUSE.wall, HOUSE.roof, HOUSE.trim))
         return f"{_with_article(wall)} facade", f"{_with_article(roof)} roof", f"{trim} window frames"

@@ -1,7 +1,7 @@
-"""Purposes of errands, read from the texts that a participant observes: what is done there, for whom, and why.
+"""Purposes of errands, read from the texts that a participant observes: task, beneficiary and reason.
 
-The readers know English clauses, not templates: they read the storyboards of the package and of others. What they
-cannot read is None or empty; nothing is added to the text but the change from "you" to "I".
+The readers know English clauses, not templates: they read the storyboards of the package and of others. Unreadable
+    parts are None or empty; the text is not changed except from "you" to "I".
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Purpose:
         place: place with its preposition, "at Ikea", "from Anton's"; None if the text names none.
         person: person that the errand is for or leads to: "Mateo's mother", "Yusuf"; None if the text names none.
         owner: person whose house it leads to: "Samuel" of "Samuel's house", "my sister"; None if the text names none.
-        items: what is bought, fetched or brought: "a newspaper", "the spare key".
+        items: items that are bought, fetched or brought: "a newspaper", "the spare key".
         reason: clause as it follows "because": "the buses are on strike"; None if the text gives none.
     """
 
@@ -222,7 +222,7 @@ def _tidy(clause: str) -> str:
 
 
 def _imperative(clause: str) -> str | None:
-    """Returns the clause from its verb on, "buy a newspaper at Ikea"; None if it is no instruction."""
+    """Returns the clause from its verb on, "buy a newspaper at Ikea"; None if it is not an instruction."""
     text = _tidy(clause)
     while found := _LEADS.match(text):
         text = text[found.end() :]
@@ -291,7 +291,7 @@ def _without_place(imperative: str) -> tuple[str | None, str | None, str | None]
 
 
 def _after_motion(rest: str) -> str | None:
-    """Returns what is done at a place: "to buy bread" or "and buy bread" behind "stop at Ikea"."""
+    """Returns the task at a place: "to buy bread" or "and buy bread" after "stop at Ikea"."""
     found = re.match(r",? (?:to|and|for) (?P<rest>.+)", rest)
     return None if found is None else _imperative(found["rest"])
 
@@ -363,7 +363,7 @@ def _places() -> frozenset[str]:
 
 @functools.cache
 def _not_names() -> frozenset[str]:
-    """Returns words with a capital letter that are no names of people."""
+    """Returns capitalised words other than names of people."""
     places = {word for name in _places() for word in name.title().split()}
     labels = {word for kind in catalogue().values() for text in (kind.label, kind.name.label) for word in text.split()}
     labels |= {label for name in LandmarkName for label in name.label.split()}

@@ -120,7 +120,7 @@ class SubgoalTemplate:
         delete_after_subgoal: index of the subgoal that must be reached before a deletion; None for no condition.
         leaves: whether the person at the destination disappears once the subgoal is reached.
         reason: why the subgoal matters, a clause as after "because"; None if the template does not say.
-        messages: what the participant is told when the Ad-Wizard triggers, deletes or changes the subgoal.
+        messages: messages to the participant when the Ad-Wizard triggers, deletes or changes the subgoal.
     """
 
     destination: str

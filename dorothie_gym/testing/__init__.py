@@ -1,7 +1,6 @@
 """Contracts of the package as reusable checks, for people who write a policy, a town, an environment or a recorder.
 
-Each check raises `AssertionError` with a message that names the broken rule and where it broke, so that one call is a
-test:
+Each check raises `AssertionError` with a message that names the broken rule and the place, so that one call is a test:
 
 ```python
 from dorothie_gym.testing import check_policy

@@ -42,11 +42,11 @@ def check_policy(
     The same session played again, interleaved with a second one by the same policy object, must give the same actions.
 
     Args:
-        policy: of any role.
+        policy: policy of any role.
         town: name, file or `Town` to play in.
-        seed: of the session; the second session has the next seed.
+        seed: seed of the session; the second session has the next seed.
         decisions: decisions played at most.
-        config: of the environment.
+        config: config of the environment.
 
     Raises:
         AssertionError: the contract is broken; the message names the rule and the decision.
@@ -164,7 +164,7 @@ def check_town(town: str | Path | Town, *, sessions: int = 3, decisions: int = 4
         town: name, file (YAML or OpenDRIVE) or `Town`.
         sessions: scenarios drawn and played with the scripted policies.
         decisions: decisions played in each session.
-        seed: of the first session.
+        seed: seed of the first session.
 
     Raises:
         AssertionError: the linter found faults (ten are listed), or the lane graph does not match the lanes.

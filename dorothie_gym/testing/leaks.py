@@ -55,7 +55,7 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
             `reset(options={"scenario": ...})`. It is reset several times.
-        seed: of the first session; the first seed from here on whose scenario has a hidden landmark is used.
+        seed: seed of the first session; the first seed from here on whose scenario has a hidden landmark is used.
         decisions: decisions played in each session, at 2 Hz by default.
 
     Raises:
@@ -74,8 +74,8 @@ class Compared(NamedTuple):
 
     Attributes:
         decisions: played.
-        in_view: at which a hidden landmark was in view in either session.
-        pictures: at which pictures, if there are any, were compared.
+        in_view: decisions at which a hidden landmark was in view in either session.
+        pictures: decisions at which pictures, if there are any, were compared.
     """
 
     decisions: int
@@ -84,12 +84,12 @@ class Compared(NamedTuple):
 
 
 def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decisions: int) -> Compared:
-    """Checks that hidden landmarks at other sites change nothing that the Co-Wizard observes.
+    """Checks that the Co-Wizard's observations do not depend on the sites of hidden landmarks.
 
     Args:
         env: see `check_observations_do_not_leak`.
         play: plays a session, such as `playing.play_scripted`.
-        seed: of the session, whose scenario has a hidden landmark.
+        seed: seed of the session, whose scenario has a hidden landmark.
         decisions: decisions played.
 
     Raises:
@@ -122,7 +122,7 @@ _Played = TypeVar("_Played")
 
 
 def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[_Played], list[bool]]:
-    """Returns what a session yields, and at each decision whether a sample of a picture is one of a hidden landmark."""
+    """Returns the results of a session, and for each decision whether a picture has a sample of a hidden landmark."""
     played, views, cameras = list[_Played](), list[bool](), list[SessionCamera]()
     for decision in playing:
         session = env.unwrapped.session

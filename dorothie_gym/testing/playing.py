@@ -25,9 +25,9 @@ class Decision:
     """One decision of a played session.
 
     Attributes:
-        observations: of all agents, before the decision.
-        infos: of all agents, before the decision.
-        actions: of all agents; empty after the last decision.
+        observations: observations of all agents, before the decision.
+        infos: infos of all agents, before the decision.
+        actions: actions of all agents; empty after the last decision.
     """
 
     observations: ByAgent

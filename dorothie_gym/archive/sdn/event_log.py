@@ -150,7 +150,7 @@ def _argument(val: JsonObject) -> tuple[object, object]:
 
 
 def plan_of(value: object) -> dict[str, object] | None:
-    """Returns the junctions of a plan; None if the value is no plan."""
+    """Returns the junctions of a plan; None if the value is not a plan."""
     items = value if isinstance(value, list) else [value]
     junctions = [whole_of(item.get("junction_id") if isinstance(item, Mapping) else item) for item in items]
     return None if None in junctions else {"junctions": junctions}

@@ -22,7 +22,7 @@ _ASSETS: Final[Mapping[LandmarkName, str]] = MappingProxyType(
         LandmarkName.PERSON: "walker.pedestrian.0001",
     }
 )
-"""Assets that are no props; the published loader looks up each asset by its exact spelling."""
+"""Assets that are not props; the published loader looks up each asset by its exact spelling."""
 
 _FIELDS: Final = ("asset", "name", "landmark")
 

@@ -172,7 +172,7 @@ def _object(folder: Path, name: str, report: ReadReport) -> JsonObject:
 
 
 def _log_rows(path: Path, report: ReadReport) -> tuple[list[JsonObject], JsonObject]:
-    """Returns the rows of a log, and the fields around them if the log is no plain list (as in the hub layout).
+    """Returns the rows of a log, and the fields around them if the log is not a plain list (as in the hub layout).
 
     Rows are the objects with a field 'frame', or in a list with such objects: of the list, if the file holds one, else
     in the fields of its object.

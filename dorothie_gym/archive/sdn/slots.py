@@ -26,7 +26,7 @@ MAX_OBJECT_DEPTH: Final = 4
 """Deepest nesting of objects in a slot value that is read."""
 
 LEFT_OUT: Final = "slots_left_out"
-"""Field of an act with the slot values that are none of the ontology."""
+"""Field of an act with the slot values outside the ontology."""
 
 
 @dataclass
@@ -34,7 +34,7 @@ class SlotReader:
     """Reads the slots of one act.
 
     Attributes:
-        report: receives the values that are none of the ontology.
+        report: receives the values outside the ontology.
         found: labels of the known values, by label of their slot.
         left: other values, by name of their slot.
     """

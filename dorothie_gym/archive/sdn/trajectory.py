@@ -102,8 +102,8 @@ class SdnMap:
     def turn_angle(self, lane: int, road: int, junction: int | None = None) -> float | None:
         """Returns the angle [degrees, positive left] of the turn into a road.
 
-        It is that of the exit from the car's lane, else from a lane beside it, that leads into the road. Where there is
-        none, or the lane is unknown, it is that of the only approach from which a connector leads into the road.
+        The angle belongs to the exit into the road from the car's lane, or otherwise from an adjacent lane. If there is
+        none, or the lane is unknown, it belongs to the only approach with a connector into the road.
 
         Args:
             lane: lane of the car; -1 for an unknown one.
@@ -127,7 +127,7 @@ class SdnMap:
         return None
 
     def _angle_ahead(self, lane: int, road: int) -> float | None:
-        """Returns the angle into a road at the next junction ahead, from a lane or from those beside it."""
+        """Returns the angle into a road at the next junction ahead, from a lane or from adjacent lanes."""
         assert self.town is not None
         town, lanes = self.town, self._side_by_side(lane)
         for _ in range(len(town.lanes)):  # along the road to the junction

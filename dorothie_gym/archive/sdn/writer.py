@@ -163,7 +163,7 @@ def _file(data: Mapping[str, object]) -> str:
 
 
 def _write_audio(folder: Path, session: Session) -> None:
-    """Writes the audio of each utterance, joined from that of its spans; those of which a file is missing are left out.
+    """Writes the audio of each utterance, joined from that of its spans; utterances with a missing file are omitted.
 
     A file that holds a whole utterance is copied.
 

@@ -86,7 +86,7 @@ def _turn(angle: float, view: CoWizardView, town: Town) -> FeasibleAction | None
 
 
 def _nearest_exit(angle: float, choice: Choice, town: Town) -> Exit:
-    """Returns the exit nearest in angle, from the own lane or, if none leads that way, from a lane beside it."""
+    """Returns the exit nearest in angle, from the car's lane or, if it has none there, from an adjacent lane."""
 
     def misfit(way: Exit) -> tuple[float, int]:
         return abs(float(wrap_degrees(way.angle - angle))), way.connector

@@ -28,10 +28,10 @@ _TAKES_UP = (ArgumentKind.SPEED_STEP, ArgumentKind.SWITCH)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class History:
-    """Observations, utterances and own actions of a Co-Wizard; every change returns a new object.
+    """Observations, utterances and actions of a Co-Wizard; every change returns a new object.
 
     Attributes:
-        encoded: what a benchmark model can still be shown of them, as columns.
+        encoded: the part of them that a benchmark model can still be shown, as columns.
         events: number of dialogue moves and physical actions so far.
         utterances: number of utterances so far.
         landmark: label of the landmark that was named last, by either speaker.
@@ -136,7 +136,7 @@ class HistoryTracker:
 
     Attributes:
         history: completed utterances and actions.
-        air: spans of the own utterance that is being spoken.
+        air: spans of the Co-Wizard's utterance in progress.
         began: start of that utterance [s].
         tried: physical action of the last decision, None for none.
         before: observation of the last decision; None at first.

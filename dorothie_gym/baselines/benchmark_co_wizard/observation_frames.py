@@ -48,7 +48,7 @@ def observed_frame(view: CoWizardView, town: Town) -> ObservedFrame:
 
 
 def header_of(observation: ObservationMapping, town: Town) -> SessionHeader:
-    """Returns a session header with what the Co-Wizard knows: streets, and the landmarks on its map."""
+    """Returns a session header with the Co-Wizard's knowledge: streets, and the landmarks on its map."""
     column = LandmarkColumn
     marks = [row for row in observation["landmarks"].tolist() if row[column.NAME] > 0]
     return SessionHeader(

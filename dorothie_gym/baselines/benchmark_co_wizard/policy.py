@@ -52,7 +52,7 @@ class BenchmarkPolicyState:
     Attributes:
         seed: seed of all random numbers.
         town: the map.
-        voice: state of the own speech.
+        voice: state of its own speech.
         count: number of decisions so far.
         following: tracker of the history, None before the first observation.
         watch: state of the decision triggers.

@@ -1,8 +1,8 @@
-"""Answers of the learned Co-Wizard that follow from its evidence, and which of its remarks the evidence rules out.
+"""Answers of the learned Co-Wizard from its evidence, and rules that exclude remarks.
 
-Whether a question is answered is chosen by the network. What a yes/no question is answered follows from the evidence
-for what it asks (`beliefs.evidence`); why the car stands or turns round, from its state and memory (`reasons`); when it
-arrives, from its route. What was not understood is said again from memory.
+The network chooses whether to answer a question. The answer to a yes/no question follows from the evidence for its
+proposition (`beliefs.evidence`), the reason for a standstill or U-turn from state and memory (`reasons`), and the
+arrival time from the route. A remark that was not understood is repeated from memory.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _ABOUT_THE_GOAL: Final = (Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_
 
 
 def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -> Remark | None:
-    """Returns the answer to a question whose answer follows from the evidence; None if none has just been asked.
+    """Returns the answer to the last question if it follows from the evidence; None without such a question.
 
     These are questions that yes or no answers, why the car stands or turns round, and when it arrives.
 
@@ -78,7 +78,7 @@ def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -
 
 
 def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
-    """Returns what a yes/no question asks; a check that names no more is about the present goal."""
+    """Returns the proposition of a yes/no question; a check that names no more is about the present goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
     if utterance.places:
@@ -99,7 +99,7 @@ def _open_answer(utterance: Utterance, memory: Memory, view: CoWizardView) -> Re
 
 
 def is_answer(remark: Remark, answer: Remark) -> bool:
-    """Returns whether a remark answers what `answer` does: yes, no, a reason, a time, or that it is not known."""
+    """Returns whether a remark is an answer like those of `answer`: yes, no, a reason, a time, or "not known"."""
     if remark.act.move is DialogueMove.REPLY_W:
         to_open_question = answer.act.move not in _ANSWERS or not answer.meaning
         return to_open_question and bool(remark.meaning) and remark.meaning[0].predicate in _REASONS_AND_TIMES
@@ -109,7 +109,7 @@ def is_answer(remark: Remark, answer: Remark) -> bool:
 
 
 def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
-    """Returns the last own remark, said again, if the participant has just not understood it."""
+    """Returns a repetition of the Co-Wizard's last remark if the participant has just not understood it."""
     if utterance is None or memory.last is None or not utterance.heard.acts:
         return None
     if utterance.heard.acts[0].move is not DialogueMove.CONFUSE:
@@ -129,16 +129,16 @@ def is_sayable(
 ) -> bool:
     """Returns whether a remark is not ruled out.
 
-    Ruled out is what the evidence denies, an answer about something that was not asked, an acknowledgement instead of
-    an answer, and what has just been said. The answer that follows from the evidence is ruled out only by the last.
+    The evidence rules out statements that it denies, answers to other questions, acknowledgements instead of an answer,
+    and repetitions. Only the last rule applies to the answer that follows from the evidence.
 
     Args:
         remark: the remark.
-        topic: what it is about.
+        topic: topic of the remark.
         memory: working memory.
         view: observation.
         utterance: latest utterance of the participant.
-        answer: answer to what was just asked (`answer_to`).
+        answer: answer to the last question (`answer_to`).
     """
     said_at = dict(memory.said_at).get(topic)
     if said_at is not None and said_at > memory.heard_at and seconds_since(view.time, said_at) < SAID_AGAIN_AFTER:
@@ -157,7 +157,7 @@ def is_sayable(
 
 
 def _waits_for_answer(utterance: Utterance, memory: Memory) -> bool:
-    """Returns whether an utterance asks something, and nothing has been said since."""
+    """Returns whether an utterance asks something that has not been answered yet."""
     return memory.spoke_at < utterance.time and any(act.move in QUESTIONS for act in utterance.heard.acts)
 
 
@@ -169,7 +169,7 @@ def _is_denied(memory: Memory, view: CoWizardView, said: Proposition) -> bool:
 
 
 def _is_about(answer: Proposition, utterance: Utterance) -> bool:
-    """Returns whether an answer is about what an utterance asks, as far as that was understood."""
+    """Returns whether an answer is about the question of an utterance, as far as that was understood."""
     asked = _asked_about(utterance)
     if not asked:
         return True
@@ -178,7 +178,7 @@ def _is_about(answer: Proposition, utterance: Utterance) -> bool:
 
 
 def _asked_about(utterance: Utterance) -> tuple[Predicate, ...]:
-    """Returns the predicates of answers to a question; empty where what it asks was not understood."""
+    """Returns the predicates of answers to a question; empty if it was not understood."""
     asked = utterance.asked if utterance.asks is not None else utterance.heard.words.asked
     if asked is not None:
         return (asked.predicate,)

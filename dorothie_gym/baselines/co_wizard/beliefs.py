@@ -38,14 +38,14 @@ _Evidence = Callable[[Memory, CoWizardView, Proposition], bool | None]
 
 
 def evidence(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
-    """Returns whether a proposition seems true; None where nothing tells."""
+    """Returns whether a proposition seems true; None without evidence."""
     judge = _EVIDENCE.get(said.predicate)
     found = None if judge is None else judge(memory, view, said)
     return found if found is None else found is not said.negated
 
 
 def goal_left(memory: Memory, view: CoWizardView) -> float | None:
-    """Returns the way to a goal on the map [m]; None without one."""
+    """Returns the route length to a goal on the map [m]; None without a goal."""
     return memory.navigator.left(view) if memory.goal_mark >= 0 else None
 
 

@@ -1,4 +1,4 @@
-"""One decision of the learned Co-Wizard, up to what the network is given: the same in training and in play."""
+"""One decision of the learned Co-Wizard, up to the inputs of the network: the same in training and in play."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Attention:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What is perceived at a decision.
+    """Perception at a decision.
 
     Attributes:
         view: observation.
@@ -97,7 +97,7 @@ def perceive(observation: ObservationMapping, attention: Attention, last: Dialog
     Args:
         observation: observation of the Co-Wizard, with its action mask.
         attention: state before.
-        last: last own move, as context of what is heard.
+        last: the Co-Wizard's last move, as context for what is heard.
     """
     view = CoWizardView.read(observation, attention.memory.town)
     heard = heard_utterance(observation, Role.PARTICIPANT, last)
@@ -115,7 +115,7 @@ class Inputs:
     Attributes:
         state: state and utterances (n,).
         words: rows of the words of the latest utterance.
-        options: vectors of what is chosen among, places or commands (k, m), filled with 0.
+        options: vectors of the options, places or commands, padded with 0 (k, m).
         rows: number of each option: row of the landmark, or index of the command.
     """
 
@@ -179,7 +179,7 @@ def remember(scene: Scene, update: Update) -> Memory:
 
 
 def noted(memory: Memory, remark: Remark, view: CoWizardView) -> Memory:
-    """Returns the memory after an own remark."""
+    """Returns the memory after a remark of the Co-Wizard."""
     asks = remark.act.move in QUESTIONS
     way = bool({ActionValue.QUERIED, ActionValue.J_TURN, ActionValue.LANE_FOLLOW} & set(remark.act.values(Slot.ACTION)))
     return memory.spoken(remark, topic_of(remark), view, asks=asks, asks_way=asks and way)
@@ -191,10 +191,10 @@ def finished(
     """Returns the belief update to send, and the state after a decision.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         memory: memory after listening.
         physical: command that is given.
-        remarks: what was decided to say.
+        remarks: chosen remarks.
     """
     for remark in remarks:
         memory = noted(memory, remark, scene.view)

@@ -1,4 +1,4 @@
-"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+"""Training examples from recorded sessions, and from sessions that player and teacher play together."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Pupil:
     def decide(
         self, observation: ObservationMapping, on_example: OnExample, turn: Turn | None = None
     ) -> tuple[Scene, Memory, Lesson]:
-        """Lets the teacher decide, and hands on the example; returns scene, memory after listening, and lesson.
+        """Lets the teacher decide, and passes on the example; returns scene, memory after listening, and lesson.
 
         Args:
             observation: observation of the Co-Wizard, with its action mask.
@@ -100,14 +100,14 @@ class Pupil:
         return scene, memory, lesson
 
     def did(self, scene: Scene, memory: Memory, physical: Physical | None, remarks: Sequence[Remark]) -> None:
-        """Notes the command that was given, and what was decided to say."""
+        """Records the command that was given, and the chosen remarks."""
         self.attention = finished(scene, memory, physical, remarks)[1]
         if remarks:
             self.last = remarks[-1].act.move
 
 
 def follow(session: Session, town: Town, on_example: OnExample) -> None:
-    """Simulates a recorded session of scripted roles again, and hands on the examples of its Co-Wizard.
+    """Simulates a recorded session of scripted roles again, and passes on the examples of its Co-Wizard.
 
     Args:
         session: recorded session.
@@ -126,7 +126,7 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
 def practise(
     player: LearnedCoWizard, engine: SessionEngine, seed: int, on_example: OnExample, *, share: float, talking: float
 ) -> None:
-    """Plays a session in which teacher and player take turns; hands on the teacher's decisions as examples.
+    """Plays a session in which teacher and player take turns; passes on the teacher's decisions as examples.
 
     Args:
         player: the player.
@@ -170,7 +170,7 @@ class _Practice:
         self.disagreements = 0
 
     def take_over(self) -> None:
-        """Gives the player the memory that the teacher has led to, and what was said."""
+        """Gives the player the memory that results from the teacher's decisions, and its remarks."""
         voice = replace(self._teacher.speech, queue=())
         self._state = replace(self._state, attention=self._pupil.attention, voice=voice)
         self.disagreements = 0
@@ -198,7 +198,7 @@ class _Practice:
         return replace(turn.action, speech=speech)
 
     def _correct(self, turn: Turn, memory: Memory, lesson: Lesson, on_example: OnExample) -> None:
-        """Hands on an example of how the player's memory gets back to the teacher's, if something was just heard.
+        """Passes on an example of how the player's memory gets back to the teacher's, if something was just heard.
 
         Without anything new, the network would learn to change a memory for no reason.
         """

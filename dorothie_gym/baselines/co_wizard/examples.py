@@ -1,4 +1,4 @@
-"""Examples to learn from: the inputs of decisions, and what the teacher did."""
+"""Training examples: inputs of decisions, and the teacher's decisions."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Example:
         acting: inputs of the second step.
         before: values of the memory before (v,).
         values: values of the memory after (v,).
-        fresh: which variables are set anew.
+        fresh: which variables are set again.
         goal: `GoalEvent`, or their number + position of the place among `listening.rows`; `UNKNOWN` if it is missing.
         status: status given to an errand.
         command: index of the command; `UNKNOWN` if it could not be commanded.
-        remarks: forms of the first two remarks; "" for none, None if it is not learnt from.
-        weight: number of decisions that it stands for.
+        remarks: forms of the first two remarks; "" for none, None if it is not trained.
+        weight: number of decisions that it represents.
     """
 
     listening: Inputs
@@ -53,11 +53,11 @@ def make_example(
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         listening: inputs of the first step.
         acting: inputs of the second step.
         commands: possible commands.
-        lesson: what the teacher did.
+        lesson: decision of the teacher.
         available: names and numbers that could be said.
         rng: draws which idle decisions are kept.
         talks: whether the remarks, or silence, are learnt.
@@ -92,16 +92,16 @@ def make_example(
 def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Memory, lesson: Lesson) -> Example | None:
     """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
 
-    Where the own goal is another place than the teacher's, and the utterance does not say which, the player is to
+    Where the own goal is another place than the teacher's, and the utterance does not say which, the player has to
     doubt it (a place of the same name) or to give it up: it cannot know the right one, but it no longer plans a route
-    against the directions that it is given.
+    against the directions that it gets.
 
     Args:
-        scene: what the player perceived, with its own memory.
+        scene: the player's perception, with its own memory.
         listening: inputs of the first step.
         acting: inputs of the second step, from which nothing is learnt.
         led: memory that the teacher has led to.
-        lesson: what the teacher did.
+        lesson: decision of the teacher.
     """
     own, update = scene.memory, lesson.update
     same_goal = own.goal is led.goal and own.goal_mark == led.goal_mark

@@ -48,7 +48,7 @@ HAZARDS: Final = (
 )
 PHYSICAL: Final = tuple(PhysicalAction)
 TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
-"""What remarks are about: their predicate or, without content, their move."""
+"""Topics of remarks: their predicate or, without content, their move."""
 
 _SILENCES: Final = (4.0, 7.0, 8.0, 10.0)  # silences after which the scripted Co-Wizard asks [s]
 
@@ -69,7 +69,7 @@ def state_vector(
         view: observation.
         step: next step on the navigator's route.
         utterances: last utterances of the participant, the latest first.
-        queued: whether own remarks wait to be said.
+        queued: whether its remarks wait to be said.
     """
     return [
         *_road(memory, view),
@@ -146,7 +146,7 @@ def _road(memory: Memory, view: CoWizardView) -> list[float]:
 
 
 def ordered_exit(memory: Memory, view: CoWizardView, choice: Choice | None) -> Exit | None:
-    """Returns the exit of a junction that the turn in the memory means, whether or not junctions are to be passed."""
+    """Returns the exit of a junction that matches the turn in the memory, regardless of junctions to pass before."""
     order = ORDERS[memory.value("order")]
     if order is None or choice is None:
         return None

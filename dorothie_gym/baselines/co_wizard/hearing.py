@@ -35,7 +35,7 @@ _MOVES: Final = tuple(DialogueMove)
 _NAMES_LEFT_OUT: Final = frozenset(
     LABEL_INDEX[value] for value in LABELS if isinstance(value, LandmarkName | StreetName) and value.label != "Queried"
 )
-"""Names of places and streets are compared with what the map shows, not learnt one by one."""
+"""Names of places and streets are compared with the map, not learnt one by one."""
 _LABELS_HEARD: Final = tuple(k for k in range(len(LABELS)) if k not in _NAMES_LEFT_OUT)
 _MENTION: Final = re.compile(r"[a-z']+|\d+|[?]")
 
@@ -64,14 +64,14 @@ class Utterance:
 
     @cached_property
     def said(self) -> tuple[float, ...]:
-        """Moves, slot values other than names, and what the words say, as numbers."""
+        """Moves, slot values other than names, and content of the words, as numbers."""
         return tuple(_numbers(self))
 
     @cached_property
     def asks(self) -> DialogueMove | None:
         """Move of the first question that yes or no answers; None without one.
 
-        A question about a stop or U-turn of which no more was understood asks why, as far as can be told: "way did we
+        A question that is understood to be about a stop or U-turn, and no more, is assumed to ask why: "way did we
         stop?".
         """
         for act in self.heard.acts:
@@ -82,7 +82,7 @@ class Utterance:
 
     @cached_property
     def asks_why(self) -> ActionValue | None:
-        """What a question asks the reason for: STOP for why the car stands, U_TURN for why it turns round."""
+        """Action whose reason a question asks for: STOP for a standstill, U_TURN for a U-turn."""
         if self.heard.words.asked is not None:
             return None
         questions = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN)
@@ -90,7 +90,7 @@ class Utterance:
 
     @cached_property
     def asked(self) -> Proposition | None:
-        """What a question asks, by its words or else by its slots; None if that cannot be told."""
+        """Proposition of a question, from its words or otherwise from its slots; None if unknown."""
         if self.heard.words.asked is not None:
             return self.heard.words.asked
         for act in self.heard.acts:
@@ -130,7 +130,7 @@ def word_rows(text: str) -> NDArray[np.int64]:
 
 
 def utterance_vector(utterance: Utterance | None, now: float) -> list[float]:
-    """Returns an utterance as numbers: its age, and what it says."""
+    """Returns an utterance as numbers: its age and content."""
     if utterance is None:
         return [0.0] * UTTERANCE_SIZE
     age = now - utterance.time

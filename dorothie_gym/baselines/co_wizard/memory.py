@@ -1,8 +1,8 @@
-"""Working memory of the learned Co-Wizard: what it has committed itself to, written by its own network.
+"""Working memory of the learned Co-Wizard: its commitments, written by its own network.
 
 At each decision the network predicts the next value of each variable in `VARIABLES`, and an event of the goal
-(`GoalEvent`, or a place on the map). `Memory.updated` stores both. What is kept besides follows from them and from the
-own observation: times, the navigator's route, and where a slow approach ends.
+(`GoalEvent`, or a place on the map). `Memory.updated` stores both. All other content is derived from them and from the
+observation: times, the navigator's route, and the end of a slow approach.
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ U_TURN: Final = 1
 """Value of `manoeuvre` for a U-turn that was asked for."""
 
 FRESH: Final = ("order", "nudging", "creeping")
-"""Variables that can be set anew to the same value; for each there is a further, binary output."""
+"""Variables that can be set again to the same value, for each of which there is a binary output."""
 
 STATUSES: Final = (None, GoalStatus.PENDING, GoalStatus.COMPLETE, GoalStatus.ABANDONED)
 """Statuses that an utterance gives to an errand."""
 
 
 class GoalEvent(enum.IntEnum):
-    """What happens to the goal, besides the choice of a place on the map: those are numbered behind."""
+    """Events of the goal, besides the choice of a place on the map, which has the numbers after these."""
 
     KEEP = 0
     CLEAR = 1
@@ -82,7 +82,7 @@ PLACE_SIGHT: Final = 80.0
 """Distance along the default lanes within which a place is looked for [m]; as that of the scripted Co-Wizard."""
 
 REACTION: Final = 3.0
-"""Time within which the memory is changed because of what was heard [s]."""
+"""Time within which an utterance may change the memory [s]."""
 
 AWAY: Final = 300.0
 """Time that stands for "never" or "long ago" [s]."""
@@ -94,7 +94,7 @@ class Update:
 
     Attributes:
         values: next value of each variable, in the order of `VARIABLES`.
-        fresh: whether each variable in `FRESH` is set anew.
+        fresh: whether each variable in `FRESH` is set again.
         goal: `GoalEvent`, or their number + row of the landmark.
         status: index in `STATUSES`, for the first place named, or for the goal.
     """
@@ -112,7 +112,7 @@ class Memory:
     Attributes:
         town: the map.
         values: value of each variable.
-        changed_at: time at which each variable was last changed or set anew [s].
+        changed_at: time at which each variable was last changed or set again [s].
         goal: name of the goal; None for none.
         goal_mark: its row among the landmarks; -1 if it is not on the map.
         goal_at: time of its last change [s].
@@ -127,19 +127,19 @@ class Memory:
         plan: junctions of the route as sent last.
         standing_since: start of the standstill [s]; None while the car moves.
         stood_until: end of the last standstill [s].
-        reason: why the car stands, or stood last, as far as that could be told.
-        reason_since: since when it has stood for this reason [s].
+        reason: why the car stands, or stood last, if known.
+        reason_since: time since which it has stood for this reason [s].
         told_to_stop_at: time at which it halted because of an utterance [s].
-        told_to_turn_round_at: last time at which it was to turn round because of one [s].
-        physical: last own physical action; None for none.
+        told_to_turn_round_at: last time at which an utterance told it to turn round [s].
+        physical: its last physical action; None for none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
-        said_at: time of the last own remark by predicate or, without content, by move [s].
-        spoke_at: time of the last own remark [s].
-        asked_at: time of the last own question [s].
+        said_at: time of its last remark by predicate or, without content, by move [s].
+        spoke_at: time of its last remark [s].
+        asked_at: time of its last question [s].
         asked_lane: lane before the junction whose way was asked for; -1 for none.
         heard_at: time of the last utterance of the participant [s].
-        last: last own remark that can be said again; None at first.
+        last: its last remark that can be repeated; None at first.
         clock: time between decisions.
     """
 
@@ -194,7 +194,7 @@ class Memory:
         return memory._standing(view)._carrying_on(view)
 
     def _standing(self, view: CoWizardView) -> Memory:
-        """Brings the standstill and the reason for it up to date; a reason that cannot be told any more stays."""
+        """Brings the standstill and the reason for it up to date; a reason that can no longer be determined is kept."""
         if not view.standing:
             ended = self.stood_until if self.standing_since is None else view.time
             return replace(self, standing_since=None, stood_until=ended)
@@ -245,7 +245,7 @@ class Memory:
         return memory._with_goal(update.goal, view, named)
 
     def _carrying_on(self, view: CoWizardView) -> Memory:
-        """Carries the place of a slow approach along, and sends the plan if the route has changed."""
+        """Moves the place of a slow approach along with the car, and sends the plan if the route has changed."""
         memory = self
         if self.value("creeping") and not self.value("halted") and view.manoeuvre is not PhysicalAction.U_TURN:
             left = self.distance_to(self.target, view)
@@ -326,13 +326,13 @@ class Memory:
         return memory._noting(mark.name, GoalStatus.ONGOING)
 
     def acted(self, physical: PhysicalAction | None, view: CoWizardView) -> Memory:
-        """Notes the own physical action."""
+        """Records a physical action of the Co-Wizard."""
         if physical is None:
             return self
         return replace(self, physical=physical, physical_at=view.time, junction_of_action=view.junction)
 
     def spoken(self, remark: Remark, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> Memory:
-        """Notes an own remark: what it is about, and whether it asks."""
+        """Records a remark of the Co-Wizard: its topic, and whether it asks."""
         last = remark if asks or remark.act.slots else self.last
         said = (*(pair for pair in self.said_at if pair[0] != topic), (topic, view.time))
         lane = view.choice.lane if asks_way and view.choice is not None else self.asked_lane

@@ -48,7 +48,7 @@ class Layout:
 
 @dataclass(frozen=True, kw_only=True)
 class Heard:
-    """Outputs of listening: logits of the next values of the memory, of what is set anew, of goal and status."""
+    """Outputs of listening: logits of the next memory values, of variables that are set again, of goal and status."""
 
     values: tuple[Tensor, ...]
     fresh: Tensor
@@ -118,7 +118,7 @@ class _Scorer(nn.Module):
         self.last = nn.Linear(OPTION_WIDTH, 1)
 
     def forward(self, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
-        """Returns the score of each option (b, k), minus infinity for those that are only filled in."""
+        """Returns the score of each option (b, k), minus infinity for padding."""
         both = torch.relu(self.hidden(hidden)[:, None, :] + self.option(options))
         scores = self.last(both).squeeze(2)
         missing = torch.arange(options.shape[1])[None, :] >= count[:, None]

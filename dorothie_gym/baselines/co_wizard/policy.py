@@ -59,7 +59,7 @@ class LearnedState:
     Attributes:
         seed: seed of the draws.
         attention: memory and last utterances.
-        voice: own remarks, queued and said.
+        voice: its remarks, queued and said.
         count: number of decisions.
     """
 
@@ -74,11 +74,11 @@ class Turn:
     """Decision of the player.
 
     Attributes:
-        scene: what was perceived.
+        scene: perception.
         memory: memory after listening.
         action: the action.
-        remarks: what was decided to say.
-        queued: whether own remarks waited before.
+        remarks: chosen remarks.
+        queued: whether its remarks waited before.
         silent: whether nothing new could be said.
         state: state after the decision.
     """
@@ -243,7 +243,7 @@ def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, 
 
 
 def _scene(view: CoWizardView, memory: Memory) -> WordingContext:
-    """Returns what the words may refer to."""
+    """Returns the possible referents of the words."""
     near = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, memory.town, view.lane)
     return WordingContext(

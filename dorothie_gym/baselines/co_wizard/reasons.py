@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def reason_to_stand(memory: Memory, view: CoWizardView) -> Proposition | None:
-    """Returns why the car stands now; None if that cannot be told."""
+    """Returns why the car stands now; None if unknown."""
     goal, ordered = memory.goal, bool(memory.value("order"))
     since = view.time if memory.standing_since is None else memory.standing_since
     if memory.value("arrived") and goal is not None:

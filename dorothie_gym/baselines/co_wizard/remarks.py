@@ -1,9 +1,9 @@
-"""Remarks of the learned Co-Wizard: those of the corpus without their names, and where it takes the names from.
+"""Remarks of the learned Co-Wizard: those of the corpus without their names, and the sources of the names.
 
 A remark is an act with the propositions that it states or asks and the particulars of its words. In a form (`form_of`),
 each name of a place or street and each number is replaced by its source: the goal, a place just named, the street of an
-exit, the time that the route takes. The network chooses a form, and thereby act, content and sources; `filled` puts in
-what the sources are at this moment. The grammar words the act, as for the scripted roles.
+exit, the time that the route takes. The network chooses a form, and thereby act, content and sources; `filled` inserts
+the current values of the sources. The grammar words the act, as for the scripted roles.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ENUMS: Final = {
     )
 }  # fmt: skip
 _WHOLES: Final = ("answer", "again")
-"""Sources of whole remarks: the answer to what was just asked, and the last remark said again."""
+"""Sources of whole remarks: the answer to the last question, and a repetition of the last remark."""
 
 _OPEN: Final = ("QUERIED", "UNKNOWN")
 _WORDING: Final = ("topic", "direction", "faster", "lights", "speed", "distance", "dropped", "ordinal")
@@ -186,14 +186,14 @@ def _decoded(code: Sequence[Any], available: Sources) -> Any:
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a valid form of a remark."""
     if not isinstance(parse_json(form, "form"), dict):
         raise ValueError(form[:80])
     filled(form, {name: _example(name) for name in sources_of(form)})
 
 
 def _example(source: str) -> object:
-    """Returns what a source can be."""
+    """Returns an example of a source."""
     if source in _WHOLES:
         return Remark(act=DialogueAct.of(DialogueMove.REPLY_U))
     if source in ("goal", "former", "near", "place0", "place1"):
@@ -221,5 +221,5 @@ def sources_of(form: str) -> frozenset[str]:
 
 
 def topic_of(remark: Remark) -> str:
-    """Returns what a remark is about: its predicate or, without content, its move."""
+    """Returns the topic of a remark: its predicate or, without content, its move."""
     return str(remark.meaning[0].predicate) if remark.meaning else remark.act.move.label

@@ -1,7 +1,7 @@
-"""The scripted Co-Wizard as a teacher: run beside a session, it says what it would do, remember and say.
+"""The scripted Co-Wizard as a teacher: run alongside a session, it reports what it would do, remember and say.
 
-The teacher observes what the player observes. What the player did and said instead is put into its state (`drove`,
-`talked`), so that it goes on from the player's course, not from its own.
+The teacher has the player's observations. The player's actions and remarks are copied into its state instead of its own
+(`drove`, `talked`), so that it continues from the player's situation, not from its own.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 CALM = CoWizardStyle(
     echoes=0.3, checks=0.1, announces=0.0, silent=0.4, asks=0.6, proposes=0.0, mishears=0.0, careful=1.0, notices=0.9
 )
-"""Style of the teacher where the player plays: it understands what is said, and its choices are not left to chance."""
+"""Style of the teacher while the player plays: it understands everything, and makes no random choices."""
 
 _WISHES = (None, Wish.U_TURN, Wish.SWITCH_LEFT, Wish.SWITCH_RIGHT)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lesson:
-    """What the teacher does in a decision.
+    """Decision of the teacher.
 
     Attributes:
-        update: what it remembers after listening and looking.
+        update: its memory after listening and looking.
         physical: its physical action.
-        remarks: what it decides to say now, in one breath or the next.
+        remarks: remarks that it chooses now, in one breath or the next.
         queued: whether remarks were waiting to be said before.
-        ready: whether it has reacted to what it heard; before, it commands nothing.
+        ready: whether it has reacted to the last utterance; before, it gives no commands.
         action: the whole action.
     """
 
@@ -56,7 +56,7 @@ class Lesson:
 
 
 class Teacher:
-    """Scripted Co-Wizard beside a session."""
+    """Scripted Co-Wizard that runs alongside a session."""
 
     def __init__(self, town: Town, limits: SpaceLimits, seed: int, style: CoWizardStyle | None = None) -> None:
         """Prepares the teacher.
@@ -80,7 +80,7 @@ class Teacher:
 
     @property
     def speech(self) -> SpeechState:
-        """What was said, and what waits to be said."""
+        """Remarks that were said, and queued ones."""
         return self._state.speech
 
     def decide(
@@ -124,15 +124,15 @@ class Teacher:
             state.intentions, state.commands = self._intentions, self._commands
 
     def talked(self, voice: SpeechState, remarks: Sequence[Remark], lesson: Lesson, view: CoWizardView) -> None:
-        """Puts into the state what the player says instead of the teacher.
+        """Copies the player's remarks into the state, in place of the teacher's.
 
-        What the teacher has decided to mention counts as mentioned, but its questions are not asked, and what the
-        player asks is.
+        Topics that the teacher has chosen to mention count as mentioned, but its questions do not count as asked; the
+        player's do.
 
         Args:
-            voice: own remarks of the player, queued and said.
-            remarks: what the player has just decided to say.
-            lesson: what the teacher did.
+            voice: remarks of the player, queued and said.
+            remarks: remarks that the player has just chosen.
+            lesson: decision of the teacher.
             view: observation.
         """
         state, before = self._state, self._dialogue

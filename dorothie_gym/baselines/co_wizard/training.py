@@ -1,4 +1,4 @@
-"""Training of the learned Co-Wizard: imitation of a corpus, then rounds of practice beside the teacher."""
+"""Training of the learned Co-Wizard: imitation of a corpus, then rounds of practice with the teacher."""
 
 from __future__ import annotations
 

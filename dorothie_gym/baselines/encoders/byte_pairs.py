@@ -25,7 +25,8 @@ _WORD: Final = re.compile(r"\w+|[^\w\s]")
 class BytePairs:
     """Splits texts into pieces.
 
-    Id 0 is padding, 1 + b is the byte b, and what follows are the merged pairs in the order in which they were learnt.
+    Id 0 is padding, 1 + b is the byte b, and the following ids are the merged pairs in the order in which they were
+    learnt.
 
     Attributes:
         merges: pairs of ids that became one, most frequent first.
@@ -39,7 +40,7 @@ class BytePairs:
         """Learns pieces from texts by merging the most frequent pair of adjacent pieces repeatedly.
 
         Args:
-            texts: of the training sessions only.
+            texts: texts of the training sessions only.
             vocabulary: how many ids there are at most, padding and bytes included.
 
         Raises:

@@ -63,7 +63,7 @@ def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = 
 
     Args:
         encoder: the encoder.
-        texts: of a corpus, each once.
+        texts: texts of a corpus, each once.
         cache: folder of the user's cache folder to keep them in; None for no cache.
     """
     if cache is None:

@@ -93,7 +93,7 @@ class MiniLMEncoder:
 
 
 def has_minilm() -> bool:
-    """Returns whether MiniLM's weights and what reads them are installed."""
+    """Returns whether MiniLM's weights and their loader are installed."""
     return all(importlib.util.find_spec(package) is not None for package in (_MINILM_PACKAGE, "transformers"))
 
 
@@ -106,7 +106,7 @@ def minilm_folder() -> Path:
 
 
 class HubertEncoder:
-    """HuBERT with frozen weights: the mean over time of its last layer, of what was heard so far.
+    """HuBERT with frozen weights: the mean over time of its last layer, over the sound so far.
 
     Args:
         source: name of a model for transformers, or a folder with its weights and configuration.
@@ -177,7 +177,7 @@ def load_pretrained(kind: Any, source: str | Path, name: str) -> Any:
     Args:
         kind: class of transformers that has `from_pretrained`.
         source: name of the model, or a folder.
-        name: of the encoder, for the message.
+        name: name of the encoder, for the message.
 
     Raises:
         EncoderError: it is neither here nor reachable.

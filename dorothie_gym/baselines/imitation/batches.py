@@ -1,4 +1,4 @@
-"""Examples as tensors, and the files that hold those of a session."""
+"""Examples as tensors, and the files with the examples of a session."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from dorothie_gym.support.files import replacing
 from dorothie_gym.support.input_files import checked, parse_json, raising
 
 UNKNOWN: Final = -1
-"""Target of what is not learnt from an example."""
+"""Target value for outputs that an example does not train."""
 
 IDLE_SHARE: Final = 0.25
-"""Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
+"""Share of idle decisions that is kept; each is weighted by the inverse of this share."""
 
 _FORMS: Final = "forms"
 
@@ -63,7 +63,7 @@ class TensorBatch:
 
     @classmethod
     def read(cls, paths: Sequence[Path], vocabulary: Sequence[str]) -> Self:
-        """Returns the examples of some files, with their remarks numbered by a vocabulary; others are not learnt.
+        """Returns the examples of some files, with their remarks numbered by a vocabulary; others are not trained.
 
         Raises:
             CheckpointError: a file is damaged.

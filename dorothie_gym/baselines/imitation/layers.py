@@ -1,4 +1,4 @@
-"""Layers of the learned roles: hidden layers, and the scores of options of which one is chosen."""
+"""Layers of the learned roles: hidden layers, and scorers of options."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def option_scorer(inputs: int, width: int) -> nn.Sequential:
 
 
 def option_scores(scorer: nn.Module, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
-    """Returns the score of each option (b, k), almost minus infinity for those that are only filled in.
+    """Returns the score of each option (b, k), almost minus infinity for padding.
 
     Args:
         scorer: `option_scorer`.

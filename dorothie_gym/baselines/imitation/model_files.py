@@ -46,12 +46,12 @@ Network = TypeVar("Network", bound=nn.Module)
 
 
 def save_model(network: nn.Module, page: RoleModelPage, folder: Path, dtype: torch.dtype = torch.float32) -> None:
-    """Writes a model into a folder; an older one stays whole until it is replaced.
+    """Writes a model into a folder; an older model is replaced atomically.
 
     Args:
         network: the network.
         page: content of `model.json`.
-        folder: folder; it is made.
+        folder: folder, which is created.
         dtype: type of the weights in the file.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -77,8 +77,8 @@ def load_model(
         page_type: class of its page.
         kind: kind that the page must have.
         version: `format` that it must have.
-        make: returns the network of a page, with any weights; None if its layout is that of another version.
-        check_form: raises an error for a text that is no form of a remark.
+        make: returns the network of a page, with any weights; None if its layout belongs to another version.
+        check_form: raises an error for a text that is not a valid form of a remark.
 
     Raises:
         ModelFileError: a file is missing, damaged, or of another version.

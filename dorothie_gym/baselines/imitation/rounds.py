@@ -1,8 +1,9 @@
-"""Rounds of training: imitation of a corpus, then rounds of practice beside the teacher (DAgger).
+"""Rounds of training: imitation of a corpus, then rounds of practice with the teacher (DAgger).
 
-A round plays sessions in which the player of the round before and the teacher act in turns, adds the teacher's
-decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). Each session is a file
-of lessons, and each fit a model, so that an interrupted training goes on where it was; all follow from the seed.
+A round plays sessions in which the previous round's player and the teacher act in turns, adds the teacher's
+decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). The examples of each
+session and the model of each fit are saved, so that an interrupted training can be resumed; all depend only on the
+seed.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class RoundSettings:
         share: share of the time in which the player acts in practice.
         max_seconds: time limit of a session of practice [s].
         first_epochs: passes of the fit to the corpus.
-        epochs: passes of the fit after each round, which goes on from the one before.
+        epochs: passes of the fit after each round, which continues the previous fit.
         last_epochs: passes of the last fit.
         least: number of times that a remark must occur in the corpus to be learnt.
     """
@@ -88,7 +89,7 @@ class CorpusPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class PracticePlan:
-    """Session of practice: its number in the round, town, seed, and the file of what is learnt from."""
+    """Practice session: its number in the round, town, seed, and the file of its examples."""
 
     number: int
     town: str
@@ -104,8 +105,8 @@ class FitPlan:
         number: number of the round; 0 for the fit to the corpus.
         folder: folder of its model.
         files: files of lessons.
-        corpus_files: those of them that are of the corpus, from which the vocabulary is taken.
-        former: folder of the model to go on from; None for the first fit.
+        corpus_files: the files of the corpus among them, from which the vocabulary is taken.
+        former: folder of the model to continue from; None for the first fit.
         epochs: number of passes.
         title: name of the stage.
     """
@@ -120,7 +121,7 @@ class FitPlan:
 
 
 class Learner(Protocol):
-    """What a role brings to the training."""
+    """Role-specific parts of the training."""
 
     @property
     def branch(self) -> int:
@@ -128,7 +129,7 @@ class Learner(Protocol):
         ...
 
     def follower(self) -> Callable[[CorpusPlan], None]:
-        """Returns the function that writes the lessons of a session of the corpus; it may leave one out."""
+        """Returns the function that writes the examples of a corpus session; it may skip a session."""
         ...
 
     def player(self, folder: Path) -> Callable[[PracticePlan], None]:
@@ -157,7 +158,8 @@ def train_in_rounds(
         out: folder; it receives `model.json` and `model.safetensors`, the lessons, and the model of each round.
         workers: number of processes that play sessions; the result does not depend on it.
         on_stage: callback for the progress.
-        lessons: folder of the lessons of the corpus, which trainings with other seeds may share; None for one in `out`.
+        lessons: folder of the corpus's training examples, which trainings with other seeds may share; None for one in
+            `out`.
 
     Returns:
         The fits that were done now.
@@ -231,7 +233,7 @@ def practice_plans(seeds: Sequence[int], sessions: int, branch: int, folder: Pat
 
 
 def processor_seconds() -> float:
-    """Returns the processor time of this process and of those that have ended [s]."""
+    """Returns the processor time of this process and of its finished child processes [s]."""
     return sum(os.times()[:4])
 
 
@@ -244,7 +246,7 @@ def gather(
     workers: int,
     report: Callable[[int, int], None],
 ) -> None:
-    """Makes the missing files of sessions."""
+    """Creates the missing files of sessions."""
     missing = [plan for plan in plans if not plan.file.is_file()]
     report(len(plans) - len(missing), len(plans))
     for number, _ in enumerate(run_tasks(prepare, missing, workers=workers), start=len(plans) - len(missing) + 1):

@@ -20,11 +20,11 @@ DECAY: Final = 1e-4
 
 
 CHANGED_WEIGHT: Final = 3.0
-"""Weight of a value in the decisions in which it changes, relative to the others."""
+"""Weight of a value in decisions in which it changes, relative to other decisions."""
 
 
 class Rows(Protocol):
-    """Examples of which some rows can be taken."""
+    """Examples from which rows can be selected."""
 
     def __len__(self) -> int:
         """Returns the number of examples."""

@@ -224,7 +224,7 @@ class JunctionReader(TOTO):
         return action, side, direction
 
     def _exit_loss(self, scores: Tensor, there: Tensor, angles: Tensor, labels: Labels) -> Tensor:
-        """Returns the cross entropy of the labelled exit (B,); 0 without one, or if the action takes no angle."""
+        """Returns the cross entropy of the labelled exit (B,); 0 without a labelled exit or an angle."""
         apart = ((angles - labels.angle[:, None].nan_to_num() + 180.0) % 360.0 - 180.0).abs()
         apart = apart.masked_fill(~there, torch.inf)
         nearest, which = apart.min(1)
@@ -263,7 +263,7 @@ class JunctionReader(TOTO):
         """Returns whether the participant's last words name each exit's side, any side, and their age (B, X, 3).
 
         Args:
-            inputs: of the points.
+            inputs: inputs of the points.
             sides: (B, X, 3) whether each exit leads to the left, to the right, straight on.
         """
         human = inputs["utterance_mask"] & (inputs["utterance_speaker"] == PARTICIPANT)  # (B, U)

@@ -1,6 +1,6 @@
-"""Learned participant: one network that chooses the next errand, and what it says to the car, and when.
+"""Learned participant: one network that chooses the next errand, and the content and time of its remarks to the car.
 
-`memory` and `records` are what it keeps of the session, `features` what it sees, `remarks` what it can say, `network`
-the network, `teacher` the scripted participant whose decisions it imitates, `demonstrations`, `fitting` and `training`
-the training, and `policy` the player.
+`memory` and `records` hold its state, `features` its inputs, `remarks` its possible remarks, `network` the network,
+`teacher` the scripted participant whose decisions it imitates, `demonstrations`, `fitting` and `training` the training,
+and `policy` the player.
 """

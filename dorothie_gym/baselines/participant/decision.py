@@ -1,4 +1,4 @@
-"""One decision of the learned participant, up to what the network is given: the same in training and in play."""
+"""One decision of the learned participant, up to the inputs of the network: the same in training and in play."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Attention:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What is perceived at a decision.
+    """Perception at a decision.
 
     Attributes:
         view: observation.
@@ -53,7 +53,7 @@ class Scene:
 
     @property
     def considers_errands(self) -> bool:
-        """Returns whether the target is chosen now: there is none, or something was heard."""
+        """Returns whether to choose the target now: there is none, or an utterance was heard."""
         return self.heard or self.memory.records.task.target is None or bool(self._news)
 
     @property

@@ -1,4 +1,4 @@
-"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+"""Training examples from recorded sessions, and from sessions that player and teacher play together."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 PARTICIPANT: Final = Role.PARTICIPANT
 
 SHORTEST_TURN, LONGEST_TURN = 20, 160
-"""Range of the number of decisions for which teacher and player in turns guide the car."""
+"""Range of the number of decisions in a turn of teacher or player as guide of the car."""
 
 OnExample = Callable[[Example], None]
 
 
 class Pupil:
-    """Attention beside the teacher; the example of a decision is what the teacher does with the pupil's memory."""
+    """Attention that follows the teacher; examples are the teacher's decisions given the pupil's memory."""
 
     def __init__(self, town: Town, seed: int, teacher: Teacher) -> None:
         """Prepares the pupil of a teacher; the seed draws which examples are kept."""
@@ -47,7 +47,7 @@ class Pupil:
         self._rng = np.random.default_rng((seed, 1))
 
     def decide(self, observation: ObservationMapping, on_example: OnExample) -> tuple[Scene, Memory, Lesson]:
-        """Lets the teacher decide, and hands on the example; returns scene, memory with its choice, and lesson."""
+        """Lets the teacher decide, and passes on the example; returns scene, memory with its choice, and lesson."""
         scene = perceive(observation, self.attention)
         lesson = self._teacher.decide(observation)
         choice, choosing = lesson.choice(scene.memory), choosing_inputs(scene)
@@ -63,7 +63,7 @@ class Pupil:
         return scene, memory, lesson
 
     def follow(self, scene: Scene, memory: Memory, lesson: Lesson) -> None:
-        """Notes what the teacher says, in its words."""
+        """Records the teacher's remarks, with their words."""
         memory = memory.decided(lesson.remarks, scene.view, scene.rng)
         state = self._teacher.state
         records = replace(memory.records)
@@ -73,7 +73,7 @@ class Pupil:
         self.attention = Attention(memory=memory.spoken(state.speech, scene.view), utterances=scene.utterances)
 
     def lead(self, scene: Scene, player: LearnedParticipant) -> ActionDict:
-        """Lets the player decide, and puts what it does into the teacher's state; returns its action."""
+        """Lets the player decide, and copies its decision into the teacher's state; returns its action."""
         memory = scene.memory.chosen(player.choose(choosing_inputs(scene), scene), scene.view, scene.rng)
         remarks = player.speak(speaking_inputs(scene, memory), scene, memory)
         speech, self.attention = finished(scene, memory, remarks)
@@ -82,7 +82,7 @@ class Pupil:
 
 
 def follow(session: Session, town: Town, on_example: OnExample) -> None:
-    """Simulates a recorded session of scripted roles again, and hands on the examples of its participant.
+    """Simulates a recorded session of scripted roles again, and passes on the examples of its participant.
 
     Args:
         session: recorded session.
@@ -99,7 +99,7 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
 
 
 def practise(player: LearnedParticipant, engine: SessionEngine, seed: int, on_example: OnExample, share: float) -> None:
-    """Plays a session in which teacher and player guide the car in turns; hands on the examples.
+    """Plays a session in which teacher and player guide the car in turns; passes on the examples.
 
     Args:
         player: the player.

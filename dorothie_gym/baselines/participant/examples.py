@@ -1,4 +1,4 @@
-"""Examples to learn from: the inputs of decisions, and what the teacher did."""
+"""Training examples: inputs of decisions, and the teacher's decisions."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Example:
         guides: whether the car was guided before.
         target: 0 for no change, or 1 + position of the errand; `UNKNOWN` if it is missing.
         guiding: whether the car is guided after.
-        remarks: forms of the remarks, then ""; None if it is not learnt from.
-        weight: number of decisions that it stands for.
+        remarks: forms of the remarks, then ""; None if it is not trained.
+        weight: number of decisions that it represents.
     """
 
     choosing: Inputs
@@ -53,7 +53,7 @@ def make_example(
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         choosing: inputs of the first step.
         speaking: inputs of the second step.
         choice: the teacher's choice.
@@ -82,7 +82,7 @@ def make_example(
 def forms_of_remarks(
     remarks: Sequence[Remark], memory: Memory, scene: Scene, available: Mapping[str, object]
 ) -> list[str | None]:
-    """Returns the forms of remarks; None for those that are not learnt, and for all behind them."""
+    """Returns the forms of remarks; None for remarks that are not trained, and for all that follow them."""
     found: list[str | None] = []
     for one in remarks[:MOST_REMARKS]:
         form = STOP_FORM if is_stop(one, memory, scene.view) else form_of(one, available)

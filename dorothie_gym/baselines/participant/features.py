@@ -1,4 +1,4 @@
-"""Inputs of the network: the state of car, road, route, tasks and talk, and the errands among which it chooses."""
+"""Inputs of the network: the state of car, road, route, tasks and dialogue, and the errands to choose from."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _DIRECTIONS: Final = tuple(Direction)
 _OBJECTS: Final = tuple(ObjectClass)
 _TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
 _WAITS: Final = (1.6, 4.0, 6.0, 9.0, 10.0, 40.0)
-"""Standstills after which the scripted participant says something [s]."""
+"""Durations of a standstill after which the scripted participant makes a remark [s]."""
 
 _MOVES: Final = tuple(DialogueMove)
 _ACTIONS: Final = (
@@ -52,7 +52,7 @@ _ACTIONS: Final = (
 
 
 def state_vector(memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
-    """Returns the state of car, road, route, tasks and talk.
+    """Returns the state of car, road, route, tasks and dialogue.
 
     Args:
         memory: working memory.
@@ -272,13 +272,13 @@ def _name_of(view: ParticipantView, subgoal: SeenSubgoal) -> LandmarkName | None
 
 
 def _said_other_side(memory: Memory, direction: Direction) -> bool:
-    """Returns whether the last direction that the participant said is another one."""
+    """Returns whether the participant's last direction differs."""
     said = [item.wording.direction for item in memory.records.speech.said if item.wording.direction is not None]
     return bool(said) and said[-1] is not direction
 
 
 def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bool | None:
-    """Returns whether the answer to a question is yes; None if it is no such question, or nothing tells."""
+    """Returns whether the answer to a question is yes; None for other questions, or without evidence."""
     asked, direction = utterance.asked, utterance.heard.words.direction
     if asked is None:
         return None
@@ -302,7 +302,7 @@ def _is_elsewhere(memory: Memory, view: ParticipantView) -> bool:
 
 
 def evidence(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
-    """Returns whether a proposition is true by what the participant knows and sees; None where nothing tells."""
+    """Returns whether a proposition is true to the participant's knowledge; None without evidence."""
     found = _holds(memory, view, said)
     return found if found is None else found is not said.negated
 

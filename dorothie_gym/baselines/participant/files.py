@@ -30,7 +30,7 @@ class ModelPage(RoleModelPage):
 
 
 def save_network(network: ParticipantNetwork, page: ModelPage, folder: Path) -> None:
-    """Writes a model into a folder, with weights in half precision; an older one stays whole until it is replaced."""
+    """Writes a model into a folder, with weights in half precision; an older model is replaced atomically."""
     save_model(network, page, folder, torch.float16)
 
 

@@ -1,7 +1,7 @@
-"""Working memory of the learned participant: the target, the route to it, what was said, and what has happened.
+"""Working memory of the learned participant: the target, the route to it, past remarks and events.
 
-The target and whether the car is guided are chosen by the network. All else follows from the own observation and the
-own remarks, in the records that the scripted participant keeps as well (`ParticipantState`).
+The target and whether the car is guided are chosen by the network. Everything else is derived from its observation and
+remarks, in the records that the scripted participant keeps as well (`ParticipantState`).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ LONGEST_WAIT: Final = 12.0
 
 
 class Event(enum.IntEnum):
-    """What has happened to the tasks, on the way, or in the talk; the memory keeps when, and which place."""
+    """Events of tasks, route or dialogue; the memory keeps their time and place."""
 
     DONE = 0
     ADDED = 1
@@ -60,10 +60,10 @@ class Event(enum.IntEnum):
     MISSED = 6
     PASSED = 7
     STRAYED = 8
-    """Another route was planned because the car has left the former one."""
+    """A new route was planned because the car has left the previous one."""
     WRONG_TURN = 9
     REROUTED = 10
-    """A way that avoids manoeuvres was planned after failures."""
+    """A route that avoids manoeuvres was planned after failures."""
     BLOCKED = 11
     RED_LIGHT = 12
 
@@ -88,7 +88,7 @@ class Memory:
     Attributes:
         records: records of tasks, route, guidance, motion and talk; they are not changed.
         events: time [s] and place of the latest of each kind of event; places are None where none belongs to it.
-        said_at: time of the last own remark by predicate or, without content, by move [s].
+        said_at: time of its last remark by predicate or, without content, by move [s].
         message: the latest message.
     """
 
@@ -131,7 +131,7 @@ class Memory:
         return memory._noting_tasks(view)._following(view), view
 
     def hearing(self, heard: HeardUtterance, view: ParticipantView, rng: np.random.Generator) -> Memory:
-        """Takes in an utterance of the car: it may be answered, and what it says is not said again."""
+        """Processes an utterance of the car, which may be answered and whose content is not repeated."""
         records = self._copied()
         records.conversation = records.conversation.after_hearing(view.time)
         speech = records.speech.heard_other(view.time, heard.acts, rng, records.clock.interval / 2.0)
@@ -159,7 +159,7 @@ class Memory:
         return replace(self, records=records)
 
     def decided(self, remarks: Sequence[Remark], view: ParticipantView, rng: np.random.Generator) -> Memory:
-        """Notes what is going to be said, and queues it; urgent remarks replace what waits to be said."""
+        """Records remarks and queues them; urgent remarks replace queued ones."""
         records, memory = self._copied(), self
         voice = records.speech
         if any(GoalStatus.COMPLETE in one.act.slots for one in remarks):
@@ -186,7 +186,7 @@ class Memory:
         return replace(self.records)
 
     def _noting_tasks(self, view: ParticipantView) -> Memory:
-        """Notes which tasks are done, new, dropped or changed; a target that is no longer open is given up."""
+        """Records tasks that are done, new, dropped or changed; a target that is no longer open is given up."""
         memory, records, now = self, self._copied(), view.time
         before = records.task.subgoals
         records.task = records.task.with_subgoals(view.subgoals, str(view.raw["tasks"]))
@@ -210,7 +210,7 @@ class Memory:
         return replace(memory, records=records)
 
     def _following(self, view: ParticipantView) -> Memory:
-        """Follows the route; plans another one where the car has left it, or where it did not help twice."""
+        """Follows the route; plans another one if the car has left it, or if it has failed twice."""
         memory = self._noting_blocked(view, near=False)
         records = memory._copied()
         guiding, guidance, route = records.guidance.guiding, records.guidance, records.route
@@ -236,7 +236,7 @@ class Memory:
         return replace(memory, records=records)
 
     def _noting_blocked(self, view: ParticipantView, *, near: bool) -> Memory:
-        """Notes what blocks the route, and plans around it."""
+        """Records obstacles on the route, and plans around them."""
         records = self._copied()
         known = records.route.blocked
         _silently(records, lambda: note_blocked(records, view, near=near))
@@ -245,7 +245,7 @@ class Memory:
 
 
 def _silently(records: ParticipantState, bookkeeping: Callable[[], None]) -> None:
-    """Does some bookkeeping of the scripted participant without what it would say."""
+    """Updates the records of the scripted participant without its remarks."""
     voice = records.speech
     bookkeeping()
     records.speech = voice
@@ -266,7 +266,7 @@ def _is_wrong_turn(
 
 
 def _aim_at(records: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
-    """Makes a subgoal the target; another one that is open is put off."""
+    """Makes a subgoal the target; an open previous target is postponed."""
     if records.task.target is not None:
         records.task = records.task.put_off_target()
         records.forget_target()

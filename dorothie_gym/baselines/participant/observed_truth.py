@@ -1,4 +1,4 @@
-"""Statements about the surroundings that the observation of the learned participant denies; they are not said."""
+"""Statements about the surroundings that contradict the learned participant's observation and are not made."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dorothie_gym.policies.speech import Remark
 
 
 def is_denied(remark: Remark, view: ParticipantView) -> bool:
-    """Returns whether a remark states a crowd, or a state of the weather, that is not there.
+    """Returns whether a remark mentions a crowd or weather that is not observed.
 
-    The measures are those by which the scripted speakers notice them.
+    The thresholds are those of the scripted speakers.
     """
     states = remark.act.move is DialogueMove.EXPLAIN
     return states and any(_is_wrong(said, view) for said in remark.meaning)

@@ -53,10 +53,10 @@ class LearnedState:
 
 
 class LearnedParticipant(Policy[LearnedState]):
-    """Participant whose network chooses the next errand, and what to say to the car and when.
+    """Participant whose network chooses the next errand, and the content and time of remarks to the car.
 
-    Target and guidance are the likeliest ones. Remarks are drawn: yes only where it is true, no only where it is not,
-    and no crowd or weather that is not there. Names, numbers and words of a remark are filled in (see `remarks`).
+    The most likely target and guidance are chosen. Remarks are sampled: yes only if it is true, no only if it is not,
+    and no crowd or weather that is not observed. Names, numbers and words of a remark are filled in (see `remarks`).
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class LearnedParticipant(Policy[LearnedState]):
         return Choice(target=inputs.numbers[chosen - 1] if chosen else KEEP_TARGET, guiding=bool(guiding[0] > 0.0))
 
     def speak(self, inputs: Inputs, scene: Scene, memory: Memory) -> tuple[Remark, ...]:
-        """Returns what to say, which is drawn; nothing for silence."""
+        """Returns sampled remarks; none for silence."""
         with torch.inference_mode():
             state, words, _ = _tensors(inputs)
             scores, hidden = self._network.speak(state, words)
@@ -146,9 +146,9 @@ def finished(scene: Scene, memory: Memory, remarks: Sequence[Remark]) -> tuple[S
     """Returns the speech of a decision, and the state after it.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         memory: memory after the choice of the target.
-        remarks: what was decided to say.
+        remarks: chosen remarks.
     """
     view = scene.view
     memory = memory.decided(remarks, view, scene.rng)

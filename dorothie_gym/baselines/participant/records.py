@@ -1,4 +1,4 @@
-"""Records of the learned participant about the way: the next step on the route, and what own remarks change in them."""
+"""Route records of the learned participant: the next step on the route, and the updates after its own remarks."""
 
 from __future__ import annotations
 
@@ -96,12 +96,12 @@ _STEPS: Final = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH
 
 
 def topic_of(remark: Remark) -> str:
-    """Returns what a remark is about: its predicate or, without content, its move."""
+    """Returns the topic of a remark: its predicate or, without content, its move."""
     return str(remark.meaning[0].predicate) if remark.meaning else remark.act.move.label
 
 
 def note_remark(records: ParticipantState, view: ParticipantView, remark: Remark) -> None:
-    """Enters an own remark into records: what is announced, described, asked for, or mentioned by it."""
+    """Enters a remark of the participant into the records: what it announces, describes, asks for, or mentions."""
     act, now, goal = remark.act, view.time, records.task.goal
     actions, statuses = act.values(Slot.ACTION), act.values(Slot.STATUS)
     later = {GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(statuses)

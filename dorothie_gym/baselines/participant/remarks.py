@@ -1,4 +1,4 @@
-"""Remarks of the learned participant: forms of the corpus without their names, and where it takes the names from.
+"""Remarks of the learned participant: forms of the corpus without their names, and the sources of the names.
 
 The forms are those of the learned Co-Wizard (`co_wizard.remarks`). Further sources are action and direction of the next
 step on the route, those of the question that is answered, and texts of the story, such as the purpose of an errand; a
@@ -79,7 +79,7 @@ def sources(memory: Memory, view: ParticipantView, utterances: Sequence[Utteranc
 
 
 def _pointers(step: RouteStep | None, latest: Utterance | None) -> dict[str, object]:
-    """Returns action and direction of the next step, and what the car has named in its utterance."""
+    """Returns action and direction of the next step, and the names in the car's utterance."""
     found: dict[str, object] = {} if step is None else {"manoeuvre": step.action, "turn": step.direction}
     if latest is None:
         return found
@@ -241,7 +241,7 @@ def _move_of(form: str) -> str | None:
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a valid form of a remark."""
     if form == STOP_FORM:
         return
     if not isinstance(parse_json(form, "form"), dict):
@@ -268,7 +268,7 @@ _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_str
 
 
 def _example(source: str) -> object:
-    """Returns what a source can be."""
+    """Returns an example of a source."""
     if source.startswith(_MARK):
         return "text"
     if source in _VALUES:
@@ -281,7 +281,7 @@ def _example(source: str) -> object:
 # --- Stop at the target -----------------------------------------------------------------------------------------------
 
 STOP_FORM: Final = "stop"
-"""Form of the remark that stops the car at the target, whose words are chosen ahead (`Memory.chosen`)."""
+"""Form of the remark that stops the car at the target, whose words are chosen in advance (`Memory.chosen`)."""
 
 
 def is_stop(remark: Remark, memory: Memory, view: ParticipantView) -> bool:

@@ -1,7 +1,7 @@
-"""The scripted participant as a teacher: run beside a session, it says what it would choose and say.
+"""The scripted participant as a teacher: run alongside a session, it reports what it would choose and say.
 
-The teacher observes what the player observes. What the player said instead is put into its state (`settle`), so that it
-goes on from the player's course, not from its own.
+The teacher has the player's observations. The player's remarks are copied into its state instead of its own (`settle`),
+so that it continues from the player's situation, not from its own.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 
 @dataclass(frozen=True, kw_only=True)
 class Lesson:
-    """What the teacher does in a decision.
+    """Decision of the teacher.
 
     Attributes:
         target: number of the subgoal that is its target; None for none.
         guiding: whether it guides the car.
-        remarks: what it decides to say now, in one breath or the next.
+        remarks: remarks that it chooses now, in one breath or the next.
         action: its action.
     """
 
@@ -44,7 +44,7 @@ class Lesson:
 
 
 class Teacher:
-    """Scripted participant beside a session."""
+    """Scripted participant that runs alongside a session."""
 
     def __init__(self, town: Town, limits: SpaceLimits, seed: int, style: ParticipantStyle | None = None) -> None:
         """Prepares the teacher.
@@ -74,11 +74,11 @@ class Teacher:
         )
 
     def settle(self, memory: Memory, *, spoke: bool) -> None:
-        """Puts into the state what the player has chosen and said instead.
+        """Copies the player's choices and remarks into the state.
 
         Args:
             memory: the player's memory after the decision.
-            spoke: whether the player has decided to say something.
+            spoke: whether the player has decided to make a remark.
         """
         records, state, former = memory.records, replace(self.state), self._former
         state.speech = records.speech

@@ -48,7 +48,7 @@ Network: TypeAlias = Any
 """Policy network of a `Model`, for the same reasons without a type."""
 
 TENSORS: Final = "model.safetensors"
-"""File of a model beside `model.json`."""
+"""File of a model next to `model.json`."""
 
 KIND: Final = "dorothie_gym-rl"
 """Kind of the models of `train-rl` in `model.json`; `policy_loader` selects the loader of a file by it."""
@@ -117,7 +117,7 @@ class LinearSchedule:
 
 
 def save_model(model: Model, settings: TrainingSettings, folder: Path, seconds: float) -> None:
-    """Writes a model with the state of its optimisers into a folder; an older one stays whole until it is replaced.
+    """Writes a model with the state of its optimisers into a folder; an older model is replaced atomically.
 
     Replay buffers are not saved.
 
@@ -235,7 +235,7 @@ def refusing_misfits(path: Path) -> Iterator[None]:
 
 
 def set_parameters(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]) -> None:
-    """Sets what `parameters_of` has returned; raises various errors if it does not fit (`refusing_misfits`)."""
+    """Sets the values returned by `parameters_of`; raises various errors if they do not fit (`refusing_misfits`)."""
     variables = {name.split("/", 1)[1]: value for name, value in tensors.items() if name.startswith("variables/")}
     parameters = {
         name: _optimiser(name, page["optimisers"], tensors)

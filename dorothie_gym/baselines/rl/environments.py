@@ -42,19 +42,19 @@ PARTNERS: Final = "partners"
 """Argument of these environments: policies of the other roles."""
 
 TOWN: Final = "town"
-"""Argument of environments; a list of several towns is one of batches only."""
+"""Argument of environments; only batches accept a list of several towns."""
 
 _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
 
 def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
-    """Makes an environment whose observations are vectors or pictures, of several towns in the first.
+    """Makes an environment, of the first of several towns, whose observations are vectors or pictures.
 
     Environments with other spaces are flattened (`dorothie_gym.flatten`), and their observations squashed.
 
     Args:
         name: id of the environment.
-        settings: its arguments; `partners` may name files of policies, too.
+        settings: its arguments; `partners` may also name files of policies.
 
     Raises:
         SettingsError: there is no such environment, or it does not accept these arguments.
@@ -73,7 +73,7 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
 
 
 def _with_partners(name: str, settings: Arguments) -> Arguments:
-    """Returns the arguments of an environment with the policies that play beside its agent, instead of their names.
+    """Returns the arguments of an environment with the policies of the other roles instead of their names.
 
     Raises:
         ValueError: there is no such policy, or it plays another role.
@@ -107,7 +107,7 @@ def each_town(settings: Arguments) -> list[Arguments]:
 
 
 def make_env_of_model(name: str, settings: Arguments | None, folder: Path) -> AnyEnv:
-    """Makes the environment that the description of a model names; the file may come from a stranger.
+    """Makes the environment that the description of a model names; the file may be untrusted.
 
     Args:
         name: id of the environment.
@@ -115,7 +115,7 @@ def make_env_of_model(name: str, settings: Arguments | None, folder: Path) -> An
         folder: folder of the model.
 
     Raises:
-        ModelFileError: it is not an environment of this package that vectors can play. `Town-v0` is none of them:
+        ModelFileError: it is not an environment of this package that vectors can play. `Town-v0` is excluded:
             highway-env imports the classes that its settings name.
         SettingsError: it does not accept these arguments.
     """
@@ -194,7 +194,7 @@ class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
         return self.env.reset(seed=seed, options=options)
 
     def step(self, action: Any) -> tuple[Vector, SupportsFloat, bool, bool, dict[str, object]]:
-        """Takes a step."""
+        """Plays one step."""
         self._actions.append(np.array(action))  # a copy: the caller may use the array again
         return self.env.step(action)
 

@@ -16,7 +16,7 @@ class FineInputs(BaseFeaturesExtractor):
     """Gives a network each input as it is, and a second time ten times as large and clipped to -1..1.
 
     Observations have one unit for their whole range, such as 25 m/s for speeds. A car that stands and one that rolls at
-    1 m/s differ by 0.04 there, which a network of two layers takes long to tell apart.
+    1 m/s differ by 0.04 there, which a network of two layers is slow to learn to distinguish.
     """
 
     def __init__(self, observation_space: spaces.Space[object]) -> None:

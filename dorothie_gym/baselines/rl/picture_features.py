@@ -13,7 +13,7 @@ from torch import nn
 from dorothie_gym.envs.navigation.dashboard import rows_of_dashboard
 
 STREET: Final = 256
-"""Numbers that describe what the camera sees."""
+"""Number of features of the camera picture."""
 
 DASHBOARD: Final = 64
 """Numbers that describe the dashboard."""
@@ -30,8 +30,9 @@ class PictureFeatures(BaseFeaturesExtractor):
         """Makes the layers.
 
         Args:
-            observation_space: of pictures (channels, h, w) in 0..255, which the policy scales to 0..1.
-            channels: of each convolution.
+            observation_space: space of pictures (channels, h, w) in 0..255, which the policy scales to
+                0..1.
+            channels: channels of each convolution.
         """
         super().__init__(observation_space, STREET + DASHBOARD)
         first, second, third = channels

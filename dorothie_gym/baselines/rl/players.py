@@ -83,7 +83,7 @@ class FlatPolicy(Policy[None]):
         )
 
     def initial_state(self, seed: int, town: Town) -> None:
-        """Returns nothing: the policy has no memory, and draws nothing."""
+        """Returns nothing: the policy has no memory and no random numbers."""
 
     def step(self, observation: ObservationMapping, state: None) -> tuple[ActionDict, None]:
         """Chooses the likeliest action."""

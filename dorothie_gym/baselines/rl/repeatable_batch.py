@@ -64,7 +64,7 @@ class RepeatableVecEnv(NativeVecEnv):
     def repeat_episodes(self, episodes: Sequence[Episode]) -> NDArray[Any]:
         """Plays recorded episodes, one in each environment, and returns their last observations (num_envs, ...).
 
-        All environments take their last action in the same step, so that each begins when its turn has come.
+        All environments take their last action in the same step, so each episode begins with a matching delay.
 
         Raises:
             ValueError: there is not one episode for each environment, or one has an action that is none.

@@ -1,4 +1,4 @@
-"""Checkpoint of a run: one file with everything that the run needs to go on as if it had not been interrupted.
+"""Checkpoint of a run: one file with everything that the run needs to continue as if it had not been interrupted.
 
 It is written between two rollouts and replaced in one step. It holds weights and optimisers, step counts, the states of
 all random generators, the rows of the learning curve, and a replay buffer if there is one. Environments are stored as
@@ -103,7 +103,7 @@ def read_checkpoint(folder: Path) -> Checkpoint | None:
 # --- State of a model of stable-baselines3 between two rollouts -------------------------------------------------------
 
 _COUNTERS: Final = ("_episode_num", "_n_calls", "exploration_rate", "_current_progress_remaining")
-"""Numbers of an algorithm, where it has them, beside those that `parameters_of` returns."""
+"""Numbers of an algorithm, if it has them, in addition to those that `parameters_of` returns."""
 
 _BUFFER: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 """Arrays of a replay buffer (rows, environments, ...)."""
@@ -115,7 +115,7 @@ _ARRAYS: Final = frozenset(
         "past_successes", "logged", "actions", "buffer",
     ]
 )  # fmt: skip
-"""Tensors beside those that `parameters_of` returns, or what stands before the slash in their names."""
+"""Tensors in addition to those that `parameters_of` returns, or the part of their names before the slash."""
 
 
 def state_of(model: Model) -> tuple[Page, Tensors]:
@@ -155,7 +155,7 @@ def state_of(model: Model) -> tuple[Page, Tensors]:
 
 
 def restore_state(model: Model, checkpoint: Checkpoint) -> None:
-    """Restores what `state_of` has returned in a model with new environments and a logger.
+    """Restores the state returned by `state_of` in a model with new environments and a logger.
 
     Raises:
         ModelFileError: the checkpoint does not fit the model, or an environment does not repeat its episode exactly.

@@ -139,7 +139,7 @@ class Run:
         return found
 
     def _write_checkpoint(self, settings: TrainingSettings, steps: int, page: Page, tensors: Tensors) -> None:
-        """Writes the checkpoint after a number of steps; a run that goes on there writes all later files again."""
+        """Writes the checkpoint after a number of steps; a run that is resumed there writes all later files again."""
         rows = [row.as_json() for row in self.rows]
         own: Page = {"settings": settings.as_json(), "steps": steps, "seconds": self.seconds, "rows": rows}
         write_checkpoint(self.folder, {**own, **page}, tensors)

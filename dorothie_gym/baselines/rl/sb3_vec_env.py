@@ -19,9 +19,9 @@ TRUNCATED, FINAL_OBSERVATION = "TimeLimit.truncated", "terminal_observation"
 def sb3_vec_env(env: VectorEnv[Any, Any, Any]) -> VecEnv:
     """Returns a vector environment as a `VecEnv`, which steps all of its environments in one call.
 
-    An info is empty but at the end of an episode: there it holds the last observation, whether the episode was cut off
-    by the time limit, and what the environment itself tells of the end, such as `is_success`. `env_method` and
-    `get_attr` know what the vector environment has, such as `action_masks` for `MaskablePPO`.
+    An info is empty except at the end of an episode, where it contains the last observation, whether the episode was
+    cut off by the time limit, and the environment's own information on the end, such as `is_success`. `env_method` and
+    `get_attr` access the methods and attributes of the vector environment, such as `action_masks` for `MaskablePPO`.
 
     Args:
         env: vector environment in the autoreset mode `SAME_STEP`, such as
@@ -58,10 +58,10 @@ class NativeVecEnv(VecEnv):
 
     @render_mode.setter
     def render_mode(self, mode: str | None) -> None:
-        """Ignores the mode that the base class takes from the environments: it is theirs."""
+        """Ignores the render mode that the base class sets, which belongs to the environments."""
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Sets the seeds of the next reset; those of seeds that lie next to each other are unrelated.
+        """Sets the seeds of the next reset; neighbouring seeds give unrelated ones.
 
         stable-baselines3 gives environment k the seed `seed + k`, so that two runs share most of their episodes.
         """
@@ -79,7 +79,7 @@ class NativeVecEnv(VecEnv):
         return np.asarray(observations)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Notes the actions."""
+        """Records the actions."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
@@ -141,7 +141,7 @@ class NativeVecEnv(VecEnv):
 
 
 def unrelated_seeds(seed: int | None, count: int) -> list[int | None]:
-    """Returns the seeds of some environments of a run; those of runs whose seeds lie next to each other differ."""
+    """Returns the seeds of some environments of a run; runs with neighbouring seeds get different ones."""
     return [int(number) for number in np.random.SeedSequence(seed).generate_state(count)]
 
 

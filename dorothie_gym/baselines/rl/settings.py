@@ -193,7 +193,7 @@ def _check_parameters(parameters: Arguments) -> None:
 def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSettings:
     """Returns the tuned settings of an algorithm and an environment, with changes.
 
-    With another number of environments, rollouts of PPO get as many steps of each as keep their size.
+    With a different number of environments, the steps per environment are adjusted to keep the size of PPO's rollouts.
 
     Args:
         algorithm: one of `ALGORITHMS`.

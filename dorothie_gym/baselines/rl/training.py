@@ -40,17 +40,17 @@ CHECKPOINT_SHARE: Final = 0.005
 """Largest share of the time that the writing of checkpoints takes."""
 
 SMALL_NETWORK: Final = 256
-"""Greatest width of layers up to which torch uses one thread: more would wait for each other longer than they work."""
+"""Largest layer width for which torch uses one thread: more threads would wait for each other longer than they work."""
 
 LOGGED_EPISODES: Final = 4
 """Number of episodes between TensorBoard records of off-policy algorithms."""
 
 
 def best_of(rows: Sequence[TrainingEvaluation], settings: TrainingSettings) -> TrainingEvaluation | None:
-    """Returns the evaluation with the highest success rate; of equal ones that with the highest reward.
+    """Returns the evaluation with the highest success rate; of equal ones, the one with the highest reward.
 
-    An Ad-Wizard has no success of its own: that of a session is its opponents', and its best evaluation is the one with
-    the highest reward.
+    For an Ad-Wizard, the success of a session belongs to its opponents, so its best evaluation is the one with the
+    highest reward.
     """
     adversarial = ROLE_ENVIRONMENTS.get(settings.env) is Role.AD_WIZARD
     return max(rows, key=lambda row: (0.0 if adversarial else row.outcome.success, row.outcome.reward), default=None)
@@ -188,9 +188,10 @@ class Training(Run):
 
 
 class EntropySchedule(BaseCallback):
-    """Lets the weight of the entropy fall linearly over the steps of a training.
+    """Decreases the weight of the entropy linearly over the steps of a training.
 
-    A policy that need not explore any more becomes decided, so that its most likely actions do as well as sampled ones.
+    A policy that no longer needs to explore becomes deterministic, so that its most likely actions do as well as
+    sampled ones.
     """
 
     def __init__(self, first: float, last: float) -> None:

@@ -26,7 +26,7 @@ MakeEnv: TypeAlias = Callable[[], AnyEnv]
 
 @runtime_checkable
 class MakeBatch(Protocol):
-    """Factory of environments that has a batch form, too."""
+    """Factory of environments that also have a batch form."""
 
     def batch(self, count: int) -> VecEnv:
         """Returns several environments as one."""
@@ -114,7 +114,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return [by_number[k] for k in numbers]
 
     def _answers(self, workers: Iterable[int]) -> list[Answer]:
-        """Returns the answers of workers; waits for all of them before it raises the error of one."""
+        """Returns the answers of workers; waits for all of them before raising an error of any."""
         received = [self._receive(worker) for worker in workers]
         for succeeded, answer in received:
             if not succeeded:

@@ -1,4 +1,4 @@
-"""TOTO and what it is made of."""
+"""TOTO and its parts."""
 
 import lazy_loader
 

@@ -46,7 +46,7 @@ ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
         "Map Knowledge": (Channel.MAP, Channel.TRAJECTORY),
     }
 )
-"""Inputs that ablations of TOTO remove, by what their rows are called; the object history includes the present."""
+"""Inputs that ablations of TOTO remove, named after their rows; the object history includes the present."""
 
 TextTraining = Literal["frozen", "trained"]
 
@@ -59,8 +59,8 @@ class LossWeights:
 
     Attributes:
         move, slot_types, slot_values: of UfN and of RfN; cross entropy, and binary cross entropies.
-        action: of NfD; cross entropy.
-        angle: of NfD; error of the angle [1/degree].
+        action: NfD action; cross entropy.
+        angle: NfD angle; error of the angle [1/degree].
         belief: error of the belief [1/unit].
     """
 
@@ -116,7 +116,7 @@ class TOTOConfig(HistorySizes):
         text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not MiniLM.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
         lane_width: numbers of a lane's vector, a multiple of `map_heads`.
-        map_heads: of the graph attention.
+        map_heads: heads of the graph attention.
         id_width: numbers of the vector looked up for a road, and for a junction.
         roads, junctions: sizes of those tables; ids beyond them share rows.
         image_width: numbers of a picture's vector at each token of the window; 0 where there is no camera.
@@ -239,7 +239,7 @@ class TOTOConfig(HistorySizes):
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Self:
-        """Reads what `to_json` returned.
+        """Reads the output of `to_json`.
 
         Raises:
             InputFileError: a field is unknown, missing, of another type or out of its range.

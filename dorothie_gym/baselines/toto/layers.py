@@ -61,7 +61,7 @@ class Block(nn.Module):
 
     Args:
         width: numbers of a token.
-        heads: of the attention.
+        heads: number of attention heads.
         feed_forward: numbers between its two matrices.
         dropout: share of values dropped.
         attention_dropout: share of the attention's weights dropped.
@@ -117,7 +117,7 @@ class GraphAttention(nn.Module):
     Args:
         inputs: numbers of a node.
         outputs: numbers of a node after, a multiple of `heads`.
-        heads: of the attention.
+        heads: number of attention heads.
         edge_types: number of kinds of edges, without that of a node to itself.
     """
 

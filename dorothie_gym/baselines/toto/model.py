@@ -34,7 +34,7 @@ OBJECT_KINDS: Final = 32
 """Rows of the table of kinds of objects; there are fewer."""
 
 BELIEFS: Final = 5
-"""Way to the next frame dx, dy, its heading, way to the goal dx, dy."""
+"""Displacement to the next frame dx, dy, its heading, displacement to the goal dx, dy."""
 
 YAW: Final = FEATURES.index("start_yaw")
 """Column of a lane's heading at its start."""
@@ -51,7 +51,7 @@ class TOTO(Model):
     Args:
         config: sizes and inputs.
         towns: lane graphs.
-        texts: how texts are read.
+        texts: encoder of texts.
     """
 
     def __init__(self, config: TOTOConfig, towns: Towns, texts: Texts):
@@ -320,8 +320,8 @@ class TOTO(Model):
 def gather_tokens(channels: list[Tokens]) -> tuple[Tensor, Tensor, Tensor]:
     """Returns the tokens of all channels (B, T, d), their times (B, T) and their mask (B, T).
 
-    Tokens that are there come first, and T is the most that any point has: what is missing costs nothing, and nothing
-    depends on how much room for it there was. Attention does not know places, so that their order does not matter.
+    Valid tokens come first, and T is the largest number of any point: missing tokens cost nothing, and results do not
+        depend on the padding. Attention does not know places, so that their order does not matter.
     """
     tokens = torch.cat([part for part, _, _ in channels], dim=1)
     mask = torch.cat([part for _, part, _ in channels], dim=1)

@@ -18,7 +18,7 @@ _SMALLEST_SPREAD: Final = 1e-6
 class Texts(nn.Module, ABC):
     """Turns indices of texts into vectors.
 
-    The texts themselves are no part of a model's weights: a model may be used on another corpus.
+    The texts themselves are not part of a model's weights: a model may be used on another corpus.
 
     Attributes:
         width: numbers of a vector.
@@ -70,7 +70,7 @@ class TrainedTexts(Texts):
     Args:
         tokens: (n, length) int64 pieces of each text of the corpus, padding at the end.
         reader: module from pieces (u, length) to vectors (u, width).
-        width: of the reader's vectors.
+        width: width of the reader's vectors.
     """
 
     tokens: Tensor

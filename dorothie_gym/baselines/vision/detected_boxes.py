@@ -1,7 +1,7 @@
 """Objects that a trained detector finds in the pictures of a recorded session, as rows of `ACTOR_DTYPE`.
 
-Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers begin anew in
-each picture, and no speed is known, because nothing is followed from picture to picture.
+Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers start again in
+    each picture, and no speed is known, because objects are not tracked from picture to picture.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from dorothie_gym.support.angles import wrap_radians
 from dorothie_gym.support.files import replacing
 
 CYCLIST_WIDTH: Final = 1.0
-"""Width below which a vehicle counts as a cyclist: the detector does not tell them apart [m]."""
+"""Width below which a vehicle counts as a cyclist: the detector does not distinguish them [m]."""
 
 OBJECTS_FOLDER: Final = "objects"
-"""Folder beside the weights of a detector, with what it found in sessions."""
+"""Folder next to the weights of a detector, with its detections in sessions."""
 
 _SPACING: Final = 4  # records
 _AT_ONCE: Final = 8  # pictures
@@ -60,11 +60,11 @@ _ACTORS: Final = {
 class DetectedBoxes:
     """Objects that a trained detector finds, which reads the classes and depths that its SegFormer predicts.
 
-    Detections count from the score on that had the best F1 in the validation pictures. What is found in a session is
-    kept in a folder beside the weights.
+    Detections count from the score on that had the best F1 in the validation pictures. The detections in a session are
+    stored in a folder next to the weights.
 
     Attributes:
-        detector: folder of its training, `OUT/detr/<size>/seed-<n>`; the SegFormer's is beside it in `OUT`.
+        detector: folder of its training, `OUT/detr/<size>/seed-<n>`; the SegFormer's is next to it in `OUT`.
 
     Raises:
         CheckpointError: a training is missing, or the detector reads true classes and depths or those of another
@@ -114,7 +114,7 @@ class DetectedBoxes:
 
     @functools.cached_property
     def digest(self) -> str:
-        """Digest of the weights and of the sources that draw pictures.
+        """Digest of the weights and of the source code that draws pictures.
 
         Raises:
             SessionError: the sources cannot be read.
@@ -133,14 +133,14 @@ class DetectedBoxes:
         return config.queries, config.size
 
     def actors(self, session: Session, town: Town) -> SceneTable:
-        """Returns what is found in pictures at the session's records of actors, as far as they are looked at.
+        """Returns the detections in pictures at those of the session's records of actors that are examined.
 
         That is the last record before each event, which models read at their points, and every fourth of the others,
         for the window before a point. Records outside the frames of the car get no objects.
 
         Raises:
             SessionError: the session has no frames of the car, or no surroundings.
-            OSError: the folder beside the weights cannot be written.
+            OSError: the folder next to the weights cannot be written.
         """
         frames = session.scene.actors.frames
         looks = looked_at(frames, _event_frames(session))
@@ -160,7 +160,7 @@ class DetectedBoxes:
         return frames[before_events(frames, _event_frames(session))], self._recall(session, town)[1]
 
     def _recall(self, session: Session, town: Town) -> tuple[Rows, NDArray[np.float16]]:
-        """Returns what was found in a session, of `_KEPT_DTYPE`, and its queries; found now where none are kept."""
+        """Returns the detections in a session, of `_KEPT_DTYPE`, and its queries; computes them if necessary."""
         name = hashlib.sha256(f"{self.digest} {session.digest} {town.name}".encode()).hexdigest()
         paths = [self.detector / OBJECTS_FOLDER / f"{name}-{part}.npy" for part in ("objects", "queries")]
         rows, queries = (_read(path) for path in paths)
@@ -177,7 +177,7 @@ class DetectedBoxes:
     def _look(
         self, session: Session, town: Town, queried: NDArray[np.int64]
     ) -> tuple[NDArray[np.void], NDArray[np.float16]]:
-        """Returns what is found in a session, and the queries at some of its records, rising."""
+        """Returns the detections in a session, and the queries at some of its records, in rising order."""
         config = self._models[1].config
         camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
         pictures = RecordedPictures(session, town, camera)
@@ -201,7 +201,7 @@ class DetectedBoxes:
     def _found_at(
         self, records: Sequence[int], pictures: RecordedPictures, frames: NDArray[np.int64]
     ) -> tuple[list[Rows], NDArray[np.float16]]:
-        """Returns what is found in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
+        """Returns the detections in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
         reader, detector = self._models
         drawn, views = [], []
         for record in records:
@@ -269,7 +269,7 @@ def actors_at(scores: NDArray[np.floating], spaces: NDArray[np.float64], view: V
         scores: (n, k) sureness of the kinds of each.
         spaces: (n, 7) boxes in space, `SPACE_COLUMNS`.
         view: projection of the picture.
-        heading: of the camera [rad].
+        heading: heading of the camera [rad].
     """
     aside, down, ahead, length, width, _, turned = spaces.T
     places = view.origin + np.stack((aside, -down, ahead), axis=1) @ view.axes

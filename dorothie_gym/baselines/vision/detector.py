@@ -35,14 +35,14 @@ class DetectorConfig:
     """Sizes and learning of a Deformable DETR.
 
     Attributes:
-        width: of the pictures [pixels].
-        height: of the pictures [pixels].
-        queries: of objects, the most that are found in a picture.
-        encoder_layers: of the transformer.
-        decoder_layers: of the transformer.
+        width: width of the pictures [pixels].
+        height: height of the pictures [pixels].
+        queries: number of object queries, and thus the most objects found in a picture.
+        encoder_layers: number of encoder layers of the transformer.
+        decoder_layers: number of decoder layers of the transformer.
         size: numbers of a query.
         feed_forward: width of the feed-forward layers.
-        heads: of the attention.
+        heads: number of attention heads.
         levels: resolutions of the backbone that are looked at, from 1/8 on.
         encoded: channels into which the five are encoded.
         backbone_sizes: channels of the four stages of the backbone.
@@ -52,7 +52,7 @@ class DetectorConfig:
             faster; not as published.
         learning_rate: highest of AdamW.
         backbone_rate: factor of the learning rate in the backbone.
-        weight_decay: of AdamW.
+        weight_decay: weight decay of AdamW.
         warm_up: share of the steps in which the learning rate rises.
         batch_size: pictures of a step.
         epochs: passes over the training pictures.
@@ -143,7 +143,7 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """What is found in B pictures.
+    """Detections in B pictures.
 
     Attributes:
         boxes: (B, q, 4) middle x and y, width and height, in widths and heights of the picture.
@@ -219,7 +219,7 @@ class Detector(nn.Module):
             last.bias.copy_(torch.tensor(_FIRST_SOLID))
 
     def forward(self, rgb: Tensor, depth: Tensor, semantic: Tensor) -> Detections:
-        """Returns what is found in pictures (B, 3, h, w) in [-1, 1], depths [m] and classes (B, h, w)."""
+        """Returns the detections in pictures (B, 3, h, w) in [-1, 1], depths [m] and classes (B, h, w)."""
         found = self.detr(pixel_values=self.encoded(rgb, depth, semantic))
         solids = solids_from(found.pred_boxes, self.solid_head(found.last_hidden_state))
         return Detections(found.pred_boxes, found.logits.sigmoid(), solids, found.last_hidden_state)

@@ -1,4 +1,4 @@
-"""Trainings of the vision models on a corpus, and the table of their figures beside the paper's."""
+"""Trainings of the vision models on a corpus, and the table of their figures next to the paper's."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class VisionExperiment:
         corpus: folder of the corpus.
         model: "segformer" or "detr".
         size: "small" or "paper".
-        seed: of weights, order and changes of the pictures.
+        seed: seed of weights, order and changes of the pictures.
         out: parent of the folders of all trainings.
         inputs: classes and depths that the detector reads: "predicted" by the SegFormer of this size and seed in
             `out`, or "true".

@@ -71,7 +71,7 @@ CAMERA_FAULTS: Final = tuple(sensor for sensor in Sensor if CLARITY[sensor] < 1.
 """Faults that show in pictures."""
 
 MOST_BYTES: Final = 8 * 1024 * MIB
-"""Limit of the pictures in the user's cache [bytes]; those of the running command stay beyond it, too."""
+"""Limit of the pictures in the user's cache [bytes]; those of the running command are kept even beyond it."""
 
 _NEAR: Final = 45.0  # [m] farther road users have few pixels
 _TRIED: Final = 2  # pictures that are looked at for one that is chosen
@@ -90,8 +90,8 @@ class FrameSampling:
     """Choice of pictures of a session, and their size. Pictures of a faulty camera are left out.
 
     Attributes:
-        width: of a picture [pixels].
-        height: of a picture [pixels].
+        width: width of a picture [pixels].
+        height: height of a picture [pixels].
         spacing: distance that the car drives between two pictures [m].
         wait: time after which a car that does not drive gives a further picture [s].
         most: largest number of pictures of a session, evenly thinned out.
@@ -199,7 +199,7 @@ class SessionFrames:
     Attributes:
         name: name of the session.
         town: name of its town.
-        key: hash of what determines the pictures.
+        key: hash of everything that determines the pictures.
         rgb: (n, h, w, 3) uint8.
         semantic: (n, h, w) uint8 `ObjectClass`.
         depth: (n, h, w) float16 distance along the axis of the camera [m], infinite for the sky.
@@ -283,7 +283,7 @@ class FrameSet:
 
     @property
     def key(self) -> str:
-        """Hash of what determines the pictures."""
+        """Hash of everything that determines the pictures."""
         return hashlib.sha256(" ".join(session.key for session in self.sessions).encode()).hexdigest()
 
 
@@ -389,10 +389,10 @@ def _boxes(number: int, drawn: CameraFrame, solid: SolidBoxes, heading: float) -
     """Returns the boxes of road users and props in a picture; the class is the commonest of their pixels.
 
     Args:
-        number: of the picture.
+        number: number of the picture.
         drawn: the picture.
         solid: boxes in space of the bodies near the camera.
-        heading: of the camera [rad].
+        heading: heading of the camera [rad].
     """
     assert drawn.boxes is not None and drawn.instance is not None and drawn.semantic is not None
     places = {key: place for place, key in enumerate(solid.keys.tolist())}
@@ -424,7 +424,7 @@ def _mapped(path: Path, name: str, town: str) -> SessionFrames:
 
 @functools.cache
 def _builder_digest() -> str:
-    """Returns a digest of everything besides the session that determines its pictures."""
+    """Returns a digest of everything except the session that determines its pictures."""
     scenes = builder_digest()
     if scenes is None:
         raise SessionError("the sources of the camera cannot be read; no pictures can be kept for the training")

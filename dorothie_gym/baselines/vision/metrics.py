@@ -1,12 +1,14 @@
 """Metrics of the vision models: intersection over union, errors of depth, and COCO's average precision.
 
 Classes present are those with at least one true pixel in the pictures that are tested; the means over classes are over
-these. Objects are tested class by class as in COCO: a detection is right if its box overlaps one of the picture's true
-boxes of its class, not found by a surer detection, by at least a share of their union. Precision is read at 101 values
-of recall. True boxes with few visible pixels are ignored: they need not be found, and detections of them do not count.
+these. Objects are tested class by class as in COCO: a detection is correct if its box overlaps one of the picture's
+true boxes of its class by at least a share of their union, and no detection with a higher score has matched this box.
+Precision is read at 101 values of recall. True boxes with few visible pixels are ignored: they need not be found, and
+detections of them do not count.
 
-Boxes in space are tested like nuScenes (Caesar et al., CVPR 2020): average precision where a detection is right if its
-middle is at most 2 m from a true one, height aside, and mean errors of the detections that are right by overlap.
+Boxes in space are tested like nuScenes (Caesar et al., CVPR 2020): average precision where a detection is correct if
+its centre is at most 2 m from a true one, ignoring height, and mean errors of the detections that are correct by
+overlap.
 """
 
 from __future__ import annotations
@@ -111,7 +113,7 @@ class PictureBoxes:
     detected_spaces: Array
 
     def of_kind(self, kind: int) -> PictureBoxes:
-        """Returns the boxes of one kind, those detected the surest first."""
+        """Returns the boxes of one kind, those with the highest score first."""
         true, found = self.kinds == kind, np.flatnonzero(self.detected_kinds == kind)
         found = found[np.argsort(-self.scores[found], kind="stable")]
         return PictureBoxes(
@@ -165,9 +167,9 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
     Returns:
         place_error: distance of the middles, height aside [m].
         range_error: |detected - true| / true depth.
-        size_error: 1 less intersection over union of the boxes, were they at one place with one heading.
+        size_error: 1 minus the intersection over union of the boxes with aligned centre and heading.
         heading_error: [degrees].
-        axis_error: the same if front and back are taken for one [degrees].
+        axis_error: the same if front and back are not distinguished [degrees].
         NaN where no box is right.
     """
     rows: dict[str, list[Array]] = {name: [] for name in ("place", "range", "size", "heading", "axis")}
@@ -274,7 +276,7 @@ def box_overlaps(first: Array, second: Array) -> Array:
 
 
 def distinct(boxes: Array, scores: Array, overlap: float) -> NDArray[np.int64]:
-    """Returns the rows of boxes (n, 4) that overlap no surer one by more than a share of their union, the surest first.
+    """Returns the rows of boxes (n, 4) that overlap no box with a higher score by more than a share, best first.
 
     This is greedy suppression (Dalal and Triggs, CVPR 2005): a detector may find an object by several queries.
     """

@@ -26,10 +26,10 @@ from dorothie_gym.baselines.vision.solids import Focals, enlarged, mirrored, sol
 from dorothie_gym.baselines.vision.training import Learner
 
 LEAST_PIXELS: Final = 64
-"""Visible pixels from which on an object has to be found in tests; others are ignored."""
+"""Visible pixels from which an object counts in tests; others are ignored."""
 
 OVERLAP: Final = 0.5
-"""Overlap from which on boxes in a picture are taken for one object."""
+"""Overlap above which boxes in a picture count as one object."""
 
 TURNED: Final = (0, 1)
 """Rows of `KINDS` whose headings mean something: props look alike from several sides."""
@@ -148,7 +148,7 @@ def _part(rgb: Tensor, depth: Tensor, semantic: Tensor, window: tuple[float, flo
 
 
 def _in_part(true: Targets, window: tuple[float, float, float]) -> Targets:
-    """Returns the objects of a picture in an enlarged part of it, without those that lie mostly outside."""
+    """Returns the objects of a picture in an enlarged crop of it, without objects mostly outside the crop."""
     left, top, size = window
     boxes, corner = true.boxes, torch.tensor((left, top))
     low = (boxes[:, :2] - boxes[:, 2:] / 2 - corner) / size
@@ -189,7 +189,7 @@ def detected_boxes(model: Detector, pictures: FrameSet, *, most: int | None = No
 
 
 def distinct_queries(centred: NDArray[np.floating], scores: NDArray[np.floating]) -> NDArray[np.int64]:
-    """Returns the queries (n,) that overlap no surer one by more than `OVERLAP`, the surest first.
+    """Returns the queries (n,) that overlap no query with a higher score by more than `OVERLAP`, best first.
 
     Args:
         centred: (q, 4) boxes: middle x and y, width and height.

@@ -1,4 +1,4 @@
-"""Classes and depths that a SegFormer predicts for pictures, computed once and kept beside its weights."""
+"""Classes and depths that a SegFormer predicts for pictures, computed once and stored next to its weights."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def with_predictions(
     Args:
         pictures: the pictures.
         model: trained model.
-        folder: for the predictions of this model only; what it holds already is read.
+        folder: for the predictions of this model only; stored predictions are read.
         on_session: called after each session.
 
     Raises:

@@ -18,7 +18,7 @@ from dorothie_gym.baselines.vision.frames import CLASSES
 from dorothie_gym.baselines.vision.libraries import transformers
 
 NEAREST, FARTHEST = 1.0, 200.0
-"""Range of the bins of depth [m]; what is farther falls into the last bin."""
+"""Range of the bins of depth [m]; larger depths fall into the last bin."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +26,8 @@ class SegFormerConfig:
     """Sizes and learning of a SegFormer.
 
     Attributes:
-        width: of the pictures [pixels].
-        height: of the pictures [pixels].
+        width: width of the pictures [pixels].
+        height: height of the pictures [pixels].
         depths: blocks of each stage.
         hidden_sizes: channels of each stage.
         heads: attention heads of each stage.
@@ -35,10 +35,10 @@ class SegFormerConfig:
         decoder: channels of the decoder.
         detail: places on each side of a cell of 4 x 4 pixels for which classes are predicted; 1 as published.
         depth_detail: the same for depth.
-        bins: of depth, evenly spaced in its logarithm.
-        dropout: of the decoder.
+        bins: number of depth bins, evenly spaced in the logarithm.
+        dropout: dropout of the decoder.
         learning_rate: highest of AdamW; it rises over the first steps and then falls to 0, evenly.
-        weight_decay: of AdamW.
+        weight_decay: weight decay of AdamW.
         warm_up: share of the steps in which the learning rate rises.
         batch_size: pictures of a step.
         epochs: passes over the training pictures.

@@ -1,9 +1,9 @@
 """Boxes in space from pictures, in the usual numbers of monocular detection.
 
-What a picture shows of a box is where its middle is seen, how far it is, its size, and how it is turned towards the
-viewer (Mousavian et al., CVPR 2017; Simonelli et al., ICCV 2019). Solids have these as columns: the projected middle x
-and y, in widths and heights of the picture, logarithms of depth, length, width and height [m], and sine and cosine of
-the heading relative to the ray through the middle. They change simply with the picture: mirroring turns the sign of the
+A picture shows the position of a box's centre, its distance, its size, and its rotation relative to the viewer
+(Mousavian et al., CVPR 2017; Simonelli et al., ICCV 2019). Solids have these as columns: the projected middle x and y,
+in widths and heights of the picture, logarithms of depth, length, width and height [m], and sine and cosine of the
+heading relative to the ray through the middle. They change simply with the picture: mirroring turns the sign of the
 sine, and an enlarged part looks like the same scene nearer by, its depths multiplied by the part's share of the
 picture.
 """
@@ -74,7 +74,7 @@ def spaces_of(solids: NDArray[np.floating], focals: Focals) -> NDArray[np.float6
 
 
 def solids_from(boxes: Tensor, raw: Tensor) -> Tensor:
-    """Returns the solids (..., 8) that a head predicts beside boxes in the picture.
+    """Returns the solids (..., 8) that a head predicts in addition to boxes in the picture.
 
     Args:
         boxes: (..., 4) middle, width and height, in shares of the picture.

@@ -72,9 +72,9 @@ class VisionEpoch:
     """Pass over the training pictures.
 
     Attributes:
-        number: from 1.
+        number: number, from 1.
         loss: mean of its steps.
-        figures: of the validation pictures after it.
+        figures: figures of the validation pictures after it.
         best: number of the epoch with the best score so far.
         seconds: processor time so far, over all calls [s].
     """

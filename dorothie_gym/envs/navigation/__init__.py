@@ -1,1 +1,1 @@
-"""Driving by navigation actions: what the two ids `Navigation-v0` and `Navigation-continuous-v0` share, in batches."""
+"""Driving by navigation actions: shared code of `Navigation-v0` and `Navigation-continuous-v0`, in batches."""

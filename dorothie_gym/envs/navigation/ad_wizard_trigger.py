@@ -84,7 +84,7 @@ class PlansRecord:
 def look_for_moment(
     lanes: RecordArray[RoutingLane], marks: RecordArray[MarkRecord], world: WorldArrays, plans: PlansRecord
 ) -> None:
-    """Notes whether the Ad-Wizard is to be asked at the next decision.
+    """Records whether to query the Ad-Wizard at the next decision.
 
     Args:
         lanes: lanes of the town.
@@ -103,7 +103,7 @@ def look_for_moment(
 def finds_moment(
     lanes: RecordArray[RoutingLane], marks: RecordArray[MarkRecord], world: WorldArrays, plans: PlansRecord, now: float
 ) -> bool:
-    """Returns whether a planned trick can be played, which draws what the policy will draw."""
+    """Returns whether a planned trick can be played, with the random numbers that the policy will draw."""
     begun = False
     for k in range(MOST_TRICKS):
         begin, kind = max(plans.times[k], plans.last + _SPACING), plans.kinds[k]

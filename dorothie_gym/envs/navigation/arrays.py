@@ -27,7 +27,7 @@ class Stage(enum.IntEnum):
     MOVING = 2
     """Sensor faults may have ended: Python is to look, before the rest of the physics is stepped."""
     NO_SPACE = 3
-    """The arrays have no room for the path; with longer ones, see `world_arrays.lengthened`, `act` goes on."""
+    """The arrays have no room for the path; with longer ones, see `world_arrays.lengthened`, `act` continues."""
     GUIDING = 4
     """The instructor is to speak."""
     NO_COSTS = 5
@@ -48,11 +48,11 @@ class Event(enum.IntFlag):
     LOST = 4
     """The stage is `LOST`."""
     TOLD = 8
-    """An instruction changes what the Co-Wizard believes."""
+    """An instruction changes the Co-Wizard's beliefs."""
 
 
 EVENTS: Final = 2
-"""Column of `threads.turns_of` in which a thread notes the events of its environments."""
+"""Column of `threads.turns_of` in which a thread records the events of its environments."""
 
 
 class DriveRecord:
@@ -104,7 +104,7 @@ class DriveArrays(NamedTuple):
 
 @by_reference
 class DrivingTown(NamedTuple):
-    """What all environments of a town share, besides its arrays.
+    """Objects that all environments of a town share, besides its arrays.
 
     Attributes:
         sectors: int32 sector of each exit of the route tables, or -1.

@@ -1,4 +1,4 @@
-"""Batch of navigation sessions in one town: compiled decisions, with Python for what happens rarely."""
+"""Batch of navigation sessions in one town: compiled decisions, with Python for rare events."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _act_share, _guide_share = direct(act_share), direct(guide_share)
 class DrivingBatch(DrivingRows):
     """Sessions of one town in which only driving is left to the agents.
 
-    Compiled code plays the rows. Python handles what happens rarely: belief updates, exceptions of the Ad-Wizard,
+    Compiled code plays the rows. Python handles rare events: belief updates, exceptions of the Ad-Wizard,
     arrivals, new sessions.
     """
 
@@ -167,7 +167,7 @@ class DrivingBatch(DrivingRows):
                 state["told"][number] = False
 
     def _add_costs(self) -> None:
-        """Adds the costs to goals that roadblocks have changed; those that nobody needs any more are dropped."""
+        """Adds the costs to goals that roadblocks have changed; those that are no longer needed are dropped."""
         state = self._decisions
         used = set(state["costs"].tolist())
         self._cost_rows = {goal: row for goal, row in self._cost_rows.items() if not goal[1] or row in used}
@@ -195,7 +195,7 @@ class DrivingBatch(DrivingRows):
     # --- Rare events --------------------------------------------------------------------------------------------------
 
     def _look(self, number: int) -> None:
-        """Updates what the ego sees after a change of weather or faults."""
+        """Updates the ego's view after a change of weather or faults."""
         world = self.catch_up(number).world
         world.write_weather()
         self._decisions["faulty"][number] = bool(world.faults)
@@ -268,7 +268,7 @@ class DrivingBatch(DrivingRows):
         self._live[number] = len(task.live)
 
     def _note_goal(self, number: int) -> None:
-        """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
+        """Queues the belief updates for a goal: a place on the map, or a place at the stated distance ahead."""
         face, state = self._face(number), self._decisions[number]
         said = plain(self._guidances.said)[number, 0]
         if state["fresh"]:

@@ -106,7 +106,7 @@ class DrivingCameras:
 
 
 def readings_of(batch: DrivingRows, number: int) -> Readings:
-    """Returns what the dashboard of an environment shows; all of it is part of the vectors, too."""
+    """Returns the values that the dashboard of an environment shows; the vectors contain all of them."""
     arrays, driver = batch.row(number), batch.driver(number)
     car, plan, heard = plain(arrays.vehicles)[0], plain(arrays.plan)[0], plain(driver.heard)[0]
     view, control = plain(driver.inputs)[0], plain(arrays.car)[0]

@@ -156,7 +156,7 @@ def find_path(town: TownArrays, world: WorldArrays) -> int:
 
 @compiled
 def observe_path(world: WorldArrays, driver: DriverArrays, max_seconds: float) -> None:
-    """Writes the observation vector of a driver who steers, see `CONTINUOUS_FIELDS`.
+    """Writes the observation vector of a driver with continuous control, see `CONTINUOUS_FIELDS`.
 
     Args:
         world: arrays of the world.

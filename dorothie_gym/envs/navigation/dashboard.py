@@ -1,6 +1,6 @@
 """Dashboard in the lowest rows of the pictures of the navigation environments: instruction, distances and speeds.
 
-It shows what the vectors of the environments hold and what no camera sees. Like the indicators of Gymnasium's CarRacing
+It shows values of the vector observations that a camera cannot see. Like the indicators of Gymnasium's CarRacing
 it is a part of the picture, drawn at `HEIGHT` x `WIDTH` pixels and enlarged to the size of the picture.
 """
 
@@ -48,17 +48,17 @@ _ROWS = (slice(1, 4), slice(5, 8), slice(9, 12))  # of the gauges
 
 @dataclass(frozen=True, kw_only=True)
 class Readings:
-    """What the dashboard shows.
+    """Values that the dashboard shows.
 
     Attributes:
-        action: of the last instruction; None before the first, and where a goal was named instead.
+        action: action of the last instruction; None before the first, and where a goal was named instead.
         sector: its direction, an index of `SECTORS`; None without one.
         distance: from the car to its place, negative behind it [m].
         planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None for none.
         planned_sector: its direction.
         goal: place of the named goal ahead of the car and to its right [m]; None if it is not known.
-        speed: of the car [m/s].
-        wanted: speed that is asked for: the cruise speed, or what the path allows [m/s].
+        speed: speed of the car [m/s].
+        wanted: target speed: the cruise speed, or the speed that the path allows [m/s].
         limit: speed limit [m/s]; None where it is not known.
         hazard: whether the car brakes for a hazard.
         lights: whether the head lights are on.

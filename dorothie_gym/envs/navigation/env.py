@@ -60,7 +60,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
     # --- States -------------------------------------------------------------------------------------------------------
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environment, and what was noted for its pictures."""
+        """Returns the changing values of the environment, and the notes for its pictures."""
         return {**super().mutable_values(), "batch": self.batch.mutable_values(), "view": self._view.notes}
 
     def apply_values(self, values: dict[str, object]) -> None:
@@ -125,7 +125,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         )
 
     def _info(self) -> StepInfo:
-        """Returns the info of the last decision, as a new dictionary; what belongs to the end is "" or 0 before."""
+        """Returns the info of the last decision, as a new dictionary; entries about the end are "" or 0 until then."""
         batch = self.batch
         outcome = batch.outcomes[0]
         reasons = batch.refusals(0)
@@ -143,7 +143,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
     # --- Pictures -----------------------------------------------------------------------------------------------------
 
     def _show(self) -> None:
-        """Notes the present decision for `render()`, and draws it in human mode."""
+        """Records the current decision for `render()`, and draws it in human mode."""
         if self.render_mode is None:
             return
         self._view.note(self.batch, 0)
@@ -151,7 +151,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
             self.render()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws what the Co-Wizard observes, or the session (see `view`), as `DuoWizardEnv.render`.
+        """Draws the Co-Wizard's observation, or the session (see `view`), as `DuoWizardEnv.render`.
 
         The instructions of the participant are part of the picture.
         """

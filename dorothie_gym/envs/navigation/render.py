@@ -25,7 +25,7 @@ class DrivingView:
 
     @property
     def notes(self) -> tuple[object, float]:
-        """What was noted of the session, for a state of the environment."""
+        """Notes on the session, for a state of the environment."""
         return self.view.notes, self._shown
 
     def apply_values(self, notes: object, live: LiveSession) -> None:
@@ -36,7 +36,7 @@ class DrivingView:
         self.view.apply_values(drawn, live)
 
     def note(self, batch: DrivingBatch, place: int) -> None:
-        """Notes the present decision of an environment."""
+        """Records the current decision of an environment."""
         live, said = batch.catch_up(place), batch.heard(place).instruction
         if live is self._live:
             live.begin_decision()

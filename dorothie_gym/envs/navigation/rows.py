@@ -49,7 +49,7 @@ ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
 
 
 MUTABLE_ATTRIBUTES: Final = ("faces", "_stacks", "_live", "_noted", "_faulty")
-"""Attributes of a batch that hold what changes."""
+"""Attributes of a batch that hold changing values."""
 
 
 INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
@@ -57,12 +57,12 @@ INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
 
 
 REFUSED: Final = ("mental", "physical")
-"""Kinds of actions that may be refused: belief updates, which are made automatically, and what drives."""
+"""Kinds of actions that may be refused: belief updates, which are made automatically, and driving actions."""
 
 
 @dataclass
 class DrivingFace:
-    """What a session of a batch has besides its row.
+    """Objects of a session of a batch besides its row.
 
     Attributes:
         scenario: storyboard, street names and departure.
@@ -174,7 +174,7 @@ class DrivingRows(CachedViews):
         self._show_rows(self._sessions())
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the sessions."""
+        """Returns the changing values of the sessions."""
         values = self.__getstate__()
         used = {*self._decisions["costs"].tolist(), *self._drives.rows.ravel().tolist()} if self._stacks else set()
         goals = {row: goal for goal, row in self._cost_rows.items() if row in used}

@@ -36,9 +36,9 @@ Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 def blank_world(network: TownNetwork, config: NavigationConfig, *, pedals: bool) -> WorldArrays:
     """Returns the arrays of a world that has not started, on a clear noon.
 
-    There is room for what the scripted Ad-Wizard adds in a session: a crowd and a roadblock, as each kind of trick is
-    played at most once. Nothing depends on the seed of perception or on the wind: `World` writes both when the weather
-    changes.
+    There is room for the objects that the scripted Ad-Wizard adds in a session: a crowd and a roadblock, as each kind
+    of trick is played at most once. Nothing depends on the seed of perception or on the wind: `World` writes both when
+    the weather changes.
     """
     world, weather = OwnArrays(network, config.session_config.world).arrays, Weather()
     if config.exceptions > 0.0:

@@ -1,8 +1,8 @@
 """Decisions of many navigation environments at once (compiled): from the driver's action to observation and reward.
 
 A decision has two halves, because rare events between them are Python's: `act` carries out the action and steps the
-physics; `guide` lets the instructor speak, judges the episode, and observes. Where a half cannot go on alone, it says
-so in `DriveRecord.stage`.
+physics; `guide` lets the instructor speak, judges the episode, and observes. If a half needs Python to continue, it
+sets `DriveRecord.stage`.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ def guide(
         graph: its routing graph.
         search: scratch space for route searches.
         town: its arrays.
-        common: what all environments of the town share.
+        common: data that all environments of the town share.
         world: arrays of the world.
         driver: arrays of the driver.
         guidance: arrays of the instructor.
@@ -199,7 +199,7 @@ def guide(
 
 @compiled
 def note_told_goal(world: WorldArrays, guidance: InstructorArrays, state: DriveRecord) -> None:
-    """Notes whether a goal was told, and its place unless the map shows it: as far ahead on the path as was said."""
+    """Records whether a goal was stated, and its place, at the stated distance ahead, unless the map shows it."""
     said, landmark = guidance.said[0], int(guidance.route[0].landmark)
     state.told, state.told_lane = state.fresh or (state.said and said.landmark >= 0), -1
     if state.said and said.landmark >= 0 and said.action >= 0 and not guidance.marks[landmark].known:
@@ -209,7 +209,7 @@ def note_told_goal(world: WorldArrays, guidance: InstructorArrays, state: DriveR
 
 @compiled
 def note_seen(world: WorldArrays) -> None:
-    """Notes the props that the ego sees, if there are any."""
+    """Records the props that the ego sees, if there are any."""
     for k in range(len(world.props)):
         if world.props[k].present:
             note_props(world, int(world.clock[0].frame))
@@ -312,7 +312,7 @@ def guide_share(
         tables: its lanes and exits for guidance.
         graph: its routing graph.
         searches: scratch space for route searches of each thread.
-        common: what all environments of the town share.
+        common: data that all environments of the town share.
         worlds: arrays of all worlds.
         drivers: arrays of all drivers.
         guidances: arrays of all instructors.

@@ -101,7 +101,7 @@ class DrivingVectorEnv(
         """Begins new episodes.
 
         Args:
-            seed: of the first environment; the others have the numbers that follow. Or one for each.
+            seed: seed of the first environment; the others have the numbers that follow. A sequence has one for each.
             options: `reset_mask`, a bool array (num_envs,): which environments, by default all; `scenario` as in the
                 single environment, for all of them.
 
@@ -121,7 +121,7 @@ class DrivingVectorEnv(
     def step(
         self, actions: NDArray[np.generic]
     ) -> tuple[DriverObservation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
-        """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
+        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: (num_envs, ...) one for each.
@@ -130,7 +130,7 @@ class DrivingVectorEnv(
             Observations (num_envs, ...), rewards, terminations and truncations (num_envs,), infos.
 
         Raises:
-            ValueError: the actions are none of the action space.
+            ValueError: the actions are not in the action space.
             gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
         """
         actions = self._checked(actions)
@@ -176,10 +176,10 @@ class DrivingVectorEnv(
 
     @abstractmethod
     def _checked(self, actions: object) -> NDArray[np.generic]:
-        """Returns actions as an array; raises `ValueError` if they are none of the action space."""
+        """Returns actions as an array; raises `ValueError` if they are not in the action space."""
 
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in the environments of a mask, and notes its outcome."""
+        """Plays a decision in the environments of a mask, and records its outcome."""
         for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])
@@ -188,7 +188,7 @@ class DrivingVectorEnv(
                     self._views[number].note(*self._places[number])
 
     def _start(self, seeds: Mapping[int, int], scenario: Scenario | None) -> None:
-        """Begins sessions of environments by their seeds, and notes observations and outcomes."""
+        """Begins sessions of environments by their seeds, and records observations and outcomes."""
         for batch, members in zip(self.batches, self._members, strict=True):
             own = {place: seeds[number] for place, number in enumerate(members.tolist()) if number in seeds}
             if own:
@@ -254,7 +254,7 @@ class DrivingVectorEnv(
         return {**infos, "final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
 
     def _infos(self, mask: NDArray[np.bool_]) -> Infos:
-        """Returns the infos of the environments of a mask; what belongs to the end of an episode is "" or 0 before."""
+        """Returns the infos of the environments of a mask; entries about the end are "" or 0 until then."""
         terms = {name: self._terms[:, k] for k, name in enumerate(NAVIGATION_TERMS)}
         infractions = {name: self._infractions[:, k] for k, name in enumerate(INFRACTIONS)}
         over = self._terminations | self._truncations

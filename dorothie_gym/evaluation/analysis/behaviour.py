@@ -108,7 +108,7 @@ class BehaviourClaim:
 
     Attributes:
         name: short, for JSON.
-        title: in words.
+        title: title in words.
         figure: a number that is positive if the claim is true.
     """
 
@@ -152,7 +152,7 @@ def verdicts_of(
     None with fewer than two sessions, or if half of the samples, or more, are undefined.
 
     Args:
-        sessions: of a corpus.
+        sessions: sessions of a corpus.
         resamples: number of bootstrap samples, at least 1.
         seed: seed of the samples.
     """

@@ -16,7 +16,7 @@ For an object on the road, the window starts again when the car comes near. A qu
 exchange that handles an object on the road belongs to it if it names no landmark; after an exchange that handles a task
 exception, a question for status or destination does. If several exceptions fit, the latest counts.
 
-Where people have marked what an exchange handles, their mark counts.
+If annotators have marked what an exchange handles, their mark counts.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ def handled_by(units: Units) -> dict[int, Event]:
 def times_mentioned(units: Units) -> dict[int, list[float]]:
     """Returns when each exception is talked about [s], by `id` of its event.
 
-    Where meanings are recorded, these are the starts of the acts that are about it; otherwise those of exchanges.
+    With recorded meanings, these are the starts of the acts about the exception; otherwise the starts of exchanges.
     """
     session, found = units.session, dict[int, list[float]]()
     moves = [move for move in session.moves() if move.meaning]

@@ -1,4 +1,4 @@
-"""Propositions that are about an exception: what an utterance says decides, not its words.
+"""Propositions that are about an exception: the content of an utterance decides, not its words.
 
 - weather: `weather` with a parameter of the same kind (fog; rain and wet roads; sun; clouds; wind); `visibility` where
   that kind limits it; `lights_on`, and switching the head lights, for the altitude of the sun;
@@ -38,7 +38,7 @@ def mentions(propositions: Iterable[Proposition], kind: ExceptionKind, event: Ev
     """Returns whether a proposition is about an exception.
 
     Args:
-        propositions: what is said.
+        propositions: content of the utterances.
         kind: kind of the exception.
         event: the exception.
         near: whether the car is near its place, if it has one.

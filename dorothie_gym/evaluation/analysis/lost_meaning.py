@@ -1,4 +1,4 @@
-"""Misrecognised utterances of which the meaning was lost, and whether the speakers repaired it."""
+"""Misrecognised utterances whose meaning was lost, and whether the speakers repaired it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.spoken_understanding import readable
 
 REPAIRED_WITHIN: Final = 30.0
-"""Time after an utterance within which its meaning is repaired [s]; the car drives some 250 m meanwhile."""
+"""Time after an utterance within which its meaning is repaired [s]; the car drives about 250 m in this time."""
 
 ASKS: Final = frozenset(
     {
@@ -26,14 +26,14 @@ ASKS: Final = frozenset(
         DialogueMove.QUERY_YN,
     }
 )
-"""Moves by which a listener asks about what was said."""
+"""Moves by which a listener asks about an utterance."""
 
 _EMPTY: Final = frozenset({"Unknown", "Queried"})
 
 
 @dataclass(frozen=True, kw_only=True)
 class LostMeaning:
-    """Utterance of which a detail was lost.
+    """Utterance that lost a detail in recognition.
 
     Attributes:
         utterance: the utterance.
@@ -58,10 +58,10 @@ class LostMeaning:
 
 
 def lost_meanings(session: Session) -> Iterator[LostMeaning]:
-    """Yields the utterances of which the recogniser lost a detail, in order.
+    """Yields, in order, the utterances that lost a detail in recognition.
 
-    Both the spoken and the recognised words are read by the parser, and the speaker must have meant what is read; so
-    neither errors of the parser nor missing marks count.
+    Both the spoken and the recognised words are read by the parser, and the speaker must have meant the result; so
+    neither parser errors nor missing marks count.
     """
     said = sorted(session.utterances(), key=lambda each: each.end)
     for place, utterance in enumerate(said):

@@ -1,6 +1,6 @@
 """Agreement of annotators on the borders of units: exchanges, or transactions.
 
-Numbers of units are arbitrary, so what is compared are borders. A *site* is the place between two neighbouring spans of
+Numbers of units are arbitrary, so borders are compared. A *site* is the place between two neighbouring spans of
 a session; where annotators split an utterance differently, each of their borders is a site. A site is a border if the
 spans on its two sides belong to different units, or one of them to none. Kappa of such sites is the usual measure for
 the segmentation of dialogues (Carletta et al., Computational Linguistics 23(1), 1997).
@@ -41,7 +41,7 @@ SegmentedSession: TypeAlias = Sequence[UnitSpan]
 """Spans of all utterances of a session, in order."""
 
 Site: TypeAlias = tuple[bool | None, ...]
-"""Whether a site is a border for each annotator; None if the annotator has not finished what is beside it."""
+"""Whether a site is a border for each annotator; None if the annotator has not finished the adjacent spans."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ def _judged_by_both(sites: Iterable[Site]) -> Iterator[tuple[bool, bool]]:
 def _edits(sites: Sequence[tuple[bool, bool]]) -> tuple[float, int]:
     """Returns the cost of the edits that make the borders of one annotator those of the other, and their number.
 
-    The number counts common borders, too. Neighbouring sites are paired from the left, each once.
+    The number includes common borders. Neighbouring sites are paired from the left, each once.
     """
     cost, number, k = 0.0, 0, 0
     while k < len(sites):

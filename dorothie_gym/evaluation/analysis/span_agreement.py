@@ -146,8 +146,9 @@ class Alpha:
     """Krippendorff's alpha of any number of annotators, for nominal labels (Krippendorff 2011).
 
     Attributes:
-        moves: of the moves of pieces; None if fewer than two different moves, or no piece with two judgements, exist.
-        slots: of the values of each of the five slots in each piece; None likewise.
+        moves: alpha of the moves of pieces; None if fewer than two different moves, or no piece with two judgements,
+            exist.
+        slots: alpha of the values of each of the five slots in each piece; None likewise.
         pieces: number of pieces that at least two annotators have judged.
     """
 
@@ -166,7 +167,7 @@ def alpha_of(annotators: Sequence[Sequence[LabelledUtterance | None]]) -> Alpha:
 
     Args:
         annotators: labelled utterances of each annotator, all in the same order; None for an utterance that was not
-            given to this annotator. Utterances that are not finished are missing, too.
+            given to this annotator. Unfinished utterances are also missing.
 
     Raises:
         SessionError: the package `krippendorff` is not installed.

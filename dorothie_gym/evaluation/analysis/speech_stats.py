@@ -22,7 +22,7 @@ QUANTILES: Final = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Quantiles of the distributions."""
 
 LONGEST_SILENCE: Final = 10.0
-"""Longest silence that is a pause or a gap [s]; after longer ones the talk begins anew."""
+"""Longest silence that is a pause or a gap [s]; after longer ones the conversation starts again."""
 
 SPEAKERS: Final = (Role.PARTICIPANT, Role.CO_WIZARD)
 
@@ -96,7 +96,7 @@ class SpeechStats:
         session_seconds: their duration.
         speech: duration of the utterances by speaker.
         words: words by speaker, in their spoken forms.
-        any_speech: time in which somebody speaks.
+        any_speech: time in which at least one role speaks.
         overlap: time in which both speak.
         utterances: number of utterances.
         overlapping: utterances that begin while the other speaks.
@@ -104,7 +104,7 @@ class SpeechStats:
         pauses: time from the end of an utterance to the next one of the same speaker.
         rates: words per minute of each utterance by speaker.
         errors: word errors.
-        lost: utterances of which the recogniser lost a detail (`lost_meaning`).
+        lost: utterances that lost a detail in recognition (`lost_meaning`).
         repaired: those that were repaired.
     """
 
@@ -241,7 +241,7 @@ def _steps(path: str) -> Iterator[str]:
 
 
 def _durations(said: Sequence[UtteranceRecord]) -> tuple[float, float]:
-    """Returns the time in which somebody speaks, and that in which at least two do [s]."""
+    """Returns the time in which at least one role speaks, and that in which at least two do [s]."""
     edges = sorted([(each.start, 1) for each in said] + [(each.end, -1) for each in said])
     one = both = 0.0
     speaking, last = 0, 0.0

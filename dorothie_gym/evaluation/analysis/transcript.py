@@ -165,7 +165,7 @@ def _action_text(event: Event) -> str:
 
 
 def _together(lines: Iterable[TranscriptLine]) -> Iterator[TranscriptLine]:
-    """Joins neighbouring lines of one role that are no utterances; repetitions are counted."""
+    """Joins neighbouring lines of one role that are not utterances; repetitions are counted."""
     for (said, speaker), group in groupby(lines, key=lambda line: (line.said, line.speaker)):
         same = list(group)
         if said:

@@ -28,7 +28,7 @@ class WordErrors:
 
     Attributes:
         words: number of words that were spoken.
-        substitutions: spoken words of which the recogniser returned another one.
+        substitutions: spoken words that the recogniser replaced by another one.
         deletions: spoken words that it left out.
         insertions: words that it added.
     """
@@ -156,7 +156,7 @@ def loudness_at(session: Session, move: MoveRecord) -> Loudness:
 
 
 def cabin_at(session: Session, frame: int) -> CabinState:
-    """Returns what made noise in the car at a frame; unknown speed and weather make none."""
+    """Returns the noise sources in the car at a frame; unknown speed and weather make no noise."""
     rows = session.trajectory
     place = int(np.searchsorted(rows["frame"], frame, side="right")) - 1
     speed = abs(float(np.nan_to_num(rows["speed"][place]))) if place >= 0 else 0.0

@@ -111,7 +111,7 @@ _MAX_NAME: Final = 200
 
 
 def faults_of_claims(settings: Mapping[str, Any]) -> Iterator[str]:
-    """Yields what is wrong about settings that only the submitter knows: names, hashes, costs, unknown fields.
+    """Yields faults of settings that only the submitter knows: names, hashes, costs, unknown fields.
 
     Args:
         settings: output of `RolloutSettings.to_json`, as read from a file.

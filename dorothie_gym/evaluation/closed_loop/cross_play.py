@@ -1,7 +1,7 @@
-"""Cross-play: each of some Co-Wizards with each of some participants, over the same sessions.
+"""Cross-play: each of several Co-Wizards with each of several participants, over the same sessions.
 
-Self-play measures a pair that may have agreed on ways of its own; cross-play shows how a policy gets on with others
-(Carroll et al., NeurIPS 2019; Strouse et al., NeurIPS 2021).
+Self-play measures a pair that may have developed its own conventions; cross-play shows how a policy cooperates with
+others (Carroll et al., NeurIPS 2019; Strouse et al., NeurIPS 2021).
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def cross_play(
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
 ) -> CrossPlayResult:
-    """Plays all pairs; a started cross-play goes on. See `roll_out_all`.
+    """Plays all pairs; an interrupted cross-play is resumed. See `roll_out_all`.
 
     Args:
         settings: settings.

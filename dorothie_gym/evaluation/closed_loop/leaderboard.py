@@ -83,7 +83,7 @@ class LeaderboardEntry:
 
     @property
     def claims(self) -> tuple[Claim, ...]:
-        """What the files of the rollout state and nothing has checked."""
+        """Statements in the rollout's files that nothing has checked."""
         if self.check is not None:
             return self.check.claims
         usage, run_time = bool(self.result.usage()), bool(self.cost)
@@ -169,7 +169,7 @@ def checked_entries(
 ) -> tuple[LeaderboardEntry, ...]:
     """Returns rollouts with the outcome of the check of all their sessions, in the same order.
 
-    Rollouts of another protocol, such as those in imported towns, are returned as they are: their figures stay claims.
+    Rollouts of another protocol, such as those in imported towns, are returned unchanged: their figures remain claims.
 
     Args:
         entries: the rollouts.
@@ -201,7 +201,7 @@ def checked_entries(
 
 
 def labels_of(entries: Sequence[LeaderboardEntry]) -> dict[str, str]:
-    """Returns the short name of each policy; those that would have the same keep their paths."""
+    """Returns the short name of each policy; policies with equal short names keep their paths."""
     short = {entry.policy: entry.label for entry in entries}
     names = list(short.values())
     return {policy: label if names.count(label) == 1 else policy for policy, label in short.items()}
@@ -228,7 +228,7 @@ def leaderboard_page(
 
     Args:
         entries: the rollouts, in order.
-        picture: name of the picture beside the page, or None.
+        picture: name of the picture next to the page, or None.
         definitions: page with the definitions of the metrics, as seen from this page, or None.
     """
     where = (
@@ -326,7 +326,7 @@ def _by_exception(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]
 
 
 def figures_sha256(entries: Sequence[LeaderboardEntry]) -> str:
-    """Returns the hash of what the rows of a leaderboard say: policies, weights, sessions and measures, not times."""
+    """Returns the hash of the content of a leaderboard's rows: policies, weights, sessions, measures; no times."""
     pages = []
     for entry in entries:
         settings = entry.result.settings
@@ -392,7 +392,7 @@ def _table(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _name(label: str) -> str:
-    """Returns a name as text of a Markdown page: names of others must not become links, pictures or tags."""
+    """Returns a name as text of a Markdown page: untrusted names must not become links, pictures or tags."""
     return re.sub(r"([\\`*\[\]])", r"\\\1", printable(label)).replace("<", "&lt;")
 
 

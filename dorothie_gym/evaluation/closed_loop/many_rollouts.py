@@ -21,7 +21,7 @@ def roll_out_all(
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
 ) -> dict[str, RolloutResult]:
-    """Plays rollouts, each in a folder of its own; finished ones are read, and started ones go on.
+    """Plays rollouts, each in its own folder; finished ones are read, and interrupted ones resumed.
 
     Args:
         plans: settings of each rollout by the name of its folder.

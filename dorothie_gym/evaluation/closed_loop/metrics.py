@@ -59,7 +59,7 @@ class ClosedLoopMetric(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Success(ClosedLoopMetric):
-    """Whether all live subgoals were reached in an allowed order, the destination last, without own collisions."""
+    """Whether all live subgoals were reached in an allowed order, destination last, without an at-fault collision."""
 
     key: ClassVar[str] = "success"
     title: ClassVar[str] = "success"
@@ -80,7 +80,7 @@ class GoalConditionSuccess(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the share, and 1."""
+        """Returns the numerator (the share) and the denominator (1) of the metric."""
         return (record.reached / record.live, 1.0) if record.live else (0.0, 0.0)
 
 
@@ -93,7 +93,7 @@ class SPL(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the product, and 1."""
+        """Returns the numerator (the product) and the denominator (1) of the metric."""
         if not record.success:
             return 0.0, 1.0
         if record.shortest is None:
@@ -111,7 +111,7 @@ class RouteCompletion(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the share, and 1."""
+        """Returns the numerator (the share) and the denominator (1) of the metric."""
         return (0.0, 0.0) if record.completion is None else (record.completion, 1.0)
 
 
@@ -129,7 +129,7 @@ class InfractionScore(ClosedLoopMetric):
     penalties: Mapping[str, float] = field(default_factory=lambda: PENALTIES)
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the product, and 1."""
+        """Returns the numerator (the product) and the denominator (1) of the metric."""
         product = 1.0
         for name, count in record.infractions.items():
             product *= math.prod([self.penalties.get(name, 1.0)] * count)
@@ -145,7 +145,7 @@ class Infractions(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns their number, and 1."""
+        """Returns the numerator (the number of exceptions) and the denominator (1) of the metric."""
         return float(sum(count for name, count in record.infractions.items() if name in PENALTIES)), 1.0
 
 
@@ -158,7 +158,7 @@ class DrivingScore(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the product, and 1."""
+        """Returns the numerator (the product) and the denominator (1) of the metric."""
         share, counts = RouteCompletion().parts(record)
         return share * InfractionScore().parts(record)[0], counts
 
@@ -172,7 +172,7 @@ class Seconds(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the time, and 1."""
+        """Returns the numerator (the time) and the denominator (1) of the metric."""
         return record.seconds, 1.0
 
 
@@ -236,7 +236,7 @@ class ExceptionsMet(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns their number, and 1."""
+        """Returns the numerator (the number of exceptions) and the denominator (1) of the metric."""
         return float(sum(each.met is not None for each in record.exceptions)), 1.0
 
 

@@ -1,7 +1,7 @@
 """Check of one session of a rollout: its files, header, end and measures, and the session played again from its seed.
 
 A session follows from town, seed, settings and players. Town, seed and settings are those of the protocol, not those
-that the session states, and the players of the protocol choose their actions again. What is recorded must be equal.
+that the session states, and the players of the protocol choose their actions again. The recordings must be equal.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class SessionFindings:
 
     Attributes:
         number: number of the session in the rollout.
-        faults: what is wrong, one line each.
+        faults: faults, one line each.
         digest: SHA-256 of its content; None if it could not be read.
         simulated: whether it was played again and found equal.
         has_persona: whether its header has a persona of a role whose policy cannot be played again.
@@ -96,7 +96,7 @@ class SessionChecker:
         self._policies: dict[tuple[str, Role], AnyPolicy] = {}
 
     def __call__(self, task: SessionTask) -> SessionFindings:
-        """Returns what is found about a session; the first kind of fault ends its check."""
+        """Returns the findings about a session; the first kind of fault ends its check."""
         plan = task.plan
         found = SessionFindings(number=plan.number, faults=())
         try:
@@ -219,7 +219,7 @@ class SessionChecker:
     # --- Measures -----------------------------------------------------------------------------------------------------
 
     def _differences(self, plan: RolloutPlan, session: Session, row: RolloutRow) -> Iterator[str]:
-        """Yields where the row is not what the session measures."""
+        """Yields differences between the row and the measures of the session."""
         assert row.record is not None
         try:
             wanted = measure(session, self._engine(plan.town).town).to_json()

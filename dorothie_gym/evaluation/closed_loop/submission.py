@@ -2,7 +2,8 @@
 
 The checks need the recorded sessions and this package, not the policy. Everything that follows from the protocol is
 computed again: sessions are drawn and played from their seeds by the partners of the protocol, with the recorded
-actions of the Co-Wizard, or with its own policy if the package has it. What cannot be computed is a claim (`claims`).
+actions of the Co-Wizard, or with its own policy if the package has it. Data that cannot be computed are claims
+(`claims`).
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ _FILES: Final = frozenset({SETTINGS_FILE, RESULT_FILE, COST_FILE, SESSIONS_FOLDE
 
 @dataclass(frozen=True, kw_only=True)
 class LeaderboardProtocol:
-    """What the rows of a leaderboard have in common. Participant and Ad-Wizard are scripted.
+    """Common protocol of the rows of a leaderboard. Participant and Ad-Wizard are scripted.
 
     Attributes:
         folds: folds whose towns a rollout may be played in; it covers one of them as a whole, in the usual order.
@@ -76,7 +77,7 @@ class LeaderboardProtocol:
             raise ValueError(f"sessions is {self.sessions}; it must be at least 1")
 
     def faults(self, settings: Mapping[str, Any]) -> Iterator[str]:
-        """Yields what a rollout's settings (`RolloutSettings.to_json`) have that the protocol does not allow."""
+        """Yields the parts of a rollout's settings (`RolloutSettings.to_json`) that the protocol does not allow."""
         towns = [str(town) for town in settings["towns"]]
         whole = {fold: list(parse_towns(fold)) for fold in self.folds}
         if fold_of_towns(towns) not in self.folds or towns not in whole.values():
@@ -111,13 +112,13 @@ class SubmissionCheck:
     """Outcome of the check of a rollout.
 
     Attributes:
-        faults: what is wrong, one line each; empty for a rollout that can be submitted.
+        faults: faults, one line each; empty for a rollout that can be submitted.
         submission: content of the submission's file; None if there are faults.
         resimulated: numbers of the sessions that were played again and found equal.
         sessions: number of sessions of the protocol.
         seed: seed of the sample; None if all sessions were to be played again.
-        played: whether the Co-Wizard's policy was played again, too.
-        claims: what the rollout states and nothing checks.
+        played: whether the Co-Wizard's policy was also played again.
+        claims: statements of the rollout that nothing checks.
     """
 
     faults: tuple[str, ...]
@@ -143,8 +144,8 @@ def check_submission(
     Args:
         folder: folder of the rollout, with its sessions.
         sample: number of sessions to play again; None for all of them. The other ones are drawn, read and measured.
-        seed: seed of the sample, which also depends on the content of all sessions; None draws one, so that nobody can
-            know the sample beforehand.
+        seed: seed of the sample, which also depends on the content of all sessions; None draws one, so that the sample
+            cannot be known beforehand.
         protocol: the protocol.
         workers: number of processes; more than one needs an importable main module of the caller.
         on_session: called with the numbers of checks done and planned: one for each session, and one more for each
@@ -203,11 +204,11 @@ def check_submission(
 def differences_from(file: Path | str, submission: Mapping[str, object]) -> tuple[str, ...]:
     """Compares the file of a submission with the submission of a folder, as `check_submission` makes it.
 
-    What the check found does not count: another seed draws another sample, and others may lack the libraries of a
-    model.
+    The results of the check are ignored: another seed draws another sample, and a receiver may lack the libraries of a
+        model.
 
     Raises:
-        RolloutError: the file is no submission.
+        RolloutError: the file is not a submission.
     """
     with raising(RolloutError):
         page = read_json(Path(file), MAX_RESULT_JSON)
@@ -310,14 +311,14 @@ def _missing_and_surplus(root: Path, result: RolloutResult, plans: Sequence[Roll
 
 
 def _surplus_files(root: Path) -> Iterator[str]:
-    """Yields files that are no part of a rollout; the folder that a killed run leaves may be there, if it is empty."""
+    """Yields files that are not part of a rollout; an empty folder left by a killed run is allowed."""
     for path in sorted(root.iterdir()):
         if path.name not in _FILES and not (path.name == PARTS_FOLDER and path.is_dir() and not any(path.iterdir())):
             yield f"{path}: is no part of a rollout, and nothing checks it; remove it"
 
 
 def _differences_of_settings(root: Path, result: RolloutResult) -> Iterator[str]:
-    """Yields where the settings in the result are not those under which the folder was played."""
+    """Yields differences between the settings in the result and those under which the folder was played."""
     with raising(RolloutError):
         try:
             page = checked(read_json(root / SETTINGS_FILE, MAX_SMALL_JSON), dict[str, Any], root / SETTINGS_FILE)
@@ -335,7 +336,7 @@ def _differences_of_settings(root: Path, result: RolloutResult) -> Iterator[str]
 
 
 def _differences_of_result(root: Path, result: RolloutResult) -> Iterator[str]:
-    """Yields where the file of the result is not what its rows, in the order of the sessions, give."""
+    """Yields differences between the result file and the figures computed from its rows, in session order."""
     page = read_json(root / RESULT_FILE, MAX_RESULT_JSON)
     assert isinstance(page, Mapping)
     wanted = result.to_json()

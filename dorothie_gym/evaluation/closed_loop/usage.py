@@ -19,7 +19,7 @@ SessionUsage: TypeAlias = Mapping[str, ModelUsage]
 
 
 def read_usage(folder: Path) -> dict[str, ModelUsage]:
-    """Returns the usage recorded beside a session; empty for none.
+    """Returns the usage recorded next to a session; empty for none.
 
     Raises:
         SessionError: the file is damaged.

@@ -50,7 +50,7 @@ def locked_folder(root: Path, file: str, settings: Mapping[str, object]) -> Iter
     Args:
         root: the folder.
         file: name of the file in it that states the settings.
-        settings: what the sessions follow from, in JSON types; a folder with other settings is refused.
+        settings: settings that determine the sessions, in JSON types; a folder with other settings is refused.
 
     Raises:
         SessionError: the folder holds something else, or another process holds its lock.

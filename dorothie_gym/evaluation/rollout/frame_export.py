@@ -129,8 +129,8 @@ def export_frames(
 ) -> list[ExportedSession]:
     """Writes the frames of sessions, each into the folder of its path in the corpus; of a single one into `out`.
 
-    The folder of a session appears when it is complete; an interrupted export goes on with the next session. The bytes
-    do not depend on the number of processes.
+    The folder of a session appears when it is complete; an interrupted export continues with the next session. The
+    bytes do not depend on the number of processes.
 
     Args:
         corpus: the sessions.
@@ -175,7 +175,7 @@ def export_frames(
 
 
 def _finished(folder: Path, export: FrameExport) -> ExportedSession | None:
-    """Returns what an earlier export with these settings wrote; None where there is nothing yet."""
+    """Returns the result of an earlier export with these settings; None where there is nothing yet."""
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return None
     try:
@@ -200,7 +200,7 @@ def _finished(folder: Path, export: FrameExport) -> ExportedSession | None:
 
 @dataclass(frozen=True)
 class _Job:
-    """Export of a session into a folder, first into a hidden one beside it."""
+    """Export of a session into a folder, first into a hidden one next to it."""
 
     entry: CorpusEntry
     folder: Path

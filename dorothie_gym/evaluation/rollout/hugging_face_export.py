@@ -1,7 +1,7 @@
 """Recorded sessions as datasets of one role for Hugging Face, and the card of such datasets.
 
 A dataset contains the observations of its role and nothing of the other roles: no hidden landmarks for the Co-Wizard,
-no story, and nothing that they follow from (`role_episodes`).
+no story, and nothing from which these could be derived (`role_episodes`).
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def _hub_card(role: Role, sessions: int, decisions: int, towns: Sequence[str], l
 def dataset_card(
     role: Role, sessions: int, decisions: int, towns: Sequence[str], limits: SpaceLimits, observed: str, acted: str
 ) -> list[str]:
-    """Returns the lines of a card: what the dataset is, and its fields with shapes, units and meanings.
+    """Returns the lines of a card: description of the dataset, and its fields with shapes, units and meanings.
 
     Args:
         role: the role.

@@ -1,7 +1,7 @@
-"""Recorded sessions as datasets of one role for Minari, and for what reads Minari's datasets: TorchRL, d3rlpy.
+"""Recorded sessions as datasets of one role for Minari and readers of Minari's datasets (TorchRL, d3rlpy).
 
-As in `hugging_face_export`, a dataset has nothing of the other roles, and nothing that it follows from: episodes have
-neither names nor seeds, and the environment of the dataset draws its sessions anew.
+As in `hugging_face_export`, a dataset contains no data of the other roles, and nothing from which they could be
+    derived: episodes have neither names nor seeds, and the environment of the dataset draws new sessions.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def export_minari(
         folder: folder of Minari's datasets (`MINARI_DATASETS_PATH`).
         on_session: called after each session.
         storage: one of `STORAGES`.
-        fields: fields of the action to keep in a vector; observations are then vectors, too, as `dorothie_gym.flatten`
-            makes them. None keeps all fields as they are.
+        fields: fields of the action to keep in a vector; observations are then also vectors, as from
+            `dorothie_gym.flatten`. None keeps all fields as they are.
 
     Returns:
         Name of the dataset: "dorothie-gym/ROLE-v0".

@@ -26,7 +26,8 @@ PITCH: Final = "pitch"
 """Trait that is the pitch of a persona's voice."""
 
 USAGE_FILE: Final = "usage.json"
-"""What the policies have cost in a session (calls, tokens), by role; not part of the record, and absent for nothing."""
+"""Cost of the policies in a session (calls, tokens), by role; not part of the recording, and absent if there is none.
+"""
 
 
 class SessionHost(Protocol):
@@ -108,7 +109,7 @@ def play_session(
 
 
 def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> dict[str, Mapping[str, object]]:
-    """Returns what the policies of a session have cost, by role; empty for nothing."""
+    """Returns the costs of the policies of a session, by role; empty if there are none."""
     found = {str(role): policy.usage_of(states[role]) for role, policy in policies.items()}
     return {role: usage for role, usage in found.items() if usage is not None}
 

@@ -17,7 +17,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 class RecordedPolicy(Policy[int]):
-    """Takes the actions that a role took in a recorded session, whatever it observes; its state is the frame.
+    """Takes the actions of a role in a recorded session, independently of its observations; its state is the frame.
 
     Args:
         session: session with recorded decisions.
@@ -56,7 +56,7 @@ class RecordedPolicy(Policy[int]):
 
 
 def recorded_persona(session: Session, role: Role) -> dict[str, float | str] | None:
-    """Returns the persona of a role in a header; None without one, or if its traits are no numbers or texts."""
+    """Returns the persona of a role in a header; None if there is none, or if its traits are not numbers or texts."""
     personas = session.header.extra.get(PERSONAS)
     persona = personas.get(str(role)) if isinstance(personas, Mapping) else None
     if not isinstance(persona, Mapping):

@@ -215,7 +215,7 @@ def config_of(header: SessionHeader) -> EnvConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplaySources:
-    """Maps and storyboard for sessions whose own are not shipped.
+    """Maps and storyboard for sessions whose maps and storyboard are not shipped.
 
     Attributes:
         town: name or file of the town of all sessions; None takes the town that each session names.

@@ -1,8 +1,8 @@
-"""Recorded sessions as one role lived through them, simulated again from their seeds and actions.
+"""Recorded sessions from the perspective of one role, simulated again from their seeds and actions.
 
-An episode has what the role observed, did and was rewarded with, and nothing else of its session: no name, storyboard
-or seed, from which the errands and the hidden places follow. What is exported depends on that only, and so does the
-order of the episodes.
+An episode contains the role's observations, actions and rewards, and nothing else of its session: no name, storyboard
+or seed, from which the errands and the hidden places could be derived. What is exported depends on that only, and so
+does the order of the episodes.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _ID_LENGTH: Final = 16
 
 @dataclass(frozen=True, kw_only=True)
 class RoleEpisode:
-    """Session as one role lived through it.
+    """Session from the perspective of one role.
 
     Attributes:
-        source: name of the session, for messages to the one who exports it; it is not exported.
+        source: name of the session, for messages during the export; it is not exported.
         town: name of its town.
         config: settings of its environment.
         limits: sizes of the spaces.
@@ -60,7 +60,7 @@ class RoleEpisode:
 
     @property
     def id(self) -> str:
-        """Opaque id: a digest of what the role saw and did, which whoever has the episode can compute, too."""
+        """Opaque id: a digest of the role's observations and actions, which can be computed from the episode."""
         content = [self.town, self.observations, self.masks, self.actions, self.rewards, self.terminated]
         return digest_of(content)[:_ID_LENGTH]
 
@@ -68,7 +68,7 @@ class RoleEpisode:
 def role_episodes(
     entries: Iterable[CorpusEntry], role: Role, sources: ReplaySources | None = None
 ) -> Iterator[RoleEpisode]:
-    """Yields the sessions of a corpus as a role lived through them.
+    """Yields the sessions of a corpus from the perspective of a role.
 
     Args:
         entries: sessions that this package has recorded.
@@ -123,7 +123,7 @@ def lived_through(
 
 
 def distinct_ids(ids: Sequence[str]) -> list[str]:
-    """Returns sorted ids, those that come again with a number: of sessions in which a role saw and did the same."""
+    """Returns sorted ids; repeated ones, from sessions with equal observations and actions, get a number."""
     found, times = [], 0
     for number, name in enumerate(ids):
         times = times + 1 if number and ids[number - 1] == name else 1

@@ -139,7 +139,7 @@ class SessionJob(Generic[Result]):
     """Series of sessions in one folder.
 
     Attributes:
-        settings_file: name of the file that states what the sessions follow from.
+        settings_file: name of the file with the settings that determine the sessions.
         settings: content of that file, in JSON types; a folder with other settings is refused.
         config: settings of the engine.
         cast: player of each role.

@@ -58,7 +58,7 @@ ActionMetric = Metric[ActionPredictions, DecisionPoint]
 
 @dataclass(frozen=True, kw_only=True)
 class MoveAccuracy(ActMetric):
-    """Share of points whose move is right."""
+    """Share of points whose move is correct."""
 
     name: ClassVar[str] = "move accuracy"
 
@@ -95,7 +95,7 @@ class SlotF1(ActMetric):
 
 @dataclass(frozen=True, kw_only=True)
 class SlotScorePaper(ActMetric):
-    """Share of points whose 69 bits all match: what the paper's slot score appears to be (spec/metrics.md)."""
+    """Share of points whose 69 bits all match, which appears to be the paper's slot score (spec/metrics.md)."""
 
     name: ClassVar[str] = "slot score, paper protocol"
 
@@ -107,7 +107,7 @@ class SlotScorePaper(ActMetric):
 
 @dataclass(frozen=True, kw_only=True)
 class ActionAccuracy(ActionMetric):
-    """Share of points whose navigation action is right."""
+    """Share of points whose navigation action is correct."""
 
     name: ClassVar[str] = "action accuracy"
 
@@ -119,7 +119,7 @@ class ActionAccuracy(ActionMetric):
 
 @dataclass(frozen=True, kw_only=True)
 class ArgumentAccuracy(ActionMetric):
-    """Share of points whose angle is right, on the circle; a point whose angle is unknown counts in none.
+    """Share of points whose angle is correct, on the circle; points with an unknown angle are ignored.
 
     Attributes:
         tolerance: errors below it are accepted [degrees].
@@ -147,7 +147,7 @@ class ArgumentAccuracyPaper(ArgumentAccuracy):
 
 @dataclass(frozen=True, kw_only=True)
 class JointAccuracy(ActionMetric):
-    """Share of points whose action and angle are both right; a point whose angle is unknown counts in none.
+    """Share of points whose action and angle are both correct; points with an unknown angle are ignored.
 
     Attributes:
         tolerance: errors of the angle below it are accepted [degrees].
@@ -290,7 +290,7 @@ def task_of(key: str) -> str:
 
 
 def metric_title(name: str) -> str:
-    """Returns the title of the metric of a key without the task's name: "slot F1 (macro)"."""
+    """Returns the title of a metric key without the name of the task: "slot F1 (macro)"."""
     base = name.removesuffix(PAPER_SUFFIX)
     words = _SHORT.get(base) or base.replace("_", " ")
     return f"{words} (paper)" if name.endswith(PAPER_SUFFIX) else words

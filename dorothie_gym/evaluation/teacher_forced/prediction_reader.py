@@ -71,8 +71,8 @@ def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
         Predictions of each model, seed and task; models in order of appearance, then seeds, then tasks.
 
     Raises:
-        PredictionError: a file is no parquet file, lacks a column, a column has another type, a value is none of the
-            vocabulary, or a point has two rows; the message names file and row (counted from 0) and what to do.
+        PredictionError: a file is not a Parquet file, lacks a column, a column has another type, a value is not in the
+            vocabulary, or a point has two rows; the message names file, row (counted from 0) and remedy.
         OSError: a file cannot be read.
     """
     found: dict[tuple[str, int, Task], list[TaskPredictions]] = {}
@@ -88,7 +88,7 @@ def read_about(path: Path | str) -> dict[str, object]:
     """Returns the provenance in the metadata of a file; empty if there is none.
 
     Raises:
-        PredictionError: the file is no Parquet file, or its metadata is not valid JSON.
+        PredictionError: the file is not a Parquet file, or its metadata is not valid JSON.
         OSError: it cannot be read.
     """
     about = (_open(Path(path)).schema.metadata or {}).get(ABOUT)

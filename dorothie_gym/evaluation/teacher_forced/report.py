@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NONE: Final = "–"
-"""Stands where there is no figure."""
+"""Placeholder for a missing figure."""
 
 _TEX: Final = {
     "\\": r"\textbackslash{}",
@@ -56,7 +56,7 @@ _TEX: Final = {
 
 
 def write_report(table: ResultsTable, folder: Path | str, *, pictures: bool = True) -> tuple[Path, ...]:
-    """Writes the table into a folder, which is made if need be.
+    """Writes the table into a folder, which is created if necessary.
 
     Args:
         table: the table.
@@ -119,7 +119,7 @@ def part_title(part: str) -> str:
 
 
 def legend(table: ResultsTable) -> str:
-    """Returns what the cells of the table hold."""
+    """Returns the content of the cells of the table."""
     seeds = sorted({len(table.runs_of(model)) for model in table.models if table.runs_of(model)})
     over = " to ".join(str(count) for count in dict.fromkeys((seeds[0], seeds[-1]))) if seeds else "no"
     some = f"mean and half-width of the 95 % interval over {over} seeds" if seeds and seeds[-1] > 1 else "one seed"
@@ -137,7 +137,7 @@ def legend(table: ResultsTable) -> str:
 
 
 def markdown(table: ResultsTable) -> str:
-    """Returns the table as Markdown: figures by part, findings, points and what was left out."""
+    """Returns the table as Markdown: figures by part, findings, points and omissions."""
     lines = ["# Results", "", legend(table), *([f"Paper: {paper_source()}."] if _has_paper(table) else [])]
     rowed = _has_paper(table)
     for part in table.parts:
@@ -213,7 +213,7 @@ def points_rows(table: ResultsTable) -> tuple[list[str], list[list[str]]]:
 
 
 def notes(table: ResultsTable) -> Iterator[str]:
-    """Yields what the figures come from, and what was not scored and why, a sentence each."""
+    """Yields one sentence for each source of the figures, and for each event that was not scored."""
     labels = table.labels
     for corpus, encoder in sorted(_origins(table.about)):
         yield f"Trained on the corpus {corpus}; text encoder {encoder}."

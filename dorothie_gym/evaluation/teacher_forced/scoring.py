@@ -68,7 +68,7 @@ def score_runs(labels: CorpusLabels, predictions: Iterable[TaskPredictions]) -> 
     """Scores predictions, separately for each model and seed.
 
     Raises:
-        PredictionError: a session is unknown, an event is no point of the task, a point of the split has no row or
+        PredictionError: a session is unknown, an event is not a point of the task, a point of the split has no row or
             two, or a model, seed and task is given twice; the message names it and says what to do.
     """
     runs: dict[tuple[str, int], list[_Aligned]] = {}

@@ -1,6 +1,7 @@
 """Shallow models: boosted trees on the history without words, and logistic regression on words alone.
 
-They show how much of a task a form of the dialogue gives away. A model that understands has to exceed them.
+They show how far a task can be solved from the form of the dialogue alone; a model that understands the dialogue has to
+exceed them.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ ANGLE_STEP: Final = 15.0
 """Angles are predicted as multiples of this [degrees]."""
 
 THRESHOLDS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
-"""Probabilities from which a slot value is predicted; the best on the validation points is taken."""
+"""Candidate thresholds on the probability of a slot value; the best one on the validation points is used."""
 
 _TAKES_ARGUMENT: Final = np.array(
     [action.argument in (ArgumentKind.ANGLE, ArgumentKind.SIDE) for action in NAVIGATION_ACTIONS]
@@ -290,7 +291,7 @@ class WordRegression(ShallowModel[Any]):
     spec = BatchSpec(moves=8, utterances=6, actions=0, window=0, window_objects=0, objects=0)
 
     STRENGTHS: Final = (1.0, 10.0, 100.0)
-    """Inverse strengths of the regularisation; the best on the validation points is taken."""
+    """Candidate inverse strengths of the regularisation; the best one on the validation points is used."""
 
     def __init__(self, seed: int = 0, *, strict: bool = False) -> None:
         super().__init__(seed, strict=strict)

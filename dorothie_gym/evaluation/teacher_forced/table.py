@@ -116,7 +116,7 @@ class ResultsTable:
         return {name: estimate for name, estimate in found.items() if estimate.seeds}
 
     def findings(self) -> tuple[ModelFinding, ...]:
-        """Returns how the paper's findings come out here, and whether TOTO is above the floors and below others.
+        """Returns the outcomes of the paper's findings, and of those on TOTO, trivial baselines and other models.
 
         Others are the models that are neither the paper's nor floors nor ablations of TOTO.
         """
@@ -234,7 +234,7 @@ def evaluate_predictions(
     """Scores predictions and gathers them in a table.
 
     Args:
-        predictions: of any number of models, seeds and tasks.
+        predictions: predictions of any number of models, seeds and tasks.
         corpus: the labels (`labels_of`), or the corpus whose split is taken.
         split: see `labels_of`.
         missing: why models could not be run, by name.

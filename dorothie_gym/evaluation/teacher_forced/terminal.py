@@ -60,7 +60,7 @@ _VERDICTS: Final = {
 
 
 def print_table(table: ResultsTable, console: Console) -> None:
-    """Prints all models: figures by part of the corpus, ours above the paper's, the findings, and what was counted."""
+    """Prints all models: figures by part of the corpus, ours above the paper's, the findings, and the counts."""
     for part in table.parts:
         console.print(part_title(part), style="bold", markup=False)
         for tasks in _side_by_side(table, console):
@@ -75,7 +75,7 @@ def print_table(table: ResultsTable, console: Console) -> None:
 
 
 def print_details(table: ResultsTable, model: str, console: Console) -> None:
-    """Prints one model: every metric by part, by what is handled, and the accuracy of each class."""
+    """Prints one model: every metric by part, by handled exception, and the accuracy of each class."""
     console.print(model, style="bold", markup=False)
     for make in (_metrics, _by_handling):
         for tasks in _side_by_side(table, console):
@@ -87,7 +87,7 @@ def print_details(table: ResultsTable, model: str, console: Console) -> None:
 
 
 def print_counts(table: ResultsTable, console: Console) -> None:
-    """Prints the points of each fold, and what was not scored and why."""
+    """Prints the points of each fold, and the events that were not scored, with reasons."""
     heads, rows = points_rows(table)
     shown = _grid(*heads)
     for row in rows:

@@ -1,4 +1,4 @@
-"""Comparison of several annotations of a session: disagreements, consensus, and marks taken over into a final version.
+"""Comparison of several annotations of a session: disagreements, consensus, and marks copied into a final version.
 
 Annotators number exchanges and transactions as they like. Units are the same if they begin at the same word of the
 session; the final version numbers each unit by that word.
@@ -70,9 +70,9 @@ class UnitStarts:
 
 
 def adopted(text: SourceText, source: Annotation, id: UtteranceId) -> Change:
-    """Returns the change that takes the marks of an utterance over into the final version.
+    """Returns the change that copies the marks of an utterance into the final version.
 
-    Units are numbered by their first words; the marks of the units that begin in the utterance are taken over, too.
+    Units are numbered by their first words; the marks of the units that begin in the utterance are also copied.
     Suggestions count as accepted.
     """
     line, starts = text.by_id[id], UnitStarts(text, source)
@@ -110,7 +110,7 @@ def disagreements(text: SourceText, annotations: Mapping[str, Annotation]) -> tu
 
 
 def consensus(text: SourceText, annotations: Mapping[str, Annotation]) -> Annotation:
-    """Returns the final version to begin with: what all annotators agree on; other utterances are undecided."""
+    """Returns the initial final version: marks on which all annotators agree; other utterances are undecided."""
     open_ids = {each.id for each in disagreements(text, annotations)}
     final, first = Annotation.empty(text), next(iter(annotations.values()))
     for line in text.lines:

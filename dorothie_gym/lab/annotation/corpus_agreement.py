@@ -65,7 +65,8 @@ class CorpusAgreement:
     Attributes:
         annotators: their names, in order.
         sessions: number of sessions with two or more of them.
-        pairs: agreement of each two annotators, over the sessions that both have annotated, with the number of these.
+        pairs: agreement of each pair of annotators, over the sessions that both have annotated, with the number of
+            these.
         alpha: Krippendorff's alpha of all annotators; None if the package `krippendorff` is not installed.
         exchange_alpha: the same for the borders of exchanges; None likewise, and if it is undefined.
         transaction_alpha: the same for the borders of transactions.

@@ -148,7 +148,7 @@ class _Reader:
         return found
 
     def _span_of_time(self, utterance: _Noted) -> tuple[int, ...]:
-        """Returns what orders utterances: start and end [ms], and their places in the list of times."""
+        """Returns the sort key of utterances: start and end [ms], and their places in the list of times."""
         found = [self._times[slot] for slot in utterance.slots if slot in self._times]
         if len(found) != len(utterance.slots):
             self._fail(f"annotation {utterance.name} has no start or end (TIME_SLOT_REF1, TIME_SLOT_REF2)")

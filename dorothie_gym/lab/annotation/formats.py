@@ -75,7 +75,7 @@ def export_annotation(
 
 
 def format_of(path: Path) -> Format:
-    """Returns the format of a file or folder; raises `AnnotationError` if it is none of the known ones."""
+    """Returns the format of a file or folder; raises `AnnotationError` for an unknown format."""
     layout = layout_of(path) if path.is_dir() else None
     if layout is not None:
         return Format.NATIVE if layout == "native" else Format.SDN

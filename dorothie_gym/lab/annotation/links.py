@@ -41,7 +41,7 @@ def links_path(root: Path) -> Path:
 
 
 def seats_of(root: Path, people: Sequence[tuple[str, SeatKind]], *, renew: bool = False) -> list[Seat]:
-    """Returns the seats of people; who has a link of an earlier server keeps it. Nothing is written.
+    """Returns the seats of people; links of an earlier server remain valid. Nothing is written.
 
     Args:
         root: folder of the session or corpus.
@@ -84,7 +84,7 @@ def keep_links(root: Path, seats: Sequence[Seat], *, renew: bool = False) -> Non
     Args:
         root: folder of the session or corpus.
         seats: the seats.
-        renew: whether links of other people stop working, too; otherwise they work again when these people are named.
+        renew: whether links of other people also stop working; otherwise they work again when these people are named.
 
     Raises:
         AnnotationError: as of `seats_of`.

@@ -1,8 +1,8 @@
-"""Log of an annotator's marks: an append-only file beside the session, from which marks, undo and redo are restored.
+"""Log of an annotator's marks: an append-only file next to the session, from which marks, undo and redo are restored.
 
-The first line says whose log it is and of which text. Every later line is an edit with the new marks of what it
-changes; an undo is an edit that restores earlier marks. A line is on the disk before the edit is acknowledged, so that
-neither the death of the program nor a power failure loses it.
+The first line names the annotator and identifies the text. Every later line is an edit with the new marks of the
+changed elements; an undo is an edit that restores earlier marks. A line is on the disk before the edit is acknowledged,
+so that neither the death of the program nor a power failure loses it.
 """
 
 from __future__ import annotations
@@ -72,10 +72,10 @@ class LogLine(Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=Tru
     Attributes:
         edit: number of the edit, from 1; 0 for the start.
         action: kind of the edit.
-        change: new marks of what changes.
-        label: what the annotator did, in words.
-        by: who decided, in the final version.
-        source: annotator whose marks were taken over, in the final version.
+        change: new marks of the changed elements.
+        label: description of the edit.
+        by: adjudicator, in the final version.
+        source: annotator whose marks were copied, in the final version.
     """
 
     edit: Annotated[int, Meta(ge=0, lt=2**53)]
@@ -97,9 +97,9 @@ class Edit:
     Attributes:
         action: mark, undo or redo.
         change: the new marks, of a mark.
-        label: what the annotator did, in words.
-        by: who decided, in the final version.
-        source: annotator whose marks are taken over, in the final version.
+        label: description of the edit.
+        by: adjudicator, in the final version.
+        source: annotator whose marks are copied, in the final version.
     """
 
     action: Action = Action.MARK
@@ -134,7 +134,7 @@ def annotators_of(folder: Path) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Done:
-    """Edit that can be undone or redone: what it says, and the change that undoes or redoes it."""
+    """Edit that can be undone or redone: its description, and the change that undoes or redoes it."""
 
     label: str
     back: Change
@@ -198,22 +198,22 @@ class AnnotationLog:
 
     @property
     def can_undo(self) -> str | None:
-        """What `undo` would undo, in words; None if there is nothing."""
+        """Description of the edit that `undo` would undo; None if there is nothing."""
         return self._undo[-1].label if self._undo else None
 
     @property
     def can_redo(self) -> str | None:
-        """What `redo` would do again, in words; None if there is nothing."""
+        """Description of the edit that `redo` would repeat; None if there is nothing."""
         return self._redo[-1].label if self._redo else None
 
     def mark(self, change: Change, label: str = "", *, by: str = "", source: str = "") -> None:
-        """Takes new marks over and appends them to the log.
+        """Applies new marks and appends them to the log.
 
         Args:
             change: the new marks.
-            label: what the annotator did, in words.
-            by: who decided, in the final version.
-            source: annotator whose marks are taken over, in the final version.
+            label: description of the edit.
+            by: adjudicator, in the final version.
+            source: annotator whose marks are copied, in the final version.
 
         Raises:
             AnnotationError: the change does not fit the text, or the log is full or a link.
@@ -226,28 +226,28 @@ class AnnotationLog:
             self._append(Action.MARK, done, label, by, source)
 
     def undo(self) -> bool:
-        """Takes the last edit back; returns whether there was one. Errors as `mark`."""
+        """Undoes the last edit; returns whether there was one. Errors as `mark`."""
         if not self._undo:
             return False
         self._append(Action.UNDO, self._undo[-1].back, self._undo[-1].label)
         return True
 
     def redo(self) -> bool:
-        """Does the last edit that was taken back again; returns whether there was one. Errors as `mark`."""
+        """Redoes the last undone edit; returns whether there was one. Errors as `mark`."""
         if not self._redo:
             return False
         self._append(Action.REDO, self._redo[-1].back, self._redo[-1].label)
         return True
 
     def edit(self, edit: Edit) -> None:
-        """Takes an edit over; raises `AnnotationError` if there is nothing to undo or redo, and otherwise as `mark`."""
+        """Applies an edit; raises `AnnotationError` if there is nothing to undo or redo, and otherwise as `mark`."""
         if edit.action is Action.MARK:
             self.mark(edit.change, edit.label, by=edit.by, source=edit.source)
         elif not (self.undo() if edit.action is Action.UNDO else self.redo()):
             raise AnnotationError(f"there is nothing to {edit.action.value}")
 
     def ends_with(self, edit: Edit) -> bool:
-        """Returns whether an edit is the last one of the log: if its answer was lost, it is asked for again."""
+        """Returns whether an edit is the last one of the log, which is requested again if its answer was lost."""
         last = self.lines[-1] if self.lines else None
         if last is None or last.action is not edit.action:
             return False

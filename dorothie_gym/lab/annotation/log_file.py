@@ -1,4 +1,4 @@
-"""Files of annotators beside a session: inside its folder, appended whole or not at all, never more than is read."""
+"""Files of annotators in the folder of a session, with atomic appends and a limited size."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Extent:
 
 
 def check_place(path: Path) -> None:
-    """Raises `AnnotationError` if a file or its folder is a link: what is written there would leave the session."""
+    """Raises `AnnotationError` if a file or its folder is a link, which may lead outside the session."""
     for place, kind in ((path.parent, "folder"), (path, "file")):
         if place.is_symlink():
             raise AnnotationError(
@@ -62,11 +62,11 @@ def check_place(path: Path) -> None:
 
 @contextmanager
 def appending(path: Path, whole: int) -> Iterator[BinaryIO]:
-    """Yields a file to append to; if that fails, what was appended is removed again.
+    """Yields a file to append to; if that fails, the appended part is removed again.
 
     Args:
         path: the file; it is created if it is missing, in a folder that exists.
-        whole: size of what remains if the block fails [bytes]; a file of which nothing remains is removed.
+        whole: size to which the file is cut if the block fails [bytes]; an empty file is removed.
 
     Raises:
         AnnotationError: the file or its folder is a link, or the file has a further name elsewhere.

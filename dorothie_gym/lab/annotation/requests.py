@@ -24,14 +24,14 @@ class Step(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
 
 
 class Mark(Step, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """New marks: the change, and what was done, in words."""
+    """New marks: the change, and its description."""
 
     change: ChangeRows
     label: Annotated[str, Meta(max_length=80)] = ""
 
 
 class Adopt(Step, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """Marks of an annotator for an utterance, to be taken over into the final version."""
+    """Marks of an annotator for an utterance, to be copied into the final version."""
 
     speaker: Label
     utterance: Annotated[int, Meta(ge=0, lt=2**53)]

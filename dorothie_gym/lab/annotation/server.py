@@ -39,7 +39,7 @@ BUDGET: Final = (300.0, 60.0)
 """Requests that a seat may send at once, and per second; playing a film takes some 15 a second."""
 
 Reply: TypeAlias = Any
-"""What a handler returns: a response, or a value that is sent as JSON."""
+"""Result of a handler: a response, or a value that is sent as JSON."""
 
 Handler: TypeAlias = Callable[[Request, Seat], Awaitable[Reply]]
 

@@ -113,7 +113,7 @@ def _end(value: object, where: str) -> UnitEnd | None:
 def relabelled(session: Session, text: SourceText, annotation: Annotation, annotator: str) -> Session:
     """Returns a session with the labels of an annotation in place of its own.
 
-    Everything else is kept, except what belongs to spans or acts that no longer exist: audio, meaning and fluent words
+    Everything else is kept, except data of spans or acts that no longer exist: audio, meaning and fluent words
     of a span with other words. Decisions of the roles are left out: a replay would give the former labels. The header
     names the annotator, so that statistics use the stored exchanges and transactions instead of deriving them.
 

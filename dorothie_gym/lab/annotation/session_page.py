@@ -1,4 +1,4 @@
-"""A session as the tool in the browser shows it: talk without labels, events, the car and bodies, pictures, sound."""
+"""A session as the browser tool shows it: dialogue without labels, events, the car and bodies, pictures, sound."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class SessionPage:
         self._lock = threading.Lock()
 
     def content(self) -> dict[str, Any]:
-        """Returns what does not depend on an annotator, in JSON types; it holds no labels of the dialogue."""
+        """Returns the data that do not depend on an annotator, in JSON types, without labels of the dialogue."""
         header, session = self.session.header, self.session
         return {
             "name": session.name,

@@ -62,7 +62,7 @@ class SourceText:
 
     @classmethod
     def of(cls, session: Session) -> Self:
-        """Returns the text of a session; raises `SessionError` if nobody speaks in it."""
+        """Returns the text of a session; raises `SessionError` if it has no utterances."""
         said = [utterance for utterance in session.utterances() if utterance.speaker in SPEAKERS]
         if not said:
             raise SessionError(f"session {session.name}: nobody speaks in it; there is nothing to annotate")

@@ -1,4 +1,4 @@
-"""Workplace of annotators: sessions, seats, and the logs of those who work on them."""
+"""Workplace of annotators: sessions, seats, and logs."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Seat:
 
     Attributes:
         name: name of the person.
-        kind: what the person does.
+        kind: task of the person.
         token: secret of the link, 128 bits; empty for a link that an earlier server gave.
         known_digest: SHA-256 of the secret of such a link.
     """
@@ -147,7 +147,7 @@ class Workplace:
 
         Raises:
             AnnotationError: there is no session of this number.
-            SessionError: it cannot be read, or nobody speaks in it.
+            SessionError: it cannot be read, or has no utterances.
         """
         with self._lock:
             if not 0 <= number < len(self.entries):
@@ -163,7 +163,7 @@ class Workplace:
             return self._open[number]
 
     def greeting(self, seat: Seat) -> dict[str, Any]:
-        """Returns who a seat is for, and the sessions with whether the person has begun with each."""
+        """Returns the person of a seat, and the sessions with whether the person has begun each of them."""
         return {
             "name": seat.name,
             "kind": seat.kind.value,
@@ -180,14 +180,14 @@ class Workplace:
             return _state(session.log(seat))
 
     def edit(self, seat: Seat, number: int, base: int, edit: Edit, *, again: bool = False) -> dict[str, Any]:
-        """Takes an edit over: new marks, undo, or redo.
+        """Applies an edit: new marks, undo, or redo.
 
         Args:
-            seat: who edits.
+            seat: seat of the editor.
             number: the session.
             base: number of the edit that the browser has seen last.
-            edit: what is to be done.
-            again: whether the browser asked for it before and got no answer; then it is done once only.
+            edit: the edit.
+            again: whether the browser has sent it before without an answer; it is then applied only once.
 
         Raises:
             StaleError: there were later edits.
@@ -240,7 +240,7 @@ class Workplace:
     def adopt(
         self, seat: Seat, number: int, base: int, id: UtteranceId, annotator: str, *, again: bool = False
     ) -> dict[str, Any]:
-        """Takes the marks of an annotator for an utterance over into the final version. Errors as `edit`."""
+        """Copies the marks of an annotator for an utterance into the final version. Errors as `edit`."""
         with self._lock:
             session = self.open(number)
             if annotator not in annotators_of(session.folder):

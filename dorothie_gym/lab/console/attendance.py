@@ -1,4 +1,4 @@
-"""Attendance of people at the seats: whether a session can begin, must pause, or goes on without somebody."""
+"""Attendance of people at the seats: whether a session can begin, must pause, or continues without a person."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def is_ready(seats: Collection[Seat], *, started: bool) -> bool:
 
     Args:
         seats: all seats of the room.
-        started: whether it begins without waiting for anybody.
+        started: whether it begins without waiting for people.
     """
     roles = [seat for seat in seats if seat.role is not None]
     if any(map(is_missing, roles)):
@@ -41,12 +41,12 @@ def overdue(seats: Collection[Seat], rules: AbsenceRules, now: float) -> Iterato
 
 
 def pause_reason(seats: Collection[Seat], rules: AbsenceRules, *, started: bool) -> PauseReason | None:
-    """Returns the reason for which absences stop the clock of a session; None if it goes on.
+    """Returns the reason for which absences stop the clock of a session; None if it continues.
 
     Args:
         seats: all seats of the room.
         rules: rules for people who leave.
-        started: whether the session was begun without waiting for anybody.
+        started: whether the session was begun without waiting for people.
     """
     roles = [seat for seat in seats if seat.role is not None]
     if rules.while_away is WhileAway.PAUSE and any(map(is_missing, roles)):

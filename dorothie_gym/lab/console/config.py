@@ -1,4 +1,4 @@
-"""Settings of the console: pace, pictures, and what happens while people are away."""
+"""Settings of the console: pace, pictures, and absences of people."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from dorothie_gym.session.config import EnvConfig
 
 
 class WhileAway(enum.StrEnum):
-    """What a session does while a person who has a seat is away."""
+    """Behaviour of a session while a person with a seat is away."""
 
     PAUSE = "pause"
     """The clock stops."""
     CONTINUE = "continue"
-    """The clock goes on; the role does nothing."""
+    """The clock continues; the role does nothing."""
 
 
 class AfterAbsence(enum.StrEnum):
-    """What a session does when a person has been away for too long."""
+    """Behaviour of a session after a person has been away for too long."""
 
     END = "end"
     """The session ends with the reason "left"."""
@@ -34,9 +34,9 @@ class AbsenceRules:
     """Rules for people who leave a seat that needs a person.
 
     Attributes:
-        while_away: what happens at once.
+        while_away: immediate effect of an absence.
         seconds: time to come back [s].
-        then: what happens after that time.
+        then: effect after that time.
 
     Raises:
         ValueError: the time is negative or not finite; names the field.
@@ -63,7 +63,7 @@ class ConsoleConfig:
         pictures: whether seats can look through the windscreen.
         picture_size: width and height of the pictures [px].
         picture_quality: quality of the pictures as JPEG, in 1..95.
-        speech: whether people can speak into a microphone, and hear what others say.
+        speech: whether people can speak into a microphone and hear the others.
         absence: rules for people who leave.
         repeatable: whether people at the seats may begin another session after the last one.
 

@@ -1,4 +1,4 @@
-"""Connection of one browser: what it has been sent, what waits to be sent, and how much it may send."""
+"""Connection of one browser: sent data, queued messages, and rate limit."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class CloseCode(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Closing:
-    """Wish to close a connection, after what was sent before."""
+    """Request to close a connection after the queued messages."""
 
     code: CloseCode
 
 
 class Connection:
-    """Outgoing messages of a browser, and what it has been shown.
+    """Outgoing messages of a browser, and its last view.
 
     All methods are for the thread of the event loop, except that the thread of a session reads and writes the
     attributes.
@@ -92,7 +92,7 @@ class Connection:
             self._waiting.put_nowait(b"")
 
     def close(self, code: CloseCode) -> None:
-        """Closes the connection after what waits to be sent."""
+        """Closes the connection after the queued messages."""
         if not self._closed:
             self._closed = True
             self._waiting.put_nowait(Closing(code))

@@ -68,7 +68,7 @@ class _SpanQueue:
     in_utterance: int = 0
 
     def take(self, speaking: float) -> tuple[int, TypedAct] | None:
-        """Returns the next span, if it can be spoken now; `speaking` is the rest of the own utterance [s]."""
+        """Returns the next span, if it can be spoken now; `speaking` is the rest of the role's utterance [s]."""
         if speaking <= 0.0:
             self.in_utterance = 0
         if not self.waiting or self.in_utterance >= self.limit:

@@ -26,7 +26,7 @@ _Typed: TypeAlias = Annotated[str, Meta(max_length=MAX_TYPED)]
 
 
 class MessageError(DorothieGymError, ValueError):
-    """A message of a browser is malformed, or asks for what its seat does not offer."""
+    """A message of a browser is malformed, or asks for something that its seat does not offer."""
 
 
 class _Message(Struct, tag_field="k", tag=str.lower, forbid_unknown_fields=True, frozen=True):
@@ -84,7 +84,7 @@ class Say(_Command, frozen=True):
 
 
 class Correct(_Message, frozen=True):
-    """Correction of the act of an own span that was spoken: number of the utterance, index of the span."""
+    """Correction of the act of a span that the role has spoken: number of the utterance, index of the span."""
 
     utterance: _Item
     span: Annotated[int, Meta(ge=0, le=63)]
@@ -192,7 +192,7 @@ class Message(_Command, frozen=True):
 
 
 class Control(_Message, frozen=True):
-    """Control of the session by the experimenter, or a new session by anybody after the last one."""
+    """Control of the session by the experimenter, or a new session, which any seat may request after the last one."""
 
     act: Literal["start", "pause", "resume", "end", "again"]
 

@@ -1,4 +1,4 @@
-"""Real time: ticks of a room on threads, so that the event loop is never blocked, and delivery of what they return."""
+"""Real time: ticks of a room on threads, so that the event loop is never blocked, and delivery of their results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ async def run_room(room: Room, threads: Executor, builders: Executor) -> None:
     Args:
         room: the room.
         threads: threads for the ticks; each tick runs on one of them, and a room has one tick at a time.
-        builders: threads for what takes seconds and must not keep ticks waiting: scenes of towns for pictures.
+        builders: threads for slow work that must not delay ticks: scenes of towns for pictures.
     """
     loop = asyncio.get_running_loop()
     period = 1.0 / room.config.decision_frequency

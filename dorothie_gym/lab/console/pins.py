@@ -1,4 +1,4 @@
-"""Pins of a map: names that tell landmarks of one kind apart, and the places where a stop counts."""
+"""Pins of a map: names that distinguish landmarks of one kind, and the places where a stop counts."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def pin_rows(
     The columns are landmark, x, y [m], name on the map, x and y of the stopping place [m], and index of the street.
 
     Args:
-        pins: landmarks that the role knows; nothing else decides the names, so that they give no other one away.
+        pins: landmarks that the role knows; the names depend on nothing else, so they reveal no other landmarks.
         streets: name of each street.
         places: lanes of the town.
     """
@@ -66,7 +66,7 @@ def _numbered(names: Sequence[str]) -> Iterable[str]:
 
 
 def _street(pin: Pin, streets: Sequence[StreetName]) -> str:
-    """Returns the street of a landmark of which a town may have several; "" for others and unnamed streets."""
+    """Returns the street of a landmark that may occur several times in a town; "" for others and unnamed streets."""
     if not catalogue()[pin.name].repeatable:
         return ""
     name = streets[pin.street] if 0 <= pin.street < len(streets) else StreetName.UNKNOWN

@@ -13,15 +13,15 @@ from dorothie_gym.session.recording.events import Event, EventType
 class SpanRecordings:
     """Names of the recordings of the spans that people have said and that are not over yet.
 
-    The engine knows nothing of recordings. A span is found again by its speaker and words when its utterance is over;
-    spans of the same words are over in the order in which they were said.
+    The engine does not know about recordings. A span is found again by its speaker and words when its utterance is
+    over; spans of the same words are over in the order in which they were said.
     """
 
     def __init__(self) -> None:
         self._said: dict[Role, deque[tuple[str, str | None]]] = {}
 
     def say(self, role: Role, text: str, audio: str | None) -> None:
-        """Notes a span.
+        """Records a span.
 
         Args:
             role: speaker.
@@ -42,7 +42,7 @@ class SpanRecordings:
     def _take(self, role: Role, text: str) -> str | None:
         """Returns the recording of the first span with these words; forgets it, and those before, which were refused.
 
-        A span that nobody said here, as a policy said it, has none.
+        A span of a policy has none.
         """
         said = self._said.get(role, deque())
         if all(words != text for words, _ in said):

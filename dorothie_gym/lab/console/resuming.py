@@ -1,4 +1,4 @@
-"""Interrupted sessions with people: what a new server needs to go on with one."""
+"""Interrupted sessions with people: the data that a new server needs to resume one."""
 
 from __future__ import annotations
 

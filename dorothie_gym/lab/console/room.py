@@ -1,4 +1,4 @@
-"""Room of one session: seats, people who come and go, the session's clock, and what each seat is sent."""
+"""Room of one session: seats, arrivals and departures of people, the session's clock, and the messages to each seat."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ class Room:
         seed: seed of the first session; each further one has the next number.
         folder: folder in which each session is recorded in a folder of its own; None records nothing.
         name: name of the folder of a session; None names it by the town and a random number, since people at the seats
-            may see the name, and storyboard and seed would tell them the errands.
+            may see the name, and storyboard and seed would reveal the errands.
         extra: further fields of the header of the record (JSON types).
-        resumed: interrupted session that the first one goes on with; the engine is then one of `begin_replay`.
+        resumed: interrupted session that the first session resumes; the engine is then one of `begin_replay`.
 
     Attributes:
         engine: see above.
@@ -110,7 +110,7 @@ class Room:
         self._calls.append(Arrival(seat, connection))
 
     def leave(self, seat: Seat, connection: Connection) -> None:
-        """Notes at the next tick that a connection has ended."""
+        """Records at the next tick that a connection has ended."""
         self._calls.append(Departure(seat, connection))
 
     def receive(self, seat: Seat, connection: Connection, message: m.Incoming) -> None:
@@ -142,13 +142,13 @@ class Room:
 
     @property
     def is_quiet(self) -> bool:
-        """Whether nothing happens and nobody watches."""
+        """Whether the session is idle and no browser watches it."""
         return self.state is not RoomState.RUNNING and not self._calls and not any(s.present for s in self._all())
 
     # --- a tick -----------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> list[Outgoing]:
-        """Handles what has come in, plays a decision if the session runs, and returns what is to be sent.
+        """Handles incoming messages, plays a decision if the session runs, and returns outgoing messages.
 
         Args:
             now: clock that does not jump [s].
@@ -166,7 +166,7 @@ class Room:
         return out
 
     def fail(self) -> list[Outgoing]:
-        """Gives the session up after an error of the program; its record stays as it was at the last decision."""
+        """Aborts the session after an internal error; its recording stays as it was at the last decision."""
         self.state, self.failed = RoomState.OVER, True
         if self.record is not None:
             try:
@@ -184,7 +184,7 @@ class Room:
         return out
 
     def suspend(self) -> list[Outgoing]:
-        """Interrupts a session that is in progress because the program stops: a new program can go on with it."""
+        """Interrupts a session that is in progress because the program stops: a new program can resume it."""
         if self.record is not None:
             self.record.close()
         return [Outgoing(each, code=CloseCode.RESTART) for seat in self._all() for each in seat.connections]
@@ -210,7 +210,7 @@ class Room:
             self._catch_up(resumed)
 
     def _open_record(self) -> None:
-        """Begins the record: when the session starts, so that one that nobody came to leaves nothing."""
+        """Begins the record: when the session starts, so that a session without people leaves no files."""
         if self._folder is None or self.record is not None:
             return
         engine = self.engine

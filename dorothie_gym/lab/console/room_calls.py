@@ -38,12 +38,12 @@ class Receipt:
 
 @dataclass(frozen=True)
 class Start:
-    """The session is to begin without the people who are missing."""
+    """Request to start the session without the missing people."""
 
 
 @dataclass(frozen=True)
 class End:
-    """The session is to end."""
+    """Request to end the session."""
 
     reason: EndReason
 

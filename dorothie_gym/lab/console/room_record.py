@@ -1,4 +1,4 @@
-"""Record of a session with people: the session itself as everywhere, and the log of the seats beside it."""
+"""Record of a session with people: the normal recording of the session, and the log of the seats."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dorothie_gym.session.spaces.actions import ActionMapping
 
 
 class RoomRecord:
-    """Record of a session in progress; what was recorded survives the death of the process.
+    """Recording of a session in progress; recorded data survive a crash of the process.
 
     Args:
         engine: an engine that has just been reset.
@@ -43,7 +43,7 @@ class RoomRecord:
         self._closed = False
 
     def say(self, role: Role, text: str, audio: str | None) -> None:
-        """Notes that a person says a span at the present decision.
+        """Records that a person says a span at the current decision.
 
         Args:
             role: speaker.
@@ -77,7 +77,7 @@ class RoomRecord:
         return name
 
     def adopt_audio(self, audio: Mapping[str, Path]) -> None:
-        """Copies the recordings of an interrupted session, by name, with which this one goes on."""
+        """Copies the recordings of the interrupted session that this one resumes, by name."""
         with self._open:
             for name, path in audio.items():
                 self._add(name, path.read_bytes())

@@ -1,4 +1,4 @@
-"""Seats of a room, their states, and what is to be sent to their browsers."""
+"""Seats of a room, their states, and the messages to their browsers."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class Seat:
     Attributes:
         name: role, or `EXPERIMENTER` or `SPECTATOR`.
         role: role that is played here; None for seats that watch.
-        plan: who plays the role; None for seats that watch.
-        talk: talk as the seat knows it.
+        plan: player of the role; None for seats that watch.
+        talk: conversation as the seat knows it.
         inbox: commands that wait; None for seats that watch.
         token: secret of the link to the seat.
         connections: browsers at the seat; one for a role, any number for seats that watch.
         joined: whether a person has sat here.
-        away_since: clock at which the person left [s]; None if nobody has left.
+        away_since: clock at which the person left [s]; None if no person has left.
         taken_over: whether the policy plays for a person who is away.
         done: last command that was carried out.
         refused: reasons for refusals that were not sent yet.

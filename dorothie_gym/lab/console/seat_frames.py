@@ -1,4 +1,4 @@
-"""Messages to the seats: everything to a browser that has just come, then what has changed, and pictures."""
+"""Messages to the seats: the full state to a new browser, then changes, and pictures."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class SeatFrames:
         self.events: list[dict[str, Any]] = []
 
     def of(self, status: RoomStatus) -> Iterator[Outgoing]:
-        """Yields what each browser is to be sent at a tick; nothing where nothing has changed."""
+        """Yields the message to each browser at a tick; none if nothing has changed."""
         for seat in self._seats.values():
             if not seat.connections:
                 continue
@@ -182,7 +182,7 @@ class SeatFrames:
         return [Outgoing(connection, picture=picture) for connection in due]
 
     def _is_due(self, connection: Connection, advanced: bool) -> bool:
-        """Returns whether a browser is to get a picture: the first one, and then at its rate."""
+        """Returns whether to send a browser a picture: the first one, and then at its rate."""
         decision = self._engine.session.decisions
         if connection.pictured is None or connection.pictured > decision:
             return True

@@ -1,4 +1,4 @@
-"""Plan of the seats of a session: which roles people may or must play, and who plays them otherwise."""
+"""Plan of the seats of a session: the roles that people may or must play, and the policies that play them otherwise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Occupancy(enum.StrEnum):
     HUMAN = "human"
     """A person must play the role; the session waits."""
     OPEN = "open"
-    """A person may play the role; the scripted policy plays while nobody sits there."""
+    """A person may play the role; the scripted policy plays while the seat is empty."""
     POLICY = "policy"
     """A policy plays the role; there is no seat."""
 

@@ -57,8 +57,8 @@ class Console:
 
     Args:
         rooms: rooms of the server when it starts.
-        suspends: whether sessions in progress are interrupted when the server stops, so that another server can go on
-            with them; otherwise they end.
+        suspends: whether sessions in progress are interrupted when the server stops, so that another server can resume
+            them; otherwise they end.
         speech: whether people can speak in rooms that are opened later.
 
     Attributes:
@@ -266,7 +266,7 @@ async def _receive(room: Room, seat: Seat, connection: Connection, socket: WebSo
 
 
 async def _send(connection: Connection, socket: WebSocket) -> None:
-    """Sends what a connection has, until it is closed."""
+    """Sends the queued messages of a connection until it is closed."""
     while True:
         item = await connection.next()
         try:
@@ -282,7 +282,7 @@ async def _send(connection: Connection, socket: WebSocket) -> None:
 
 
 async def _text(socket: WebSocket) -> str:
-    """Returns the next text, an empty one for bytes, which are no message; raises `WebSocketDisconnect` at the end."""
+    """Returns the next text; empty for bytes, which are not messages; raises `WebSocketDisconnect` at the end."""
     message = await socket.receive()
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(message.get("code", 1000))

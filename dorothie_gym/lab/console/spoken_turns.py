@@ -1,4 +1,4 @@
-"""Speech at the seats: what people say into a microphone becomes text, and what they hear is spoken.
+"""Speech at the seats: recognition of people's speech, and synthesis of the utterances that they hear.
 
 The browser asks by HTTP with the secret of its seat; the websocket carries the talk itself, as typed text.
 """
@@ -42,7 +42,7 @@ Find: TypeAlias = Callable[[str], tuple[Room, Seat] | None]
 
 
 class SpokenTurns:
-    """Recognition and synthesis for the seats of a server, in one thread beside the event loop.
+    """Recognition and synthesis for the seats of a server, in one thread next to the event loop.
 
     Args:
         find: returns room and seat of a secret; None for an unknown one.

@@ -1,4 +1,4 @@
-"""Talk as one seat knows it: what its role said, and what it heard."""
+"""Conversation as one seat knows it: utterances of its role, and heard utterances."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.session.spaces.observations import ObservationMapping, heard_acts
 
 Entry = dict[str, Any]
-"""Line of the talk in JSON types: `t` [s], `who`, `text`; for own utterances also `utterance` (number) and `spans`,
-for heard ones that name landmarks `places` and `streets` (labels, as they were understood)."""
+"""Line of the talk in JSON types: `t` [s], `who`, `text`; for the role's utterances also `utterance` (number) and
+`spans`, for heard ones that name landmarks `places` and `streets` (labels, as they were understood).
+"""
 
 
 class TalkLog:
@@ -35,7 +36,7 @@ class TalkLog:
         self._read = self._messages = 0
 
     def hear(self, observation: ObservationMapping) -> None:
-        """Appends what an observation of the role holds: utterances of others, and a message of the Ad-Wizard."""
+        """Appends the content of an observation of the role: utterances of others, and a message of the Ad-Wizard."""
         time = round(float(observation["time"][0]), 1)
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
             text = observation.get(f"{speaker}_text", "")

@@ -48,7 +48,7 @@ def role_view(role: Role, observation: ObservationMapping, mask: Mapping[str, An
 
 
 def static_view(observation: ObservationMapping, streets: int) -> RoleView:
-    """Returns what stays the same in a session: names of the streets, and the story where the role observes it.
+    """Returns the constant data of a session: names of the streets, and the story if the role observes it.
 
     Args:
         observation: observation of the role.

@@ -2,7 +2,7 @@
 
 Conditions are an endless sequence of shuffled blocks, of which entry n depends on the seed and n only. Groups take the
 first free number. The number of a group that drops out is free again, so that balance is kept across dropouts and
-restarts. Roles follow the people who are there: each gets the one that the next group lacks (`needed_role`).
+restarts. Roles depend on the people present: each person gets the role that the next group lacks (`needed_role`).
 """
 
 from __future__ import annotations
@@ -163,16 +163,16 @@ def _free(taken: Collection[int]) -> Iterator[int]:
 
 
 def needed_role(assigner: Assigner, there: Sequence[Candidate], taken: Collection[int], number: int) -> Role:
-    """Returns the role for a person: one that the first group lacks which the people who are there do not fill.
+    """Returns the role for a person: one that is missing in the first group that the people present do not fill.
 
-    Of several, it is the one with the fewest people who are sure to come, so that a substitute is on the way; of equal
-    ones a random one.
+    Of several, it is the one with the fewest people who are certain to come, so that a substitute is available; of
+    equal ones a random one.
 
     Args:
         assigner: slots of the study.
-        there: people with a role who are there, the nearest to a session first.
+        there: people present who have a role, the nearest to a session first.
         taken: numbers of slots that other groups have.
-        number: number of the person, which decides what is random.
+        number: number of the person, which seeds random choices.
     """
     formed = _form(assigner, [(each.name, each.role) for each in there], taken)
     lacking = next((slot for slot, group in formed if len(group) < len(slot.people)), None)

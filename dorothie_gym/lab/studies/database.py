@@ -35,7 +35,7 @@ _PRAGMAS: Final = (
 
 
 class StorageError(SessionError):
-    """Something cannot be stored or read at the moment: the disk is full or fails, or a database is locked."""
+    """A database cannot be read or written at the moment: the disk is full or fails, or the database is locked."""
 
 
 class Database:
@@ -120,7 +120,7 @@ class Database:
         return None if found is None else found[0]
 
     def compact(self) -> None:
-        """Writes the file anew without the remains of deleted rows; raises `StorageError` if that fails."""
+        """Rewrites the file without the remains of deleted rows; raises `StorageError` if that fails."""
         self.run("VACUUM")
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Entrance of a study: links, invitations, ids of the recruiting platform, and the way back into a lost place."""
+"""Entrance of a study: links, invitations, ids of the recruiting platform, and readmission after a lost cookie."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NO_VALUES: Final = frozenset(("null", "undefined", "none", "assignment_id_not_a
 
 
 def is_placeholder(name: str, value: str) -> bool:
-    """Returns whether the value of a link's parameter was never filled in, so that it identifies nobody."""
+    """Returns whether the value of a link's parameter was never filled in, so that it identifies no person."""
     plain = value.strip().lower()
     return not plain or plain == name.lower() or plain in _NO_VALUES or _PLACEHOLDER.search(value) is not None
 
@@ -41,7 +41,7 @@ class Entrance:
         Args:
             parameters: parameters of the link; unknown names and placeholders are left out.
             token: token of an invitation, or of a link for readmission; None for none.
-            visit: random text of the browser's tab. If an answer is lost on its way, the same tab gets the same place.
+            visit: random text of the browser's tab. If an answer is lost in transit, the same tab gets the same place.
 
         Raises:
             RefusedError: the person takes part already, or the link lacks what the study needs.
@@ -86,9 +86,9 @@ class Entrance:
         return self._key in kept and self._person(kept) != name
 
     def readmit(self, given: str) -> str | None:
-        """Returns the token of a link with which a person goes on in another browser; None for an unknown person.
+        """Returns the token of a link with which a person continues in another browser; None for an unknown person.
 
-        The link admits one tab. The old browser can go on until then; an older link is void at once.
+        The link admits one tab. The old browser works until then; an older link becomes invalid immediately.
 
         Args:
             given: id of the participant, or of the recruiting platform.

@@ -1,13 +1,14 @@
-"""Deletion of everything of people, as a list of steps that a failure or a crash does not end.
+"""Deletion of all data of people, as a list of steps that survives failures and crashes.
 
-What goes: the person's answers, stages, role and secret, the ids of the recruiting platform, and the whole record of
-each session that the person took part in: its talk and actions belong to both people, and it could not be replayed
-without one of them. What stays of a partner: answers, stages, and the fact that there was a session, with its
-condition and the reason "withdrawn".
+Deleted data: the person's answers, stages, role and secret, the ids of the recruiting platform, and the whole recording
+    of each session that the person took part in: its dialogue and actions belong to both people, and it could not be
+    replayed without one of them. Kept data of a partner: answers, stages, and the fact that there was a session, with
+    its condition and the reason "withdrawn".
 
-The first step deletes the person from the pseudonymous data, and notes in the same transaction which sessions are to be
-removed. It is done or not done. From then on nothing is left to decide: `finish_erasures` does each further step, goes
-on after one that fails, and returns what is left. The next server or command does what is left.
+The first step deletes the person from the pseudonymous data, and records in the same transaction which sessions have to
+be removed. It is done or not done. From then on the deletion cannot be undone: `finish_erasures` does each further
+step, continues after failures, and returns the remaining steps. The next server or command completes the remaining
+steps.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def erase(records: StudyRecords, *names: str) -> tuple[list[str], list[str]]:
         names: ids of the participants.
 
     Returns:
-        The ids of the sessions whose records are deleted, and what could not be deleted yet, with the reason.
+        The ids of the sessions whose records are deleted, and the data that could not be deleted yet, with the reason.
 
     Raises:
         StorageError: the first step failed, so that nothing is deleted.
@@ -50,7 +51,7 @@ def erase(records: StudyRecords, *names: str) -> tuple[list[str], list[str]]:
 
 
 def erase_from_data(records: StudyRecords, *names: str) -> list[str]:
-    """Deletes participants from the pseudonymous data, and notes what is to be removed from other files.
+    """Deletes participants from the pseudonymous data, and records the data to remove from other files.
 
     Args:
         records: records of the study.
@@ -79,12 +80,12 @@ def erase_from_data(records: StudyRecords, *names: str) -> list[str]:
 
 
 def finish_erasures(records: StudyRecords) -> list[str]:
-    """Removes what deleted participants have left in other files, as far as possible.
+    """Removes the data of deleted participants from other files, as far as possible.
 
-    May be called at any time; what fails is tried again by the next call, also after a crash.
+    May be called at any time; failed steps are retried by the next call, also after a crash.
 
     Returns:
-        What is left, with the reason; empty if nothing is.
+        Remaining data, with the reason; empty if there are none.
     """
     left: list[str] = []
     _attempt(left, lambda: _forget_platform_ids(records))
@@ -124,7 +125,7 @@ def _forget_platform_ids(records: StudyRecords) -> None:
 
 
 def _note_removal(records: StudyRecords, session: str) -> None:
-    """Notes that nothing of a session is left, once this is durable."""
+    """Records that nothing of a session is left, once this is durable."""
     sync(records.folder / SESSIONS_FOLDER)
     records.erased(session)
 
@@ -150,7 +151,7 @@ def remove_attempts(records: StudyRecords, session: str, *, keep: str | None = N
 def _remove_records(
     records: StudyRecords, session: str, *, attempts_only: bool, keep: str | None = None
 ) -> Iterator[str]:
-    """Removes what is named like a session; yields what cannot be removed, with the reason.
+    """Removes files and folders named like a session; yields those that cannot be removed, with the reason.
 
     Parts of files and folders that were being written begin with a dot.
     """
@@ -168,7 +169,7 @@ def _remove_records(
 
 
 def _remove(entry: Path) -> Iterator[str]:
-    """Removes a file, a link (not what it leads to), or a folder with all that can be removed; yields the failures."""
+    """Removes a file, a link (not its target), or a folder and its content; yields the failures."""
     try:
         if entry.is_symlink() or not entry.is_dir():
             entry.unlink(missing_ok=True)
@@ -200,7 +201,7 @@ def _reason(path: Path, error: OSError) -> str:
 def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence[str]) -> list[str]:
     """Returns the files of a study folder that people have put there and that may still hold something of a person.
 
-    Databases and the records of other sessions are not searched: what is deleted there is known.
+    Databases and the recordings of other sessions are not searched, because the deleted data there are known.
 
     Args:
         records: records of the study.
@@ -208,7 +209,7 @@ def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence
         sessions: ids of the sessions whose records were deleted.
 
     Returns:
-        The files, with what was found there.
+        The files, with the text found there.
     """
     root, found = records.folder, list[str]()
     own = {root / SESSIONS_FOLDER / row.folder for row in records.sessions() if row.folder is not None}
@@ -227,7 +228,7 @@ def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence
 
 
 def _holds(path: Path, wanted: Sequence[bytes]) -> bool:
-    """Returns whether a file has any of some texts; False for one that cannot be read, as others say."""
+    """Returns whether a file has any of some texts; False for one that cannot be read, which other checks report."""
     longest, rest = max(map(len, wanted), default=0), b""
     with contextlib.suppress(OSError), path.open("rb") as file:
         while part := file.read(_CHUNK):

@@ -15,7 +15,7 @@ PATTERNS: Final = {
 
 
 def explain(reason: str, schema: type, steps: list[tuple[str, str]]) -> str:
-    """Returns the message of a fault, with what was expected.
+    """Returns the message of a fault, with the expected value.
 
     Args:
         reason: message of msgspec.

@@ -34,7 +34,7 @@ class Experimenter:
 
     Args:
         progress: participants of the study.
-        entrance: links with which people go on.
+        entrance: links with which people continue.
 
     Attributes:
         token: token of the link, which admits one browser; the next server has another one.
@@ -96,7 +96,7 @@ class Experimenter:
     # --- content ------------------------------------------------------------------------------------------------------
 
     def overview(self) -> dict[str, Any]:
-        """Returns people who wait, people by stage, and open rooms with the token of the own seat there."""
+        """Returns people who wait, people by stage, and open rooms with the token of the experimenter's seat there."""
         progress, present = self._progress, set(self._progress.present())
         rooms = [self._row(place) for place in progress.rooms.all() if place.room is not None]
         return {

@@ -1,4 +1,4 @@
-"""Pseudonymous tables of a study: participants, answers, sessions, and what was said; as CSV, and as Parquet.
+"""Pseudonymous tables of a study: participants, answers, sessions, and utterances; as CSV, and as Parquet.
 
 They have no ids of the recruiting platform and no dates: times are seconds since the consent.
 """

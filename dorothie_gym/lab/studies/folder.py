@@ -27,10 +27,10 @@ def running_study(file: Path, folder: Path) -> Iterator[tuple[Study, StudyRecord
     """Yields a study and its records for a server, which has the folder for itself.
 
     The first server copies the study file into the folder. If texts or rules have changed since, the copy is renamed
-    (`study.1.yaml`) and made anew.
+    (`study.1.yaml`) and replaced.
 
     Raises:
-        InputFileError: the file is no study.
+        InputFileError: the file is not a study file.
         SessionError: the folder is of another study or of a version with other conditions or questions, or a server
             runs there.
     """

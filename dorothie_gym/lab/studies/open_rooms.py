@@ -28,7 +28,7 @@ AT_ONCE: Final = 2
 """Rooms that are built at the same time."""
 
 IDLE_SECONDS: Final = 120.0
-"""Time after which a tutorial or a finished session is closed if nobody sits in it [s]; a tutorial begins again."""
+"""Time after which a tutorial or a finished session is closed if it has no people [s]; a tutorial then begins again."""
 
 LEAST_PATIENCE: Final = 15.0
 """Shortest time for the people of a new session to sit down [s]: pages have to load."""
@@ -44,7 +44,7 @@ class OpenRoom:
     Attributes:
         people: ids of the participants, by role.
         session: the session; None for a tutorial.
-        resumes: whether it goes on with a session of a stopped server.
+        resumes: whether it resumes a session of a stopped server.
         opened: clock at which it was opened [s].
         attended: clock at which people were in it last [s].
         room: the room; None while it is being built.
@@ -75,7 +75,7 @@ class OpenRooms:
         builder: builder of rooms.
         records: records of the study.
         console: server of the rooms.
-        changed: called when participants are to be told of a change.
+        changed: called when participants have to be notified of a change.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class OpenRooms:
         return self.tutorial_of(name) or self._open(OpenRoom(people={role: name}, session=None))
 
     def open_session(self, row: SessionRow, people: Mapping[Role, str]) -> OpenRoom:
-        """Opens the room of a session; one that a stopped server interrupted goes on."""
+        """Opens the room of a session; resumes one that a stopped server interrupted."""
         found = self.of_session(row.id)
         if found is not None:
             return found

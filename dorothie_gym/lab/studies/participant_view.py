@@ -17,7 +17,7 @@ from dorothie_gym.lab.studies.study import Study
 
 
 def entrance_view(progress: Progress) -> dict[str, Any]:
-    """Returns what everybody may see: the title."""
+    """Returns the public data of the study: the title."""
     return {"title": progress.study.title}
 
 
@@ -53,7 +53,7 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
 
 
 def _absence(study: Study) -> dict[str, str]:
-    """Returns what happens next while others are away, and while the own browser has no connection."""
+    """Returns what happens next while others are away, and while the person's browser has no connection."""
     seconds, kind = f"{study.absence.seconds:.0f} s", study.absence.then
     if kind is AfterAbsence.END:
         others = f"After {seconds} the session ends; you then go on with the study and get your code."

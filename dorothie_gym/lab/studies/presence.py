@@ -37,7 +37,7 @@ class Presence:
                 del self._asking[name]
 
     def see(self, name: str) -> None:
-        """Notes that a participant has just sent something."""
+        """Records that a participant has just sent a request."""
         self._seen[name] = time.monotonic()
 
     def present(self, within: float = PRESENT_SECONDS) -> list[str]:
@@ -51,7 +51,7 @@ class Presence:
         return sorted({*self._asking, *(name for name, seen in self._seen.items() if now - seen <= within)})
 
     def tell(self) -> None:
-        """Wakes everybody who waits for news."""
+        """Wakes all requests that wait for news."""
         self._news.set()
         self._news = asyncio.Event()
 

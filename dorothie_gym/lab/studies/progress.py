@@ -1,4 +1,4 @@
-"""Progress of participants through a study: what they may do at each stage, and the end of sessions."""
+"""Progress of participants through a study: permitted requests at each stage, and the end of sessions."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Progress:
         return group is not None and person.position < self.study.sessions_each and not self.records.is_broken(group.id)
 
     def _leave_session(self, person: Participant) -> None:
-        """Moves a participant on whose session is over."""
+        """Moves a participant whose session is over to the next stage."""
         row = self.session_of(person)
         if row is None or row.reason is None:
             raise RefusedError("The session is still in progress.")
@@ -158,7 +158,7 @@ class Progress:
                 self.rooms.open_session(row, group.members)
 
     def note_ends(self) -> bool:
-        """Notes the ends of sessions that are over; returns whether there were any."""
+        """Records the ends of finished sessions; returns whether there were any."""
         ended = False
         for place in self.rooms.finished():
             assert place.session is not None and place.room is not None
@@ -193,7 +193,7 @@ class Progress:
                 self.records.set_group_state(row.group, "completed")
 
     def _note_absent(self, place: OpenRoom, reason: str) -> None:
-        """Notes who left a session that ended for this reason."""
+        """Records the person who left a session that ended for this reason."""
         assert place.room is not None
         for role, name in place.people.items():
             if reason == EndReason.LEFT.value and not place.room.seats[role.value].present:
@@ -231,7 +231,7 @@ class Progress:
     # --- withdrawal -------------------------------------------------------------------------------------------------
 
     async def withdraw(self, person: Participant) -> bool:
-        """Deletes everything of a person; a session in progress ends for everybody.
+        """Deletes everything of a person; a session in progress ends for all its people.
 
         Returns:
             Whether nothing is left; otherwise the server tries again.
@@ -253,7 +253,7 @@ class Progress:
         return self.finish_erasures()
 
     def finish_erasures(self) -> bool:
-        """Removes what deleted people have left in other files; returns whether nothing is left."""
+        """Removes the data of deleted people from other files; returns whether nothing is left."""
         left = finish_erasures(self.records)
         for each in left if left != self._left else []:
             logger.warning("still to be deleted: %s", each)
@@ -261,6 +261,6 @@ class Progress:
         return not left
 
     def retry_erasures(self) -> None:
-        """Tries again what could not be deleted."""
+        """Retries failed deletions."""
         if self._left:
             self.finish_erasures()

@@ -78,7 +78,7 @@ class Participant:
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """People who play together: number, slot, and the participants of the roles."""
+    """Group of people who play together: its number, slot, and participant of each role."""
 
     id: int
     slot: int

@@ -29,7 +29,7 @@ from dorothie_gym.lab.studies.stages import Outcome, Stage
 from dorothie_gym.ontology.roles import Role
 
 ABANDONED_SECONDS: Final = 1800.0
-"""Time without a sign of a person before the consent after which what is known is deleted [s]."""
+"""Time without a sign of a person before the consent after which the person's data are deleted [s]."""
 
 WITHDRAWN: Final = "withdrawn"
 """Reason of the end of a session whose record was deleted."""
@@ -158,7 +158,7 @@ class StudyRecords:
         return None if key is None else self.find_platform_id(key, given)
 
     def see(self, name: str) -> None:
-        """Notes that the browser of a participant was heard of."""
+        """Records a sign of a participant's browser."""
         self.data.run("UPDATE participants SET seen = ? WHERE id = ?", time.time(), name)
 
     def undecided(self) -> list[str]:
@@ -232,13 +232,13 @@ class StudyRecords:
         self.data.run(f"UPDATE invitations SET used = 0 WHERE token = ({query})", name)
 
     def readmit(self, name: str) -> str:
-        """Returns a token with which a participant can go on in another browser; only its hash is stored."""
+        """Returns a token with which a participant can continue in another browser; only its hash is stored."""
         token = secrets.token_urlsafe(16)
         self.data.run("INSERT OR REPLACE INTO readmissions VALUES (?, ?, NULL)", name, digest(token))
         return token
 
     def is_unused_readmission(self, token: str) -> bool:
-        """Returns whether a token lets a participant go on in another browser."""
+        """Returns whether a token lets a participant continue in another browser."""
         query = "SELECT 1 FROM readmissions WHERE token = ? AND visit IS NULL"
         return self.data.row(query, digest(token)) is not None
 
@@ -332,7 +332,7 @@ class StudyRecords:
         ]
 
     def set_folder(self, session: str, folder: str | None) -> None:
-        """Notes the folder in which a session is recorded; one that is withdrawn keeps none."""
+        """Records the folder of a session's recording; a withdrawn session keeps none."""
         self.data.run(
             "UPDATE sessions SET folder = ? WHERE id = ? AND (? IS NULL OR reason IS NOT ?)",
             folder,
@@ -342,7 +342,7 @@ class StudyRecords:
         )
 
     def finish_session(self, session: str, reason: str, *, success: bool | None, seconds: float | None) -> None:
-        """Notes the end of a session; one that is withdrawn stays so."""
+        """Records the end of a session; a withdrawn session stays withdrawn."""
         self.data.run(
             "UPDATE sessions SET reason = ?, success = ?, seconds = ? WHERE id = ? AND reason IS NOT ?",
             reason,
@@ -355,7 +355,7 @@ class StudyRecords:
     # --- erasure ----------------------------------------------------------------------------------------------------
 
     def erase_later(self, sessions: Sequence[str]) -> None:
-        """Notes sessions whose records are to be removed, also after a crash."""
+        """Records sessions whose recordings have to be removed, also after a crash."""
         for session in sessions:
             self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", session)
 
@@ -364,7 +364,7 @@ class StudyRecords:
         return [row["folder"] for row in self.data.rows("SELECT folder FROM erasures ORDER BY folder")]
 
     def erased(self, session: str) -> None:
-        """Notes that nothing of a session is left."""
+        """Records that nothing of a session is left."""
         self.data.run("DELETE FROM erasures WHERE folder = ?", session)
 
 

@@ -37,7 +37,7 @@ class News(Body, frozen=True):
 
 
 class Consent(Body, frozen=True):
-    """Consent: what was agreed to, by statement; None declines."""
+    """Consent: the accepted statements; None declines."""
 
     agreed: Annotated[list[bool], Meta(max_length=20)] | None
 
@@ -57,7 +57,7 @@ class Proceed(Body, frozen=True):
 
 
 class Wait(Body, frozen=True):
-    """Choice of a person who has waited in vain: to wait on, or to finish."""
+    """Choice of a person for whom no partner was found: to continue waiting, or to finish."""
 
     on: bool
 
@@ -75,7 +75,7 @@ class Readmit(Body, frozen=True):
 
 
 class Overview(Body, frozen=True):
-    """Request of the experimenter for what goes on."""
+    """Request of the experimenter for the state of the study."""
 
 
 class Withdraw(Body, frozen=True):

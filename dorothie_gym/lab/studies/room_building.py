@@ -52,7 +52,7 @@ class RoomBuilder:
         return Room(self._engine(tutorial.scenario, config), plans, config, seed=self._study.assignment.seed)
 
     def session(self, row: SessionRow, people: Mapping[Role, str]) -> Room:
-        """Returns the room of a session, which goes on if a stopped server left its record behind.
+        """Returns the room of a session, which is resumed if a stopped server left its recording.
 
         Args:
             row: the session.

@@ -87,7 +87,7 @@ class StudyServer:
     Attributes:
         console: rooms and seats.
         progress: participants.
-        entrance: links, invitations, and the way back.
+        entrance: links, invitations, and readmission.
         experimenter: page of the experimenter, and the token of its link.
         gate: limits of the requests.
 
@@ -143,7 +143,7 @@ class StudyServer:
         return application(routes, lifespan)
 
     async def _supervise(self) -> None:
-        """Pairs people, notes the ends of sessions, and deletes people who did not decide to take part."""
+        """Pairs people, records the ends of sessions, and deletes people who did not decide to take part."""
         cleaned = 0.0
         while True:
             await asyncio.sleep(TICK)

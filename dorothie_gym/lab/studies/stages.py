@@ -9,7 +9,7 @@ from dorothie_gym.lab.studies.study import Study
 
 
 class RefusedError(DorothieGymError, ValueError):
-    """A participant asked for what the present stage does not offer; the message is shown to the person."""
+    """A participant sent a request that the current stage does not permit; the message is shown to the person."""
 
 
 class Stage(enum.StrEnum):

@@ -23,7 +23,7 @@ class Admission(enum.StrEnum):
     """People who may take part."""
 
     OPEN = "open"
-    """Everybody who has the link."""
+    """Admission of every person with the link."""
     INVITED = "invited"
     """People with an invitation, which holds a token that can be used once."""
 
@@ -94,7 +94,7 @@ class SessionSettings(_Part, frozen=True, kw_only=True):
     Attributes:
         max_seconds: simulated time after which a session ends [s].
         pictures: whether seats look through the windscreen.
-        speech: whether people can speak into a microphone and hear the others, besides typing; what they say is
+        speech: whether people can speak into a microphone and hear the others, in addition to typing; speech is
             recorded with the session.
     """
 
@@ -116,7 +116,7 @@ class Tutorial(_Part, frozen=True, kw_only=True):
 
 
 class Absence(_Part, frozen=True, kw_only=True):
-    """Rules for people who leave a session: what happens at once, after how long, and then."""
+    """Rules for people who leave a session: immediate effect, waiting time, and effect after it."""
 
     while_away: WhileAway = WhileAway.PAUSE
     seconds: Annotated[float, Meta(ge=0.0, le=86400.0)] = 60.0
@@ -134,7 +134,7 @@ class WaitingRoom(_Part, frozen=True, kw_only=True):
 
 
 class Completion(_Part, frozen=True, kw_only=True):
-    """Code that people are shown at the end, and an address to go on to."""
+    """Code that people are shown at the end, and an address to continue to."""
 
     code: Annotated[str, Meta(min_length=1, max_length=80)] | None = None
     url: (
@@ -146,11 +146,11 @@ class Recruitment(_Part, frozen=True, kw_only=True):
     """Recruitment of people.
 
     Attributes:
-        admission: who may take part.
+        admission: people who may take part.
         parameters: names of the parameters of the link that are kept; the first one identifies a person.
-        required: whether nobody can take part without the first parameter, by which the platform pays.
-        completion: end of people who took part.
-        no_partner: end of people who waited in vain.
+        required: whether people need the first parameter, by which the platform pays, to take part.
+        completion: ending for people who took part.
+        no_partner: ending for people for whom no partner was found.
     """
 
     admission: Admission = Admission.OPEN
@@ -194,9 +194,9 @@ class Texts(_Part, frozen=True, kw_only=True):
 
     Attributes:
         instructions: instructions for each role that people play.
-        tutorial: what to try in the tutorial drive, for each role; may be left out.
+        tutorial: instructions for the tutorial drive, for each role; may be omitted.
         waiting: text of the waiting room.
-        no_partner: text for people who waited in vain.
+        no_partner: text for people for whom no partner was found.
         debriefing: text at the end.
         declined: text for people who do not consent.
         withdrawn: text after a withdrawal.
@@ -227,7 +227,7 @@ class Study(_Part, frozen=True, kw_only=True):
 
     Attributes:
         title: title that people see.
-        contact: whom people can ask; shown with the consent and at the end.
+        contact: contact for questions; shown with the consent and at the end.
         conditions: conditions.
         scenarios: towns and storyboards, which take turns; see `dorothie_gym.lab.studies.assignment`.
         consent: information and consent.

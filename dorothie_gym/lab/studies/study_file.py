@@ -32,7 +32,7 @@ _INDEX: Final = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 
 class _Loader(yaml.SafeLoader):
-    """Loader of YAML 1.2's core types: "no" and "on" are texts, and dates, too."""
+    """Loader of YAML 1.2's core types: "no", "on" and dates are texts."""
 
 
 _Loader.yaml_implicit_resolvers = {}

@@ -1,4 +1,4 @@
-"""Roles, and the waiting room: pairing of people who are present, later sessions of a group, waiting in vain."""
+"""Roles, and the waiting room: pairing of people who are present, later sessions of a group, and expired waits."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class WaitingRoom:
         self._waiting_since[person.id] = time.monotonic()
 
     def give_up(self, person: Participant) -> None:
-        """Ends the participation of a person who has waited in vain; the group of later sessions is broken."""
+        """Ends the participation of a person for whom no partner was found; the group of later sessions is broken."""
         check_stage(person.stage, Stage.LOBBY)
         if not self.has_waited_in_vain(person.id):
             raise RefusedError("Please wait a little longer.")
@@ -84,7 +84,7 @@ class WaitingRoom:
     # --- roles ------------------------------------------------------------------------------------------------------
 
     def give_role(self, person: Participant) -> None:
-        """Gives a person the role that the people who are there lack; does nothing for one who has a role."""
+        """Gives a person the role that is missing among the people present; does nothing for a person with a role."""
         if person.role is None:
             there = [each for each in self._there() if each.name != person.id]
             number = self._records.number(person.id)
@@ -92,7 +92,7 @@ class WaitingRoom:
             self._records.set_role(person.id, role)
 
     def mend_roles(self) -> bool:
-        """Changes the role of somebody who reads the instructions or practises, if otherwise others wait in vain.
+        """Changes the role of a person who reads the instructions or practises, if others would otherwise wait in vain.
 
         Returns:
             Whether a role has changed.
@@ -115,7 +115,7 @@ class WaitingRoom:
         return True
 
     def _there(self) -> list[Candidate]:
-        """Returns the people with a role who are there and play no session yet, the nearest to a session first."""
+        """Returns the people present who have a role and play no session yet, the nearest to a session first."""
         people = [self._records.participant(name) for name in self._presence.present(GONE_SECONDS)]
         found = [each for each in people if each is not None and each.position == 0 and each.stage in CERTAINTY]
         now, order = time.monotonic(), list(CERTAINTY)

@@ -267,7 +267,7 @@ def _car_sides(samples: LaneSamples, rows: slice) -> Array:
 
 
 def _on_lanes(town: Town, samples: LaneSamples, places: Array, heights: Array) -> Array:
-    """Returns which positions (3 n, 2) at heights (n,) lie on lanes outside junctions (3 n,), which are paved too."""
+    """Returns which positions (3 n, 2) at heights (n,) lie on lanes outside junctions (3 n,), which are also paved."""
     road = np.flatnonzero(~np.array([lane.in_junction for lane in town.lanes])[samples.owner])
     if len(road) == 0:
         return np.zeros(len(places), dtype=np.bool_)

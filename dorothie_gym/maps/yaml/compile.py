@@ -29,7 +29,7 @@ def read_yaml_town(path: str | FilePath) -> Town:
     """Compiles a town file.
 
     Raises:
-        TownError: with the file, the line, the element, and what to do.
+        TownError: with the file, the line, the element, and the remedy.
     """
     return compile_town(lay_out(read_plan(FilePath(path))))
 

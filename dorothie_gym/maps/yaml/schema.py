@@ -53,7 +53,7 @@ def read_lights(entry: YamlEntry, junctions: Junctions, streets: Sequence[Street
     """Reads the traffic lights, each given by a junction name or a mapping.
 
     Raises:
-        TownError: with the line and what to do.
+        TownError: with the line and the remedy.
     """
     lights: dict[str, LightsPlan] = {}
     for element in entry.names("a list of junctions"):
@@ -75,7 +75,7 @@ def read_signs(
     """Reads the stop signs and the yield signs.
 
     Raises:
-        TownError: with the line and what to do.
+        TownError: with the line and the remedy.
     """
     lit = {plan.junction: plan.entry.line for plan in lights}
     found: tuple[Pairs, ...] = ()
@@ -98,7 +98,7 @@ def read_crosswalks(entry: YamlEntry, junctions: Junctions, streets: Sequence[St
     """Reads the crosswalks.
 
     Raises:
-        TownError: with the line and what to do.
+        TownError: with the line and the remedy.
     """
     pairs = _pairs(entry, junctions, streets)
     for element, _, street in pairs:
@@ -207,7 +207,7 @@ def read_plan(path: Path) -> TownPlan:
     """Reads a town file.
 
     Raises:
-        TownError: with the file, the line, the element, and what to do.
+        TownError: with the file, the line, the element, and the remedy.
     """
     top = read_nodes(path)
     fields = {key: value.named(key) for key, value in top.fields(TOWN_KEYS, required=("junctions", "streets")).items()}

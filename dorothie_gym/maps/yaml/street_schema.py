@@ -72,7 +72,7 @@ def read_street(
     """Reads the street with index `k`.
 
     Raises:
-        TownError: with the line, the street and what to do.
+        TownError: with the line, the street and the remedy.
     """
     name = key.text("a name")
     here = key.named(f"street {name!r}")

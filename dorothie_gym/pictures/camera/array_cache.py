@@ -37,14 +37,14 @@ def through_cache(
     pack: Callable[[Kept], Arrays],
     unpack: Callable[[Arrays], Kept],
 ) -> Kept:
-    """Returns what the user's cache holds under a key, or builds it and adds it to the cache.
+    """Returns the entry of the user's cache under a key, or builds it and adds it to the cache.
 
     A damaged entry is replaced (`user_cache.read_signed`). A cache that cannot be written is logged at level DEBUG and
     otherwise ignored.
 
     Args:
         folder: name of the folder in the cache.
-        key: bytes that determine the content, besides the sources of the camera.
+        key: bytes that determine the content, in addition to the sources of the camera.
         most: largest number of archives in the folder; the oldest are removed beyond it.
         build: makes the content.
         pack: returns the arrays of the content.
@@ -98,7 +98,7 @@ def table_of(arrays: Arrays, name: str, kind: Callable[..., Table]) -> Table:
 
 @functools.cache
 def builder_digest() -> str | None:
-    """Returns a digest of everything besides the town that determines its scene; None if it cannot be read."""
+    """Returns a digest of everything except the town that determines its scene; None if it cannot be read."""
     compiler = compiler_digest()
     if compiler is None:
         return None

@@ -23,12 +23,12 @@ ASSETS_KEPT = 4
 @shared
 @dataclass(frozen=True, eq=False)
 class CameraAssets:
-    """What all towns share.
+    """Camera data that all towns share.
 
     Attributes:
         atlas: textures, with the blades of all street names of the ontology.
         bank: models of bodies.
-        noise: of the sky.
+        noise: noise of the sky.
     """
 
     atlas: AtlasArrays

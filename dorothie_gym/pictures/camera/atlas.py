@@ -41,7 +41,7 @@ class Texture(enum.IntEnum):
     HOUSE = 7
     """Clapboard with windows."""
     SHOPS = 8
-    """Shop windows, doors and awnings: four shops beside each other, one storey."""
+    """Shop windows, doors and awnings: four adjacent shops, one storey."""
     ROOF_TILES = 9
     LEAVES = 10
     CONCRETE = 11
@@ -193,7 +193,7 @@ def with_street_names(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
     Args:
         base: textures. If it is that of `street_atlas`, sessions whose names are those of the ontology share its
             texels, and only their tables differ.
-        names: of the streets of a session.
+        names: names of the streets of a session.
     """
     if len(base.table) == STREET_NAMES + len(_STREETS) and all(name in _STREETS for name in names):
         rows = [*range(STREET_NAMES), *(STREET_NAMES + _STREETS[name] for name in names)]

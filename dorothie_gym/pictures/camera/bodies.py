@@ -30,7 +30,7 @@ def copy_bodies(
     box: Array,
     target: Mesh,
 ) -> int:
-    """Writes the triangles of bodies that may be seen; returns their number, or one larger than the room if need be.
+    """Writes the triangles of bodies that may be seen; returns their number, or the room plus one if there are more.
 
     Triangles that are seen from behind are left out.
 
@@ -38,11 +38,11 @@ def copy_bodies(
         view: projection.
         tiles: smallest nearness in tiles of samples, see `cells.find_tiles`.
         bank: triangles of all models.
-        ranges: of `ModelBank`.
-        boxes: of `ModelBank`.
+        ranges: ranges of `ModelBank`.
+        boxes: boxes of `ModelBank`.
         bodies: models and places.
         box: (2, 3) scratch space.
-        target: to be written.
+        target: receives the triangles.
     """
     count, room = 0, target.corners.shape[0]
     for k in range(len(bodies)):

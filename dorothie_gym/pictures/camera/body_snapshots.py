@@ -35,7 +35,7 @@ def snapshot_of(bodies: Bodies) -> BodySnapshot:
 def bodies_between(before: BodySnapshot, after: BodySnapshot, share: float) -> BodySnapshot:
     """Returns the bodies at a share of the time between two snapshots of one world, moved along straight lines.
 
-    Those that have come in between, which have another key in their row or none, are where they came.
+    Bodies that have appeared in between, whose row has another key or none before, are where they appeared.
     """
     return BodySnapshot(
         _between(VehicleRecord, before.vehicles, after.vehicles, share),

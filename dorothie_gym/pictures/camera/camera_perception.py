@@ -34,7 +34,7 @@ from dorothie_gym.tasks.storyboard import Landmark
 
 
 class CameraPerception(CachedViews):
-    """What the camera on the car of a session shows of bodies and landmarks.
+    """Bodies and landmarks that the camera on the car of a session shows.
 
     Attributes:
         in_view: indices of the landmarks that are recognised at the present decision, ascending.
@@ -94,7 +94,7 @@ class CameraPerception(CachedViews):
     # --- Observations -------------------------------------------------------------------------------------------------
 
     def add_to(self, observations: Mapping[str, Observation]) -> None:
-        """Writes what is seen into the observations of the roles that see it, which own their arrays."""
+        """Writes visible objects into the observations of the roles that see them, which own their arrays."""
         for role in OBSERVERS:
             if role in observations:
                 observation = observations[role]

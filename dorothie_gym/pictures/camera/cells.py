@@ -98,11 +98,11 @@ def draw_cells(
 
     Args:
         view: projection.
-        buffer: to be drawn to, empty.
+        buffer: empty buffer to draw to.
         mesh: sorted by cell.
-        cells: of the mesh.
+        cells: cells of the mesh.
         scratch: from `new_order`; its tiles remain those of the buffer.
-        number: of the first triangle of the mesh.
+        number: number of the first triangle of the mesh.
     """
     _sort_cells(view, cells, scratch)
     drawn, ring, due = 0, 0, _FIRST_RING
@@ -229,7 +229,7 @@ def _find_line(
     g: NDArray[np.float32],
     h: NDArray[np.float32],
 ) -> None:
-    """Writes the smallest value in each column of `TILE` rows; written so that the compiler makes vectors of it."""
+    """Writes the smallest value in each column of `TILE` rows; written so that the compiler vectorises it."""
     for k in range(len(a)):
         line[k] = min(min(min(a[k], b[k]), min(c[k], d[k])), min(min(e[k], f[k]), min(g[k], h[k])))
 

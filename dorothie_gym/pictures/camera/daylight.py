@@ -1,4 +1,4 @@
-"""Light and air of a picture: what the weather parameters mean for sun, sky, clouds, fog, rain and wet roads.
+"""Light and air of a picture: effects of the weather parameters on sun, sky, clouds, fog, rain and wet roads.
 
 Colours are RGB in 0..255 as displays show them; light multiplies them. Extinctions are those of the simulator's
 perception (`sim/sensing/visibility.py`), so that contrast in the picture falls off as the perceived signal does.
@@ -53,7 +53,7 @@ class Daylight(NamedTuple):
         fog_start: where the fog begins [m].
         rain: extinction [1/m].
         rainfall: strength of the rain in [0, 1].
-        wetness: of the road in [0, 1].
+        wetness: wetness of the road in [0, 1].
         lamps: strength of street lamps, lit windows and signs in [0, 1].
         head_lights: strength of the car's head lights in [0, 1].
         beams: strength of the head lights of other vehicles in [0, 1].

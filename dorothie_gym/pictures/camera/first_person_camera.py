@@ -44,11 +44,11 @@ _draw_head_lights = direct(draw_head_lights)
 @shared
 @dataclass(frozen=True, kw_only=True)
 class CameraScene:
-    """What all cameras of a town share.
+    """Data that all cameras of a town share.
 
     Attributes:
-        town: what stands in every session, sorted by cell.
-        cells: of the town.
+        town: objects of every session, sorted by cell.
+        cells: cells of the town.
         ground: materials and colours of the ground.
         atlas: textures.
         lamps: light of street lamps.
@@ -102,7 +102,7 @@ class Boxes:
 
 
 class FirstPersonCamera:
-    """Camera that draws a town, what stands in a session, and bodies.
+    """Camera that draws a town, the static objects of a session, and bodies.
 
     Its buffers are allocated once. A picture depends on the arguments of `render` alone, not on earlier pictures.
     """
@@ -111,9 +111,9 @@ class FirstPersonCamera:
         """Allocates the buffers.
 
         Args:
-            scene: what all cameras of the town share.
+            scene: data that all cameras of the town share.
             config: settings.
-            overlay: what stands in the session, such as landmarks.
+            overlay: static objects of the session, such as landmarks.
         """
         self.scene, self.config = scene, config
         self._overlay, self._overlay_cells, order = sorted_by_cell(empty_mesh() if overlay is None else overlay)
@@ -173,9 +173,9 @@ class FirstPersonCamera:
         """Draws a picture.
 
         Args:
-            pose: of the camera.
+            pose: pose of the camera.
             weather: weather and sun.
-            bodies: what moves, as `model_bank.place_bodies` lists it.
+            bodies: moving bodies, as from `model_bank.place_bodies`.
             time: simulated seconds, which move the rain.
             head_lights: whether the car's head lights are on.
             faults: faulty sensors, which act on RGB.

@@ -1,4 +1,4 @@
-"""Light of the head lights of other vehicles on the road before them and on what stands there.
+"""Light of the head lights of other vehicles on the road and the objects in front of them.
 
 For each picture in the dark, the beams are drawn from above into a map of squares of 1 m, with the height of the road.
 Buildings and vehicles do not stop a beam: it reaches few metres.
@@ -64,10 +64,10 @@ def draw_head_lights(
     """Draws the beams of all vehicles before a camera whose lights are on.
 
     Args:
-        lights: to be written.
-        x: of the camera [m].
-        y: of the camera [m].
-        heading: of the camera [rad].
+        lights: receives the beams.
+        x: x coordinate of the camera [m].
+        y: y coordinate of the camera [m].
+        heading: heading of the camera [rad].
         bodies: models and places.
     """
     middle_x, middle_y = x + _AHEAD * pm.cos(heading), y + _AHEAD * pm.sin(heading)

@@ -129,7 +129,7 @@ def _find_lamps(optics: Optics, lamps: LampMap, beams: HeadLights, samples: Samp
 
 @inlined
 def _slant(values: Array, k: int) -> float:
-    """Returns the cosine between the normal of a sample and the way to the camera."""
+    """Returns the cosine between the normal of a sample and the direction to the camera."""
     right, up = values[RIGHT + k], values[UP + k]
     return float(values[SLANT + k] / math.sqrt(1.0 + right * right + up * up))
 
@@ -157,7 +157,7 @@ def _multiply(optics: Optics, values: Array, count: int) -> None:
 
 @inlined
 def _wet(optics: Optics, samples: Samples, count: int) -> None:
-    """Darkens the ground, and lets it mirror the horizon."""
+    """Darkens wet ground, and adds its reflection of the horizon."""
     values = samples.values
     for k in range(count):
         if samples.surfaces[k] & _GROUND:
@@ -170,7 +170,7 @@ def _wet(optics: Optics, samples: Samples, count: int) -> None:
 
 @inlined
 def _mirror(optics: Optics, samples: Samples, count: int) -> None:
-    """Adds what glass mirrors: the sky and the street."""
+    """Adds reflections in glass: the sky and the street."""
     values = samples.values
     for k in range(count):
         if samples.surfaces[k] & (_GLASS | _EMISSIVE) == _GLASS:

@@ -1,4 +1,4 @@
-"""Depth, semantic class and instance of every pixel, and the boxes of what is seen of each instance."""
+"""Depth, semantic class and instance of every pixel, and the boxes of the visible part of each instance."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ def write_labels(
     Args:
         view: projection of the buffer.
         buffer: numbers of the triangles, see `mesh_of`.
-        town: what stands in every session.
-        overlay: what stands in this session.
-        bodies: what moves.
+        town: objects of every session.
+        overlay: static objects of this session.
+        bodies: moving bodies.
         ground: materials of the ground.
         samples: scratch space.
-        labels: to be written.
+        labels: receives the labels.
     """
     for y in range(view.height):
         numbers, first = buffer.triangles[y], 0

@@ -89,10 +89,10 @@ def head_light(optics: Optics, x: float, y: float, z: float, slant: float) -> fl
 
     Args:
         optics: strength of the head lights, and the camera on the car.
-        x: of the surface relative to the camera [m].
-        y: of the surface relative to the camera [m].
-        z: of the surface relative to the camera [m].
-        slant: cosine between the surface's normal and the way to the camera.
+        x: x coordinate of the surface relative to the camera [m].
+        y: y coordinate of the surface relative to the camera [m].
+        z: z coordinate of the surface relative to the camera [m].
+        slant: cosine between the surface's normal and the direction to the camera.
     """
     ahead = x * optics.right_y - y * optics.right_x
     aside = abs(x * optics.right_x + y * optics.right_y)
@@ -129,7 +129,7 @@ def add_rain(picture: NDArray[np.uint8], rainfall: float, frame: int) -> None:
     Args:
         picture: (h, w, 3).
         rainfall: in [0, 1].
-        frame: number from which their places follow.
+        frame: number that determines their places.
     """
     height, width, _ = picture.shape
     state = np.uint64(frame * 2654435761 + 88172645463325252)

@@ -33,7 +33,7 @@ _FLAT = 1e-9  # [m2]; smaller triangles are left out
 
 
 class Surface(enum.IntFlag):
-    """Kinds of surfaces, which are shaded in ways of their own."""
+    """Kinds of surfaces, which are shaded differently."""
 
     NONE = 0
     GROUND = 1
@@ -175,7 +175,7 @@ class MeshBuilder:
             corners: (4, 3) [m]: lower left, upper left, upper right, lower right, seen from its visible side.
             colour: (3,).
             kind: semantic class.
-            repeats: of the texture to the right and upwards.
+            repeats: repeats of the texture to the right and upwards.
             texture: index in the atlas.
             surface: kind of surface.
             instance: key of the body.
@@ -210,7 +210,7 @@ class MeshBuilder:
         instance: int = TOWN,
         two_sided: bool = False,
     ) -> None:
-        """Adds an upright rectangle with one repeat of a texture, to be read by somebody who looks along a heading."""
+        """Adds an upright rectangle with one repeat of a texture, to be read by a viewer who looks along a heading."""
         right = np.array([-pm.sin(heading), pm.cos(heading), 0.0]) * (width / 2.0)
         up, middle = np.array([0.0, 0.0, height / 2.0]), np.asarray(centre, dtype=np.float64)
         corners = [middle - right - up, middle - right + up, middle + right + up, middle + right - up]

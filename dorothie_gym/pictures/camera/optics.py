@@ -28,7 +28,7 @@ class Optics(NamedTuple):
         horizon_r, horizon_g, horizon_b: colour.
         air_r, air_g, air_b: colour.
         fog, fog_start, rain, wetness, lamps, head_lights, beams: see `Daylight`.
-        rise: of the car per metre ahead.
+        rise: rise of the car per metre ahead.
         shadows: whether the sun casts shadows.
         slope_x, slope_y: see `ShadowMaps.slope`.
         town_x, town_y, bodies_x, bodies_y: first squares of the maps of shadows.
@@ -94,8 +94,8 @@ def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, tilt: floa
     Args:
         view: projection.
         light: see `light_numbers`.
-        maps: of shadows.
-        tilt: of the car upwards [rad].
+        maps: maps of shadows.
+        tilt: tilt of the car upwards [rad].
     """
     return Optics(  # type: ignore[call-arg]  # unpacked arrays, in the order of the fields
         *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, pm.tan(tilt),

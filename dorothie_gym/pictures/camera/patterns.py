@@ -79,7 +79,7 @@ def office() -> Picture:
 
 
 def shops() -> Picture:
-    """Returns four shops beside each other: awning, window and door; one storey, light at night."""
+    """Returns four adjacent shops: awning, window and door; one storey, light at night."""
     height, width = 64, BAYS * 64
     base = np.zeros((height, width, 4), dtype=np.float32)
     up = np.broadcast_to((np.arange(height)[:, None] + 0.5) / height, (height, width))

@@ -31,7 +31,7 @@ class CameraPose:
         z: [m].
         heading: [rad].
         pitch: upwards [rad].
-        tilt: of the car that carries it, upwards [rad]: that of the road.
+        tilt: upward tilt of the car, equal to that of the road [rad].
     """
 
     x: float
@@ -45,7 +45,7 @@ class CameraPose:
         """Returns the pose of a mount on a car with this pose.
 
         Args:
-            forward: of the middle of the car [m].
+            forward: distance in front of the middle of the car [m].
             up: above the road, at a right angle to it [m].
             pitch: relative to the car [rad].
         """
@@ -63,8 +63,8 @@ class View(NamedTuple):
         origin: (3,) position [m].
         axes: (3, 3) unit vectors to the right, up and forward.
         focal: focal length [pixels].
-        width: of the picture [pixels].
-        height: of the picture [pixels].
+        width: width of the picture [pixels].
+        height: height of the picture [pixels].
     """
 
     origin: Array
@@ -97,11 +97,11 @@ def pose_on_car(mount: CameraMount, x: float, y: float, z: float, heading: float
 
     Args:
         mount: place of the camera on the car.
-        x: of the car [m].
-        y: of the car [m].
-        z: of the road below it [m].
-        heading: of the car [rad].
-        rise: of the road per metre ahead.
+        x: x coordinate of the car [m].
+        y: y coordinate of the car [m].
+        z: z coordinate of the road below it [m].
+        heading: heading of the car [rad].
+        rise: rise of the road per metre ahead.
     """
     return CameraPose(x, y, z, heading, pm.atan(rise)).mounted(mount.forward, mount.up, math.radians(mount.pitch))
 
@@ -110,7 +110,7 @@ def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -
     """Returns the projection of a picture.
 
     Args:
-        pose: of the camera.
+        pose: pose of the camera.
         width: [pixels].
         height: [pixels].
         field_of_view: horizontal [degrees].

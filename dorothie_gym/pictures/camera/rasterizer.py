@@ -57,14 +57,14 @@ class VisibilityBuffer(NamedTuple):
     Attributes:
         nearness: (h, w) float32 inverse depth [1/m], 0 for the sky.
         triangles: (h, w) int32 number of the triangle, `SKY` for none.
-        values: scratch: corners of a batch of triangles in the picture [samples], and what is drawn of each.
+        values: scratch: corners of a batch of triangles in the picture [samples], and the drawn part of each.
         sifted: (_BATCH,) int32 scratch: 1 for those triangles of a batch that may cover a sample, 0 for others.
         kept: (_ROOM,) scratch: their rows.
         parts: (12, _ROOM) float32 scratch: their components, see `Mesh.components`.
         firsts: (h + _ROWS,) scratch: first sample of a triangle in each of its rows.
         lasts: (h + _ROWS,) scratch: sample behind the last one.
         corners: (3, 3) scratch: a triangle's corners to the right and up, times the focal length, and forward.
-        cut: (4, 2) scratch: the picture coordinates of what the near plane leaves of a triangle.
+        cut: (4, 2) scratch: the picture coordinates of a triangle clipped by the near plane.
     """
 
     nearness: NDArray[np.float32]
@@ -107,7 +107,7 @@ def draw_triangles(view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int,
 def collect_triangles(
     view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, found: int, shift: int
 ) -> int:
-    """Adds those of a range of triangles that may cover a sample to the collected ones, and draws these if need be.
+    """Collects the triangles of a range that may cover a sample, and draws the collected ones if there is no room.
 
     Args:
         view: projection.
@@ -116,7 +116,7 @@ def collect_triangles(
         first: triangle of the range.
         last: triangle behind the range.
         found: number of the triangles that are collected already.
-        shift: is added to the row of a triangle to give its number.
+        shift: number of a triangle minus its row.
 
     Returns:
         The number of collected triangles, to be drawn with `draw_collected`.
@@ -139,8 +139,8 @@ def collect_triangles(
 def _sift(view: View, mesh: Mesh, first: int, sifted: NDArray[np.int32], count: int) -> None:
     """Finds the triangles of a batch that may cover a sample: all that do, and few others.
 
-    Nine of ten triangles do not, seen from behind, out of the picture, or between samples. Half the digits, and twice
-    as many triangles in a vector of the processor, suffice to find most of them.
+    Nine of ten triangles do not, seen from behind, out of the picture, or between samples. Half the digits suffice for
+    most of them, and twice as many triangles fit into a vector register.
     """
     origin, axes = view.origin, view.axes
     far = max(max(abs(origin[0]), abs(origin[1])), abs(origin[2]))
@@ -222,7 +222,7 @@ def draw_collected(view: View, buffer: VisibilityBuffer, mesh: Mesh, count: int,
 
 @inlined
 def _project(view: View, parts: NDArray[np.float32], values: Array, count: int) -> None:
-    """Projects triangles and chooses what is drawn of them; written so that the compiler makes vectors of it."""
+    """Projects triangles and selects those to draw; written so that the compiler vectorises it."""
     origin, axes, focal = view.origin, view.axes, view.focal
     x0, y0, z0 = origin[0], origin[1], origin[2]
     rx, ry, rz = focal * axes[0, 0], focal * axes[0, 1], focal * axes[0, 2]
@@ -266,7 +266,7 @@ def _project(view: View, parts: NDArray[np.float32], values: Array, count: int) 
 
 @compiled
 def _cut_off(view: View, mesh: Mesh, row: int, corners: Array, cut: Array) -> int:
-    """Projects what the near plane leaves of a triangle: three or four corners; returns their number."""
+    """Projects a triangle clipped by the near plane: three or four corners; returns their number."""
     origin, axes, focal, wide, high = view.origin, view.axes, view.focal, 0.5 * view.width, 0.5 * view.height
     for j in range(3):
         x = mesh.corners[row, j, 0] - origin[0]
@@ -342,7 +342,7 @@ def _fill(
 def _fill_span(
     nearness: NDArray[np.float32], triangles: NDArray[np.int32], first: float, step: float, number: int
 ) -> None:
-    """Draws samples of a row; written so that the compiler makes vectors of it."""
+    """Draws samples of a row; written so that the compiler vectorises it."""
     identity = np.int32(number)
     for k in range(len(nearness)):
         value, old, other = np.float32(first + step * np.int32(k)), nearness[k], triangles[k]

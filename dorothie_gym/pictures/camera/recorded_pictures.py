@@ -61,8 +61,8 @@ _OWN_LOT = 6.0, 5.0  # [m] length and depth of the lot of a landmark that stands
 class RecordedPictures:
     """Pictures of the camera on the car of a recorded session, at any frame between its first and last.
 
-    Bodies are interpolated between records. They keep their keys, and so their looks; keys that are no positive 32-bit
-    numbers, of other corpora, are replaced by 1, 2, ... in their order. A picture depends on its frame only.
+    Bodies are interpolated between records. They keep their keys, and thus their appearance; keys of other corpora that
+    are not positive 32-bit numbers are replaced by 1, 2, ... in their order. A picture depends on its frame only.
 
     Attributes:
         camera: the camera.
@@ -151,7 +151,7 @@ class RecordedPictures:
         return self.camera.pose_on(x, y, height, heading)
 
     def weather(self, frame: int) -> Weather:
-        """Returns the last recorded weather at a frame; a clear noon where there is none."""
+        """Returns the last recorded weather at a frame; a clear noon if there is none."""
         record = self._session.scene.weather.at(frame)
         if record is None or not len(record):
             return Weather()
@@ -270,7 +270,7 @@ def _accelerations_of(tracks: ActorTracks) -> Array:
 def _moved_before(tracks: ActorTracks) -> Array:
     """Returns the time for which the actor of each row has probably moved since it appeared (m,) [s].
 
-    Those of the first record have been there since frame 0, where pedestrians take their first steps in turn.
+    Actors of the first record have been there since frame 0, where pedestrians take their first steps in turn.
     """
     first = slice(int(tracks.table.offsets[0]), int(tracks.table.offsets[1]))
     walking = tracks.table.rows["kind"][first] == int(ActorKind.PEDESTRIAN)
@@ -314,8 +314,8 @@ def _follow(
         heading: [rad].
         before: row of the same actor in the record before, -1 for none.
         begun: distance of rows without one [m].
-        heights: to be written [m].
-        odometers: to be written [m].
+        heights: receives the heights [m].
+        odometers: receives the driven distances [m].
     """
     for k in range(len(x)):
         last = before[k]
@@ -348,14 +348,14 @@ def _fault_switches(session: Session) -> dict[Sensor, list[tuple[int, bool]]]:
 
 
 def _last_switch(switches: Switches, frame: int) -> bool:
-    """Returns what the last switch before a frame has set; False without one."""
+    """Returns the state set by the last switch before a frame; False without one."""
     return next((on for at, on in reversed(switches) if at < frame), False)
 
 
 def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene) -> tuple[TownScene, list[Landmark]]:
     """Returns the landmarks of a header at the sites of the town.
 
-    Landmarks that stand at no site, of other corpora, get a lot of their own, which the returned scene has besides.
+    Landmarks that stand at no site, of other corpora, get additional lots in the returned scene.
     """
     lots, landmarks = list(scene.lots), []
     for index, row in enumerate(rows):

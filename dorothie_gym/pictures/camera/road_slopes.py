@@ -1,4 +1,4 @@
-"""Slopes of the roads, on which vehicles and their cameras stand tilted."""
+"""Slopes of the roads, which tilt vehicles and their cameras."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class RoadSlopes(NamedTuple):
 
 
 def road_slopes(town: Town) -> RoadSlopes:
-    """Returns the slopes of all roads of a town; there are no cells where all are level."""
+    """Returns the slopes of all roads of a town; the result has no cells if all roads are level."""
     samples = TownSamples.of(town)
     slope = np.zeros(len(samples.station))
     for a, b in samples.bounds.tolist():
@@ -67,7 +67,8 @@ def road_slopes(town: Town) -> RoadSlopes:
 def rise_at(slopes: RoadSlopes, x: float, y: float, z: float, cos: float, sin: float) -> float:
     """Returns the rise per metre of the road at a position [m] in a direction, 0 beside the roads.
 
-    It is that of the plane that fits the lanes around best, so that it changes without steps as a vehicle drives on.
+    The slope is that of the plane that fits the surrounding lanes best, so that it changes continuously as a vehicle
+    drives on.
     """
     if slopes.shape[0] == 0:
         return 0.0

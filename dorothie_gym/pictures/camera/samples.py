@@ -65,14 +65,14 @@ class Samples(NamedTuple):
         values: quantities, each from the entry on that has its name:
             RIGHT, UP: place in the picture per metre of depth.
             DEPTH: along the axis of the camera [m], 0 for the sky.
-            SLANT: cosine between the normal and the way to the camera, times the length of (RIGHT, UP, 1).
+            SLANT: cosine between the normal and the direction to the camera, times the length of (RIGHT, UP, 1).
             X, Y, Z: position [m].
             WEIGHT: share of its pixel.
             RED, GREEN, BLUE: 0..255 before and after the light has been added.
             OWN: light of a texture, 0..255.
-            BRIGHT: 1 for what gives off its own colour, 0 otherwise.
+            BRIGHT: 1 for surfaces that emit their own colour, 0 otherwise.
             AMBIENT: share of the light of the sky.
-            SUN: cosine to the sun, negative for what it does not shine on.
+            SUN: cosine to the sun, negative for surfaces that face away.
             BIAS: height by which something must be higher to cast a shadow on the sample [m].
             LAMP: share of the light of street lamps.
         indices: whole numbers, intermediate results.
@@ -90,7 +90,7 @@ class Samples(NamedTuple):
 def whole_vectors(count: int) -> int:
     """Returns the number of samples of whole vectors of the processor.
 
-    What is written of those behind the last sample is overwritten by the next samples, or not read.
+    Values written after the last sample are overwritten by the next samples, or not read.
     """
     return count if count < _FEW else (count + 3) // 4 * 4
 

@@ -1,4 +1,4 @@
-"""Building of the scenes of towns. A scene from the cache needs none of what is imported here."""
+"""Building of the scenes of towns. A scene from the cache needs none of the imports of this module."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def scene_of(arrays: Arrays, town: Town) -> TownScene:
     """Returns the scene of a town from its arrays.
 
     Raises:
-        KeyError, ValueError: the arrays are no scene.
+        KeyError, ValueError: the arrays are not a scene.
     """
     mesh = table_of(arrays, "mesh", Mesh)
     lots = tuple(

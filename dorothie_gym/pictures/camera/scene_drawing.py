@@ -1,4 +1,4 @@
-"""All triangles of a scene in one call: town, what stands in the session, and bodies."""
+"""All triangles of a scene in one call: town, static objects of the session, and bodies."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ def draw_scene(
     boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord], box: Array, placed: Mesh, count: int,
     shadows: ShadowMaps, casts_shadows: bool,
 ) -> int:  # fmt: skip
-    """Draws all triangles to an emptied buffer, and shadows if need be; returns the number of those of bodies.
+    """Draws all triangles to an emptied buffer, and shadows if needed; returns the number of triangles of bodies.
 
     Args:
         view: projection.
-        buffer: to be drawn to.
-        town: what stands in every session, sorted by cell.
-        cells: of the town.
+        buffer: buffer to draw to.
+        town: objects of every session, sorted by cell.
+        cells: cells of the town.
         order: scratch space for them.
-        overlay: what stands in the session, sorted by cell.
-        overlay_cells: of the overlay.
+        overlay: static objects of the session, sorted by cell.
+        overlay_cells: cells of the overlay.
         overlay_order: scratch space for them.
         bank: triangles of all models.
-        ranges: of `ModelBank`.
-        boxes: of `ModelBank`.
+        ranges: ranges of `ModelBank`.
+        boxes: boxes of `ModelBank`.
         bodies: models and places.
         box: (2, 3) scratch space.
         placed: triangles of bodies. If it has too little room, they are not drawn.
-        count: of the triangles in `placed`, negative if they are to be written first.
+        count: number of triangles in `placed`, negative if they have to be written first.
         shadows: maps of shadows.
-        casts_shadows: whether they are to be drawn for the picture, too.
+        casts_shadows: whether the picture also needs shadows.
     """
     clear(buffer)
     draw_cells(view, buffer, town, cells, order, 0)

@@ -20,8 +20,8 @@ def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch
     """Changes a picture (h, w, 3) as the fault does that leaves least of it.
 
     Args:
-        picture: to be changed.
-        faults: of any sensors.
+        picture: picture to change.
+        faults: faults of any sensors.
         scratch: (max(h, w),) or longer.
     """
     worst = min((sensor for sensor in faults if _CHANGES[sensor] is not None), key=CLARITY.__getitem__, default=None)
@@ -49,7 +49,7 @@ _CHANGES: Mapping[Sensor, Callable[[NDArray[np.uint8], NDArray[np.uint8]], None]
 
 @concurrent
 def blur(picture: NDArray[np.uint8], channel: int, radius: int, scratch: NDArray[np.uint8]) -> None:
-    """Replaces a channel by its means over squares; rows and columns go on as they end."""
+    """Replaces a channel by its means over squares; rows and columns are extended by their last values."""
     height, width, _ = picture.shape
     for axis in range(2):
         lines, length = (height, width) if axis == 0 else (width, height)

@@ -38,7 +38,7 @@ SHADED = 120.0
 """Distance up to which bodies out of view are listed, for their shadows and head lights [m]."""
 
 LIGHTS_BELOW = 6.0
-"""Altitude of the sun below which cars drive with their lights on [degrees]; in rain and fog they do so, too."""
+"""Altitude of the sun below which cars drive with their lights on [degrees]; also in rain and fog."""
 
 _LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
@@ -92,10 +92,10 @@ class SessionCamera:
         """Returns the pose of the camera on a car, which stands tilted on slopes.
 
         Args:
-            x: of the car [m].
-            y: of the car [m].
-            z: of the road below it [m].
-            heading: of the car [rad].
+            x: x coordinate of the car [m].
+            y: y coordinate of the car [m].
+            z: z coordinate of the road below it [m].
+            heading: heading of the car [rad].
         """
         rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
         return pose_on_car(self.config.mount, x, y, z, heading, rise)
@@ -124,8 +124,8 @@ class SessionCamera:
         """Returns the picture from a pose.
 
         Args:
-            pose: of the camera.
-            bodies: of a world.
+            pose: pose of the camera.
+            bodies: bodies of a world.
             weather: weather and light.
             time: simulated time [s].
             head_lights: whether the lights of the car are on.

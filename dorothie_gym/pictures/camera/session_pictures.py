@@ -28,16 +28,13 @@ def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCa
 
 
 def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: tuple[int, int]) -> SessionCamera:
-    """Returns a camera for spectators: of a width and height [px], otherwise with the settings of the session's."""
+    """Returns a spectators' camera of a width and height [px], otherwise like the session's camera."""
     own = config.camera or CameraConfig()
     return camera_of(town, scenario, replace(own, width=size[0], height=size[1], outputs=(CameraOutput.RGB,)))
 
 
 class SessionPictures(CachedViews):
-    """Pictures of a session; each is drawn when it is first asked for.
-
-    Pictures follow from the state of the world: copies of a session draw their own.
-    """
+    """Pictures of a session, each drawn at its first use from the world's state; copies of a session draw their own."""
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_camera", "_taken")
 

@@ -43,13 +43,13 @@ def shade(
         optics: numbers of the picture.
         buffer: triangles, with `side` x `side` samples in a pixel.
         side: 1 or 2.
-        town: what stands in every session.
-        overlay: what stands in this session.
-        bodies: what moves.
+        town: objects of every session.
+        overlay: static objects of this session.
+        bodies: moving bodies.
         ground: materials and colours of the ground.
-        textures: of the walls.
+        textures: textures of the walls.
         light: light and air.
-        noise: of the sky.
+        noise: noise of the sky.
         lamps: light of street lamps on the ground.
         beams: light of the head lights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
@@ -130,7 +130,7 @@ def _sample(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) 
 def _place_of(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) -> tuple[float, float, float]:
     """Returns the middle and the share of the samples of a pixel that see the triangle of sample k.
 
-    The share is 0 if an earlier sample sees it, too.
+    The share is 0 if an earlier sample already sees it.
     """
     number, across, down, count = _sample(upper, lower, x, k), 0, 0, 0
     for j in range(4):
@@ -158,7 +158,7 @@ def _is_uniform(
 
 @compiled
 def _is_same_surface(town: Mesh, overlay: Mesh, bodies: Mesh, first: int, second: int) -> bool:
-    """Returns whether two triangles lie in a plane and look the same, as the halves of a wall do."""
+    """Returns whether two triangles lie in one plane and look the same, like the halves of a wall."""
     if first == SKY or second == SKY:
         return False
     one, two = mesh_of(town, overlay, bodies, first), mesh_of(town, overlay, bodies, second)

@@ -1,4 +1,4 @@
-"""Shadows of the sun, from maps of what stands in its light.
+"""Shadows of the sun, from height maps of the objects that cast them.
 
 Points are moved along the sun's rays to height 0. A map holds, for each square of that plane, how high the highest
 surface is whose light falls there; a point lies in shadow if a surface with the same place on the plane is higher. The
@@ -52,7 +52,7 @@ _GROUND = int(Surface.GROUND)
 
 @by_reference
 class ShadowMaps(NamedTuple):
-    """Heights of what stands in the sun.
+    """Heights of the objects that cast shadows.
 
     Attributes:
         town: (n, n) int16 heights [1/50 m], tiles side by side, each at its place modulo their number.
@@ -108,14 +108,14 @@ def draw_shadows(
 
     Args:
         view: projection of the picture.
-        maps: to be drawn to.
-        town: what stands in every session, sorted by cell.
+        maps: maps to draw to.
+        town: objects of every session, sorted by cell.
         town_cells: its cells.
-        overlay: what stands only in this session, sorted by cell.
+        overlay: static objects of this session only, sorted by cell.
         overlay_cells: its cells.
         bank: triangles of all models.
-        ranges: of `ModelBank`.
-        boxes: of `ModelBank`.
+        ranges: ranges of `ModelBank`.
+        boxes: boxes of `ModelBank`.
         bodies: models and places.
     """
     lowest = min(_lowest(town_cells), _lowest(overlay_cells))
@@ -188,7 +188,7 @@ def _is_tile_in_view(view: View, maps: ShadowMaps, column: int, row: int, lowest
 
 @inlined
 def _empty(row: NDArray[np.int16]) -> None:
-    """Empties a row of a map, whose squares lie side by side: the compiler makes vectors of it."""
+    """Empties a row of a map, whose squares are contiguous, so that the compiler vectorises it."""
     for k in range(len(row)):
         row[k] = _NOTHING
 
@@ -256,7 +256,7 @@ def _empty_bodies(maps: ShadowMaps) -> None:
 
 @inlined
 def _note_part(maps: ShadowMaps, box: Array) -> None:
-    """Notes the part of the map of bodies where the shadow of a box (2, 3) [m] falls, and a little more."""
+    """Records the part of the map of bodies where the shadow of a box (2, 3) [m] falls, with a margin."""
     if maps.parts[0] < _PARTS:
         for axis in range(2):
             low, high = maps.slope[axis] * box[0, 2], maps.slope[axis] * box[1, 2]
@@ -271,7 +271,7 @@ def _note_part(maps: ShadowMaps, box: Array) -> None:
 def _is_shadow_in_view(
     view: View, maps: ShadowMaps, body: PlacementRecord, model: NDArray[np.float32], lowest: float
 ) -> bool:
-    """Returns whether a body, or what lies behind it from the sun down to a height [m], touches the picture."""
+    """Returns whether a body, or its shadow down to a height [m], touches the picture."""
     box = maps.corners
     surround(body, model, box)
     for axis in range(2):
@@ -366,8 +366,8 @@ def sunlit(
         bodies_y: first row.
         column: square whose middle is left of the place.
         row: square whose middle is above the place.
-        a: way from there to the right [squares].
-        b: way from there downwards [squares].
+        a: distance from there to the right [squares].
+        b: distance from there downwards [squares].
         level: height above which surfaces cast a shadow on the place [1/50 m].
     """
     lit, i, j = 1.0, column - town_x, row - town_y

@@ -43,15 +43,15 @@ def sample_texture(
     """Returns red, green and blue of a texture, 0..1, and its own light, 0..255.
 
     Args:
-        texels: of all textures.
+        texels: texels of all textures.
         first: texel of the texture.
         width: [texels].
         height: [texels].
         last: number of halvings of the texture.
         u: coordinate to the right, in repeats.
         v: coordinate upwards.
-        du: of the longer side of the footprint.
-        dv: of the longer side of the footprint.
+        du: u component of the longer side of the footprint.
+        dv: v component of the longer side of the footprint.
         along: square of the longer side of the footprint [texels^2].
         across: square of the shorter side of the footprint [texels^2].
     """

@@ -1,4 +1,4 @@
-"""Scenes: what stands in a town in every session, and what a session adds to it."""
+"""Scenes: objects of a town in every session, and the objects that a session adds."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from dorothie_gym.tasks.storyboard import Landmark
 @shared
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TownScene:
-    """What stands in a town in every session.
+    """Objects of a town in every session.
 
     Attributes:
         ground: lookups of heights, materials and colours of the ground.
         mesh: ground and scenery, sorted by cell.
-        cells: of the mesh.
+        cells: cells of the mesh.
         signals: lights and signs; the lenses show another state in each session.
         lenses: triangles of `signals` that show the state of traffic lights.
         lamps: light of street lamps.
-        slopes: of the roads.
+        slopes: slopes of the roads.
         lots: ground reserved for the landmarks of the sites, by their ids.
-        programmes: of the traffic lights.
+        programmes: programmes of the traffic lights.
     """
 
     ground: Ground
@@ -58,12 +58,12 @@ class TownScene:
 
 @dataclass(frozen=True, eq=False)
 class SessionScene:
-    """What a session adds to the scene of its town: the names of its streets, and its landmarks.
+    """Objects that a session adds to the scene of its town: street names and landmarks.
 
     Attributes:
-        town: what stands in every session.
+        town: objects of every session.
         street_names: on the blades, by the indices of the streets; blades without a name are empty.
-        landmarks: of the session.
+        landmarks: landmarks of the session.
     """
 
     town: TownScene
@@ -72,7 +72,7 @@ class SessionScene:
 
     @cached_property
     def camera_scene(self) -> CameraScene:
-        """What a camera needs besides the overlay."""
+        """Data that a camera needs besides the overlay."""
         town, assets = self.town, camera_assets()
         blades = int(town.mesh.textures.max(initial=0)) + 1 - STREET_NAMES
         names = [*self.street_names, *[""] * (blades - len(self.street_names))]

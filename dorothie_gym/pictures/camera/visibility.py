@@ -1,8 +1,7 @@
-"""Camera whose pictures decide what the roles see, and how many visible pixels are enough.
+"""Camera whose pictures determine the roles' perception, and the required numbers of visible pixels.
 
-By Ricco's law, as in `sim.sensing.visibility`, a small target is detected by its area times its contrast: what the air,
-the dark or a fault takes of the contrast has to be made up for by as many more pixels. Only pixels count that nothing
-hides.
+By Ricco's law, as in `sim.sensing.visibility`, a small target is detected by its area times its contrast: a loss of
+contrast by air, darkness or a fault has to be compensated by proportionally more pixels. Only unhidden pixels count.
 
 Johnson (Image Intensifier Symposium, 1958) found how many pairs of lines across the smallest dimension of a target half
 of all observers need: 1 to detect that something is there, 6.4 to identify it. A pair of lines is two pixels.
@@ -18,13 +17,14 @@ PERCEPTION_CAMERA: Final = CameraConfig(outputs=(CameraOutput.BOXES,), antialias
 """Camera of the perception, with the usual size and mount; it does not depend on `EnvConfig.camera`."""
 
 BODY_PIXELS: Final = 8
-"""Visible pixels, at full contrast, from which on a body is seen: those of a person at `visibility.CLEAR_SIGHT`, up to
+"""Visible pixels, at full contrast, from which a body is seen: those of a person at `visibility.CLEAR_SIGHT`, up to
 which the symbolic model sees everything on a clear day. Johnson's criterion is 2 x 2 pixels. Detectors need more: KITTI
-(Geiger et al., CVPR 2012) leaves out what is less than 25 pixels high at a focal length of 721 pixels, a person beyond
-50 m, and COCO (Lin et al., ECCV 2014) calls less than 32 x 32 pixels small."""
+(Geiger et al., CVPR 2012) ignores objects less than 25 pixels high at a focal length of 721 pixels, such as a person
+beyond 50 m, and COCO (Lin et al., ECCV 2014) calls less than 32 x 32 pixels small.
+"""
 
 LANDMARK_PIXELS: Final = 400
-"""Visible pixels, at full contrast, from which on a landmark is recognised: 20 x 20, those of a person with a sign, the
+"""Visible pixels, at full contrast, from which a landmark is recognised: 20 x 20, those of a person with a sign, the
 smallest landmark, at 40 m, and of a store at 110 m. That is half as wide again as Johnson's 12.8 x 12.8."""
 
 
@@ -43,6 +43,7 @@ def is_landmark_recognised(pixels: int, contrast: float) -> bool:
 
     Args:
         pixels: number of its visible pixels in the picture of `PERCEPTION_CAMERA`.
-        contrast: share of the contrast that the air and the view leave. Darkness takes nothing: the signs are lit.
+        contrast: share of the contrast that the air and the view leave. Darkness does not reduce the contrast, because
+            the signs are lit.
     """
     return pixels * contrast >= LANDMARK_PIXELS

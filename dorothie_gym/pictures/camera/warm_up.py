@@ -24,7 +24,7 @@ def is_warm() -> bool:
 
 
 def warm_up(progress: Progress | None = None) -> None:
-    """Compiles what pictures need, and keeps the scene of one town; `progress` as in `engine.warm_up.warm_up`."""
+    """Compiles the functions of pictures, and caches one town's scene; `progress` as in `engine.warm_up.warm_up`."""
     with reporting(progress):
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)

@@ -33,7 +33,7 @@ _Run: TypeAlias = tuple[int, int, int]  # first sample, the one after the last, 
 
 
 class BorderKind(enum.IntEnum):
-    """Kind of what lies beyond the side of a lane."""
+    """Kind of the area beyond the side of a lane."""
 
     NONE = 0
     LANE = 1
@@ -47,14 +47,14 @@ class Border:
     """Line along the sides of successive lanes.
 
     Attributes:
-        kind: kind of what lies beyond it.
+        kind: kind of the area beyond it.
         sign: side of the lanes: -1 left, +1 right.
         lanes: ids of the lanes, in driving direction.
         street: street of the first lane, or -1.
         points: line on the edge of the lanes in driving direction (n, 3) [m].
         heading: (n,) [rad].
         gap: distance between the edge and the lane beyond it (n,) [m]; 0 without such a lane.
-        width: of the lane (n,) [m].
+        width: width of the lane (n,) [m].
     """
 
     kind: BorderKind

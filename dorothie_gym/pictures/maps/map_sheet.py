@@ -153,7 +153,7 @@ def sheet_painter(
     """Returns the painter of the map on a sheet; labels are placed, nothing is painted yet.
 
     Args:
-        town: what to paint.
+        town: town to paint.
         size: width and height of the sheet [px]; by default that of `sheet_size`.
         street_names: names by street index; the town's own where absent.
 
@@ -193,7 +193,7 @@ def town_picture(
     """Writes the map sheet of a town as a PNG file.
 
     Args:
-        town: what to paint.
+        town: town to paint.
         path: PNG file; its folder must exist.
         size: width and height [px]; by default that of `sheet_size`.
         street_names: names by street index; the town's own where absent.

@@ -203,7 +203,7 @@ class TownSamples:
         lane: id of the lane (n,).
         station: distance along it (n,) [m].
         heading: (n,) [rad].
-        half_width: of the lane (n,) [m].
+        half_width: half width of the lane (n,) [m].
         centre: position on the centre line (n, 3) [m].
         bounds: range of samples of each lane (lanes, 2), end excluded.
     """

@@ -81,10 +81,10 @@ def tunnel_floors(
     """Yields light asphalt with broken edges between walls for the parts of roads under streets.
 
     Args:
-        town: whose lanes.
+        town: town of the lanes.
         parts: the tunnels.
-        lines: what lies beside the lanes.
-        covered: what lies in the tunnels.
+        lines: borders of the lanes.
+        covered: lookup of the parts in tunnels.
     """
     for line in lines:
         if line.kind is BorderKind.MEDIAN:
@@ -284,7 +284,7 @@ def streets(
     """Yields everything on the ground, from the pavements to the medians; surfaces in tunnels come first.
 
     Args:
-        town: whose streets.
+        town: town of the streets.
         samples: samples of its lanes.
         lines: borders of its lanes.
         parts: bridges and tunnels.
@@ -389,7 +389,7 @@ def _beside(line: Border, reach: Array) -> Iterator[Array]:
 
 
 def _open_pieces(town: Town, tunnels: Sequence[LevelStretch]) -> Iterator[tuple[Lane, float, float]]:
-    """Lanes, or what of them lies not in tunnels."""
+    """Lanes, or their parts outside tunnels."""
     hidden: dict[int, list[LevelStretch]] = defaultdict(list)
     for part in tunnels:
         hidden[part.lane].append(part)

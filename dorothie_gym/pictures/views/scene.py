@@ -127,7 +127,7 @@ class Scene:
         landmarks: landmarks with pins.
         subgoals: (description, state) of each task, deleted ones included.
         utterances: utterances and messages, oldest first.
-        speaking: utterances in progress, which nobody has heard to the end.
+        speaking: utterances in progress, whose end has not been heard.
         notes: warnings, such as a hazard or an exception.
         exceptions: exceptions so far.
         weather: the ten parameters by name; missing ones have their values of a clear noon.

@@ -1,4 +1,4 @@
-"""Views of a session: its map, the windscreen of the car, or both side by side with the talk as subtitles."""
+"""Views of a session: its map, the windscreen of the car, or both side by side with the dialogue as subtitles."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ class SessionRenderer:
         """Returns the frame (height, width, 3) of a scene.
 
         Args:
-            scene: of the map and the talk.
-            picture: what is seen through the windscreen (h, w, 3), of the size `windscreen`.
+            scene: scene with the map and the dialogue.
+            picture: picture through the windscreen (h, w, 3), of the size `windscreen`.
 
         Raises:
             ValueError: there is no such picture, and the view has a windscreen.

@@ -1,4 +1,4 @@
-"""Subtitles under the windscreen: what is being said, and dimmed what was said before."""
+"""Subtitles under the windscreen: the current utterance, and dimmed the previous ones."""
 
 from __future__ import annotations
 

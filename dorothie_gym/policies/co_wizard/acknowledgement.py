@@ -1,4 +1,4 @@
-"""Acknowledgements of instructions, and remarks about the present plan that go with them."""
+"""Acknowledgements of instructions, and remarks about the current plan that accompany them."""
 
 from __future__ import annotations
 
@@ -53,25 +53,25 @@ def acknowledge(
 
 
 def sign_of_hearing(topic: str) -> Remark:
-    """Returns the sign that something was heard.
+    """Returns an acknowledgement.
 
     Args:
-        topic: what it was: an order ("ordered"), news ("told"), something to be seen ("seen"), an answer ("answered"),
-            an errand done ("done"), small talk ("chat"), or a question whether it was understood ("align") or heard at
-            all ("hears").
+        topic: kind of the utterance: an order ("ordered"), news ("told"), something to be seen ("seen"), an answer
+            ("answered"), a completed errand ("done"), small talk ("chat"), or a question whether it was understood
+            ("align") or heard at all ("hears").
     """
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 
 def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:
-    """Returns an acceptance ("will do") of what is wanted, or the sign that it was heard ("okay"), by chance."""
+    """Returns, by chance, an acceptance of the request ("will do") or an acknowledgement ("okay")."""
     accepts = rng.random() < state.config.accepts
     function, topic = (Function.ACCEPT, "taken") if accepts else (Function.POSITIVE_FEEDBACK, "ordered")
     return intend(function, wanted, elided=act_builders.arguments_of(wanted), wording=Wording(topic=topic))
 
 
 def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Takes on an instruction by repeating it: "turning left", or "okay, I'm turning left"."""
+    """Accepts an instruction by repeating it: "turning left", or "okay, I'm turning left"."""
     if rng.random() < 0.35:
         return (intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")),)
     elided = act_builders.arguments_of(wanted)
@@ -82,7 +82,7 @@ def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -
 def plan_remark(
     state: CoWizardState, view: CoWizardView, rng: np.random.Generator, *, joined: bool = False
 ) -> tuple[Remark, ...]:
-    """Returns a remark about the present plan, or nothing, by chance.
+    """Returns a remark about the current plan, or none, by chance.
 
     Args:
         state: working copy of the state.

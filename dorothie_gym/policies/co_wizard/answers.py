@@ -1,4 +1,4 @@
-"""Answers of the Co-Wizard to questions, from what it believes."""
+"""Answers of the Co-Wizard to questions, from its beliefs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _ABOUT_THE_GOAL = frozenset(
 _ABOUT_THE_VIEW = frozenset({Predicate.VISIBILITY, Predicate.SAFE, Predicate.FAILED})
 
 _REQUEST = re.compile(r"\b(could|can|would|will) you\b(?!.*\b(know|find|see|remember|hear|tell|take)\b)")
-"""Words that ask for something to be done, even where the verb was misheard."""
+"""Words that request an action, even if the verb was misheard."""
 
 RECENT_STOP = 45.0
 """Time after a standstill within which the reason for it can be asked for [s]."""
@@ -50,7 +50,7 @@ RECENT_STOP = 45.0
 def answer_yes_no(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Answers a yes/no question by what the Co-Wizard believes of it."""
+    """Answers a yes/no question from the Co-Wizard's beliefs."""
     asked = asked_proposition(act, words)
     place = act_builders.first_name(act.values(Slot.LANDMARK))
     if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
@@ -66,7 +66,7 @@ def answer_yes_no(
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
-    """Returns what a yes/no question asks; None if that cannot be told."""
+    """Returns the proposition of a yes/no question; None if that cannot be told."""
     if words.asked is not None:
         return words.asked
     objects, landmarks, actions = act.values(Slot.OBJECT), act.values(Slot.LANDMARK), act.values(Slot.ACTION)
@@ -97,7 +97,7 @@ def judged(state: CoWizardState, view: CoWizardView, asked: Proposition) -> Rema
 
 
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
-    """Answers a question about the head lights, which also asks for them to be switched on."""
+    """Answers a question about the head lights, which is also a request to switch them on."""
     state.intentions = state.intentions.with_lights(True)
     state.say(judged(state, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:
@@ -106,7 +106,7 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
+    """Returns an addition to an answer, by chance: why something is not seen, or the time to the goal."""
     unseen = asked.predicate is Predicate.SEES and not believes(state, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(view, rng)
@@ -116,7 +116,7 @@ def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.
 
 
 def _poor_view(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about what limits the view, if anything does, by chance."""
+    """Returns a remark about a limited view, by chance."""
     limit, fault = limit_of(view.raw), camera_fault(view.raw)
     if limit is None or rng.random() < 0.3:
         return ()
@@ -189,7 +189,7 @@ def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _explain(state: CoWizardState, effect: Proposition, cause: Proposition | None, at: int | None = None) -> None:
-    """Answers why something is so, or was so at a time [s]; says so where the reason is not known."""
+    """Answers why something is so, or was so at a time [s], or that the reason is not known."""
     state.say(explanation(effect, cause, at))
 
 

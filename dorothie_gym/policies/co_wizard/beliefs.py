@@ -1,4 +1,4 @@
-"""Beliefs of the scripted Co-Wizard about destinations, and the updates that tell the environment of them."""
+"""Beliefs of the scripted Co-Wizard about destinations, and the updates that report them to the environment."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class BeliefState:
         plan: junctions of the route as sent in the last plan update.
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
         updates: belief updates (mental actions) to be sent, the next first.
-        told: purposes of errands that the participant has told, the latest last.
+        told: purposes of errands that the participant has stated, the latest last.
         sent_goal: landmark of the last goal update with a guessed place.
-        owner: person whose house the goal is, as the participant has told; None if it is none, or nobody's by name.
+        owner: person whose house is the goal, according to the participant; None if it is not a house, or a house
+            without a named owner.
     """
 
     goal: LandmarkName | None = None
@@ -52,11 +53,11 @@ class BeliefState:
         return self if update in self.updates else replace(self, updates=(*self.updates, update))
 
     def with_told(self, told: Proposition) -> BeliefState:
-        """Keeps what the participant has told about an errand."""
+        """Records the participant's statement about an errand."""
         return replace(self, told=(*self.told, told))
 
     def with_owner(self, owner: str | None) -> BeliefState:
-        """Sets the person whose house the goal is."""
+        """Sets the person whose house is the goal."""
         return replace(self, owner=owner)
 
     def after_sending(self) -> BeliefState:

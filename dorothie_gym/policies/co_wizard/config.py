@@ -162,7 +162,7 @@ class CoWizardStyle:
 
     @classmethod
     def of(cls, persona: Persona, rng: np.random.Generator) -> CoWizardStyle:
-        """Returns the style of a persona; the random generator adds what is the speaker's own."""
+        """Returns the style of a persona; the random generator adds individual variation."""
         gentle, brisk = persona.driving is Driving.GENTLE, persona.driving is Driving.BRISK
         return cls(
             echoes=within(0.2, 0.5, persona.politeness, rng),

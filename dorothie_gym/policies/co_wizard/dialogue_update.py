@@ -65,7 +65,7 @@ _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
 def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Updates the state with what the participant has said since the last decision, and queues answers."""
+    """Updates the state with the participant's utterances since the last decision, and queues answers."""
     last = state.speech.last
     heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
     if heard is None:
@@ -100,7 +100,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
 
 
 def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
-    """Returns the queued remarks without own questions and plans, which what was heard may have settled."""
+    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled."""
     kept: list[Remark] = []
     dropped = False
     for item in state.speech.queue:
@@ -116,7 +116,7 @@ def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
 def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """Joins the answers to an utterance.
 
-    A mere "okay" is dropped where something more is said for itself, and "what?" where a part of it was understood.
+    An "okay" is dropped if another remark follows, and "what?" if a part of the utterance was understood.
     Plans come last.
     """
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
@@ -137,7 +137,7 @@ def _is_plain_sign(item: Remark) -> bool:
 
 
 def _tells_plan(item: Remark) -> bool:
-    """Returns whether a remark tells a plan that nobody has asked for."""
+    """Returns whether a remark states a plan without being asked."""
     plan = any(said.predicate in _PLANS for said in item.meaning)
     return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
 
@@ -232,7 +232,7 @@ def _instructed_place(
 def _abandoned_place(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Gives up a place, for another one now, for another one later, or for none."""
+    """Abandons a place, in favour of another one now, another one later, or none."""
     landmarks = _landmarks(act)
     dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
     others = [name for name in landmarks if name is not dropped]
@@ -314,7 +314,7 @@ def _explanation(
 def _mentioned_place(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, name: LandmarkName, rng: np.random.Generator
 ) -> None:
-    """Takes a place that is mentioned while there is nowhere to go for the next one, unless the car stands at it."""
+    """Assumes that a place mentioned while there is no goal is the next goal, unless the car stands at it."""
     if name is state.beliefs.goal:
         state.say(intend(Function.NEGATIVE_FEEDBACK))
     else:
@@ -354,7 +354,7 @@ def _statement(
 def _reply(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Takes up an answer to an open question, or a clarification: an action, a direction or a place."""
+    """Processes an answer to an open question, or a clarification: an action, a direction or a place."""
     asked_elsewhere = view.choice is not None and state.dialogue.asked_lane not in (-1, view.choice.lane)
     if act.move is DialogueMove.REPLY_W and asked_elsewhere and state.beliefs.exact and words.turns:
         return  # the junction that was asked about lies behind, and the way is known by now
@@ -440,7 +440,7 @@ def _check(
 
 
 def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
-    """Returns what the participant wants verified: a destination, a street, an action, or the present destination."""
+    """Returns the subject of a check by the participant: a street, an action, or a named or current destination."""
     places, streets, actions = _landmarks(act), act_builders.named_streets(act), act.values(Slot.ACTION)
     if places:
         return act_builders.destination(places[0])
@@ -456,7 +456,7 @@ def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Propo
 def _confusion(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Says again what was not understood."""
+    """Repeats a remark that was not understood."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
     repeat_last(state)
 

@@ -54,7 +54,7 @@ def drive(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _stand(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops a car that is to stand."""
+    """Stops a car that has been told to stand."""
     if not state.intentions.halted or view.motion is Motion.STOPPED:
         return None
     return _stop_unless_sent(state, view)

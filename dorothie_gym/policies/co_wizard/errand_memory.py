@@ -1,4 +1,4 @@
-"""Memory of the Co-Wizard for the errands that the participant tells about, and remarks that come back to them."""
+"""Memory of the Co-Wizard for the errands that the participant mentions, and later remarks about them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
 
 def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> None:
-    """Keeps the thing or person of an errand that the participant has told, and perhaps repeats it.
+    """Records the item or person of an errand that the participant has mentioned, and perhaps repeats it.
 
     Args:
         state: working copy of the state, after the reaction to the utterance.
@@ -50,7 +50,7 @@ def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generat
 
 
 def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
-    """Keeps whose house the participant wants to go to: "Mateo" of "go to Mateo's house"."""
+    """Records the owner of the house that the participant wants to go to: "Mateo" of "go to Mateo's house"."""
     about = [act.slots for act in heard.acts if LandmarkName.HOUSE in act.slots]
     if not any(GoalStatus.PENDING not in slots and not _OVER & slots for slots in about):
         return
@@ -65,7 +65,7 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
 
 
 def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
-    """Returns what an utterance tells about an errand: its thing, or its person; None if it tells neither."""
+    """Returns what an utterance says about an errand: its item, or its person; None if it mentions neither."""
     if not any(act.move in _TELLING for act in heard.acts) or any(_OVER & act.slots for act in heard.acts):
         return None
     named = [value for act in heard.acts for value in act.values(Slot.LANDMARK)]
@@ -80,12 +80,12 @@ def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
 
 
 def told_of(state: CoWizardState, place: LandmarkName | None) -> Proposition | None:
-    """Returns what the participant has told last about the errand at a place; None if it has told nothing."""
+    """Returns the participant's last statement about the errand at a place; None if there is none."""
     return next((told for told in reversed(state.beliefs.told) if told.get("place") is place), None)
 
 
 def arrival_reminder(state: CoWizardState, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about what the car has come for, or nothing, by chance."""
+    """Returns a remark about the purpose of the stop, or none, by chance."""
     told = told_of(state, state.beliefs.goal)
     stands_for_person = state.beliefs.goal is LandmarkName.PERSON and told is not None and told.get("item") is None
     if told is None or stands_for_person or rng.random() >= state.style.recalls:

@@ -80,7 +80,7 @@ def set_goal(
     corrected: bool = False,
     sure: bool = True,
 ) -> None:
-    """Takes up a destination that the participant named.
+    """Adopts a destination that the participant named.
 
     Args:
         state: working copy of the state.
@@ -121,7 +121,7 @@ def set_goal(
 def _set_unknown_goal(
     state: CoWizardState, name: LandmarkName, streets: Sequence[StreetName], rng: np.random.Generator
 ) -> None:
-    """Takes up a destination that is not on the map and says so; the car then needs guidance."""
+    """Adopts a destination that is not on the map and says so; the car then needs guidance."""
     again = state.beliefs.goal is name and not state.beliefs.exact
     where = act_builders.located(name, StreetName.QUERIED)
     state.beliefs = state.beliefs.with_unknown_goal(name).with_status(name, GoalStatus.UNKNOWN)
@@ -196,7 +196,7 @@ def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName |
         state: working copy of the state.
         view: observation.
         name: place named with the instruction, or None.
-        distance: distance that was said [m].
+        distance: stated distance [m].
     """
     if name is not None:
         mark = known_landmark(state, view, name, ())
@@ -220,7 +220,7 @@ def hear_description(
     landmarks: Sequence[LandmarkName],
     rng: np.random.Generator,
 ) -> None:
-    """Takes up a description of where the goal is: guesses the place if possible, and acknowledges."""
+    """Processes a description of the goal's place: guesses the place if possible, and acknowledges."""
     goal = state.beliefs.goal
     if goal is not None and not state.beliefs.exact:
         state.beliefs = state.beliefs.with_description()
@@ -264,14 +264,14 @@ def _described_place(
 
 
 def search_on(state: CoWizardState, view: CoWizardView) -> None:
-    """Gives up the guess of a place when the car has come there; from then on the car needs guidance."""
+    """Drops the guess of a place when the car has arrived there; from then on the car needs guidance."""
     progress = state.route.progress
     if progress is not None and not state.beliefs.exact and progress.left(view.station) < state.config.search_radius:
         state.route = state.route.with_progress(None)
 
 
 def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Takes up the place of a goal that is not on the map when the camera shows it nearby, and no other of its name."""
+    """Adopts the place of a goal that is not on the map when the camera shows it nearby, and no other of its name."""
     goal, shown = state.beliefs.goal, landmarks_in_view(view.raw, view.landmarks)
     if goal is None or state.beliefs.exact or state.intentions.arrived or not shown:
         return
@@ -301,7 +301,7 @@ def complete(state: CoWizardState, name: LandmarkName | None) -> None:
 
 
 def doubt(state: CoWizardState) -> None:
-    """Drops the place that was taken for the goal; the car needs guidance."""
+    """Drops the assumed place of the goal; the car then needs guidance."""
     if state.beliefs.exact and state.beliefs.place is not None:
         if state.beliefs.goal in _COMMON:
             state.beliefs = state.beliefs.with_place_ruled_out()

@@ -33,7 +33,7 @@ _HANDLED = frozenset(
 """Parameters of the weather that have a reaction of their own."""
 
 HAZARD_EXPIRES = 4.0
-"""Time within which what the car stands for is mentioned [s]."""
+"""Time within which the reason for a standstill is mentioned [s]."""
 
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 
@@ -68,7 +68,7 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
 
 
 def _explains_standing(item: Remark) -> bool:
-    """Returns whether a remark tells, unasked, why the car stands."""
+    """Returns whether a remark states, unasked, why the car stands."""
     return item.act.move is DialogueMove.EXPLAIN and any(said.predicate is Predicate.BECAUSE for said in item.meaning)
 
 
@@ -330,7 +330,7 @@ def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.rand
 def announce_action(
     state: CoWizardState, view: CoWizardView, physical: Physical | None, rng: np.random.Generator
 ) -> None:
-    """Announces a manoeuvre of the own plan, by chance."""
+    """Announces a planned manoeuvre, by chance."""
     spoken = not state.speech.idle or view.speaking > 0.0
     if physical is None or spoken or state.intentions.directive is not None:
         return

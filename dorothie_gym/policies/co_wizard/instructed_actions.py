@@ -1,4 +1,4 @@
-"""Actions that the participant asks for, taken into the driving goals of the Co-Wizard."""
+"""Actions that the participant requests, converted to driving goals of the Co-Wizard."""
 
 from __future__ import annotations
 
@@ -125,4 +125,4 @@ OBEYED: Final[Mapping[ActionValue, Obey]] = MappingProxyType(
         ActionValue.LIGHT_CHANGE: _do_lights,
     }
 )
-"""What is done on an instruction, by the action that it names."""
+"""Reaction to an instruction, by the action that it names."""

@@ -1,4 +1,4 @@
-"""Beliefs of the Co-Wizard about propositions, from its own observations, and its reasons for what it does."""
+"""Beliefs of the Co-Wizard about propositions, from its own observations, and the reasons for its actions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NAMED_ACTIONS: Final = {
 """Manoeuvres that the Co-Wizard names, and the slot value of each."""
 
 OBEYED_WITHIN: Final = 15.0
-"""Longest time from an instruction to what it causes [s]."""
+"""Longest time from an instruction to its effect [s]."""
 
 DETOUR_TIME: Final = 30.0
 """Time for which an obstacle explains a U-turn [s]."""
@@ -39,7 +39,7 @@ Belief = Callable[[CoWizardState, CoWizardView, Proposition], bool | None]
 
 
 def believes(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    """Returns whether the Co-Wizard holds a proposition for true; None if it does not know."""
+    """Returns whether the Co-Wizard believes a proposition; None if it does not know."""
     belief = _BELIEFS.get(said.predicate)
     held = None if belief is None else belief(state, view, said)
     return held if held is None else held is not said.negated
@@ -65,12 +65,12 @@ def sees_far(view: CoWizardView) -> bool:
 
 
 def is_red_ahead(town: Town, view: CoWizardView) -> bool:
-    """Returns whether the next traffic light on the way is near and not green."""
+    """Returns whether the next traffic light on the route is near and not green."""
     return light_ahead(town, view.lane, view.station, view.time) not in (None, LightColour.GREEN)
 
 
 def present_action(view: CoWizardView) -> ActionValue:
-    """Returns what the car is doing."""
+    """Returns the current action of the car."""
     if view.standing:
         return ActionValue.STOP
     return NAMED_ACTIONS.get(view.manoeuvre or PhysicalAction.LANE_FOLLOW, ActionValue.LANE_FOLLOW)
@@ -181,7 +181,7 @@ _BELIEFS: Final[dict[Predicate, Belief]] = {
 
 
 def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | None:
-    """Returns why the car stands now, as the Co-Wizard knows from what it does; None if it cannot tell."""
+    """Returns why the car stands now, from the Co-Wizard's own actions; None if it does not know."""
     intentions, commands, goal = state.intentions, state.commands, state.beliefs.goal
     resting = view.time < commands.rest_until
     hazard = view.hazard if view.motion is Motion.HAZARD else commands.rest_for if resting else ObjectClass.UNLABELED
@@ -207,7 +207,7 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
 
 
 def reason_to_turn_round(state: CoWizardState, view: CoWizardView) -> Proposition | None:
-    """Returns why the car turns round now; None if the Co-Wizard cannot tell."""
+    """Returns why the car turns round now; None if the Co-Wizard does not know."""
     goal = state.beliefs.goal
     told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + OBEYED_WITHIN
     if state.intentions.wish is Wish.U_TURN or told:

@@ -18,11 +18,11 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend, repeated
 
 FRAGMENT = 3
-"""Largest number of words that are taken for the rest of a misheard utterance if they make no sense."""
+"""Largest number of meaningless words that count as the rest of a misheard utterance."""
 
 
 _REPEATABLE = act_builders.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
-"""Moves that are worth saying again."""
+"""Moves that are repeated on request."""
 
 _WITHOUT_CONTENT = frozenset(
     {
@@ -38,7 +38,7 @@ _WITHOUT_CONTENT = frozenset(
 """Moves that may be said without any content."""
 
 _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
-"""What is repeated as "I said ..."; other statements are made again as they were."""
+"""Moves that are repeated as "I said ..."; other statements are repeated unchanged."""
 
 
 def is_garbled(words: ParsedText) -> bool:
@@ -47,13 +47,13 @@ def is_garbled(words: ParsedText) -> bool:
 
 
 def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
-    """Returns whether the participant is to say again what was partly inaudible; never a stop, which cannot wait."""
+    """Returns whether to ask for a repetition of a partly inaudible utterance; never of a stop, which cannot wait."""
     stops = any(ActionValue.STOP in act.values(Slot.ACTION) for act in heard.acts)
     return is_partly_inaudible(heard.words.text) and not stops and state.speech.may_ask_back(view.time)
 
 
 def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:
-    """Returns whether a reply answers neither the question nor what the Co-Wizard has just asked back."""
+    """Returns whether a reply answers neither the question nor the Co-Wizard's counter-question."""
     if words.order is not None or act.slots:
         return False
     asked_back = act.move is DialogueMove.CLARIFY and state.speech.has_just_asked_back
@@ -97,7 +97,7 @@ def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionV
 
 
 def check_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Checks a destination against whose route instructions were given; if they go on, gives up its place.
+    """Checks a destination against whose route instructions were given; if they continue, gives up its place.
 
     The name may be right and the place wrong: there are several houses.
     """

@@ -1,4 +1,4 @@
-"""Orders that the participant repeats in vain: the Co-Wizard remarks on it, and asks for another way."""
+"""Orders that the participant repeats without success: the Co-Wizard remarks on them, and asks for another route."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _COUNTED: Final = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 
 
 def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) -> None:
-    """Records an order that is obeyed; remarks on the third equal one, and asks for another way.
+    """Records an order that is obeyed; remarks on the third equal one, and asks for another route.
 
     Args:
         state: working copy of the state.

@@ -64,7 +64,7 @@ class DialogueState:
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
         stop_instructed_at: time of the last instruction to stop [s].
-        stop_reason: why the car stops then: because it is told to, or because the participant says where it is.
+        stop_reason: why the car stops then: it is told to, or the participant says where the place is.
         u_turn_instructed_at: time of the last instruction to turn round [s].
         orders: latest U-turns and lane changes that the participant asked for, with their times [s].
         proposed: turn proposed to the participant and not answered yet.
@@ -184,7 +184,7 @@ class DialogueState:
         return replace(self, weather_mentioned=mentioned)
 
     def with_noticed(self, noticed: Noticed) -> DialogueState:
-        """Sets what has been noticed of weather and crowds."""
+        """Sets the noticed weather and crowds."""
         return self if noticed is self.noticed else replace(self, noticed=noticed)
 
     def with_contradictions(self, goal: LandmarkName | None, count: int) -> DialogueState:
@@ -204,11 +204,11 @@ class Intentions:
         directive: turn asked for.
         wish: manoeuvre asked for.
         wish_until: time at which the manoeuvre is given up [s].
-        halted: whether the car is to stand.
-        nudge: place a little further on at which the car is to stop again.
+        halted: whether the car has been told to stand.
+        nudge: place a little further on at which the car stops again.
         creeping: whether the goal is close and its guessed place is carried along ahead of the car.
         arrived: whether the car has stopped at its goal and waits for the next task.
-        sent_on: whether it has only stopped where it was told to drive to, which may be the goal.
+        sent_on: whether it has only reached the place that it was guided to, which may be the goal.
         pausing: whether the car stops before the junction ahead until the way is known.
         speed: target cruise speed [km/h].
         slow_until: time at which a temporary speed ends [s].
@@ -239,7 +239,7 @@ class Intentions:
         return replace(self, halted=False, arrived=False)
 
     def halting(self) -> Intentions:
-        """Lets the car stand; other intentions stay."""
+        """Makes the car stand; keeps other intentions."""
         return replace(self, halted=True)
 
     def stopped(self) -> Intentions:
@@ -247,11 +247,11 @@ class Intentions:
         return replace(self, halted=True, nudge=None, wish=None)
 
     def stopped_at_place(self, *, arrived: bool, sent_on: bool) -> Intentions:
-        """Lets the car stand at a place; `arrived` is true at a goal, `sent_on` at the end of a nudge."""
+        """Makes the car stand at a place; `arrived` is true at a goal, `sent_on` at the end of a nudge."""
         return replace(self, halted=True, nudge=None, arrived=arrived, sent_on=sent_on)
 
     def blocked(self) -> Intentions:
-        """Drops directive and nudge and lets the car stand before an obstacle."""
+        """Drops directive and nudge and makes the car stand before an obstacle."""
         return replace(self, directive=None, nudge=None, halted=True)
 
     def turning(self, directive: Directive) -> Intentions:
@@ -259,7 +259,7 @@ class Intentions:
         return replace(self, directive=directive, wish=None, halted=False, nudge=None, creeping=False, arrived=False)
 
     def directed(self, directive: Directive | None) -> Intentions:
-        """Sets the directive, or drops it (None); other intentions stay."""
+        """Sets or drops (None) the directive; keeps other intentions."""
         return replace(self, directive=directive)
 
     def turning_round(self, until: float, *, creeping: bool) -> Intentions:
@@ -294,7 +294,7 @@ class Intentions:
         return replace(self, nudge=place, halted=False)
 
     def proceeding(self) -> Intentions:
-        """Carries out an instruction to go on along the lane."""
+        """Carries out an instruction to continue along the lane."""
         return replace(self, halted=False, arrived=False, creeping=False, wish=None)
 
     def creeping_up(self) -> Intentions:
@@ -302,7 +302,7 @@ class Intentions:
         return replace(self, creeping=True, halted=False, arrived=False, directive=None)
 
     def for_new_goal(self) -> Intentions:
-        """Drops what was intended for another goal and ends a halt."""
+        """Drops the intentions for another goal and ends a halt."""
         return replace(self, directive=None, wish=None, nudge=None, halted=False, arrived=False, creeping=False)
 
     def for_unknown_goal(self) -> Intentions:
@@ -310,11 +310,11 @@ class Intentions:
         return replace(self, creeping=False, arrived=False)
 
     def without_goal(self) -> Intentions:
-        """Drops everything that was intended for the goal; a halt stays."""
+        """Drops all intentions for the goal; keeps a halt."""
         return replace(self, directive=None, nudge=None, wish=None, creeping=False, arrived=False)
 
     def departed(self) -> Intentions:
-        """Ends the stay at the goal; a halt stays."""
+        """Ends the stay at the goal; keeps a halt."""
         return replace(self, arrived=False)
 
     def with_pause(self, pausing: bool) -> Intentions:
@@ -322,7 +322,7 @@ class Intentions:
         return replace(self, pausing=pausing)
 
     def with_speed(self, speed: int) -> Intentions:
-        """Sets the target cruise speed [km/h]; the usual one stays."""
+        """Sets the target cruise speed [km/h]; keeps the usual one."""
         return replace(self, speed=speed)
 
     def slow_longer(self, seconds: float) -> Intentions:
@@ -352,14 +352,14 @@ class CommandState:
     Attributes:
         standing_since: start of the present standstill [s]; None while the car moves.
         reason: why the car stands, or stood last, as far as the Co-Wizard knows.
-        reason_since: since when it has stood for this reason [s].
+        reason_since: time since which it has stood for this reason [s].
         stood_until: end of the last standstill [s].
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
         manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
         stop_sent_at: time of the last Stop command [s].
         rest_until: end of a stop because of something in the way [s].
-        rest_for: what the car stops for.
+        rest_for: object that the car stops for.
         rest_decided: whether stopping at the present hazard has been decided on.
         ready_at: time before which the Co-Wizard has not reacted to an instruction yet, except to stop [s].
     """
@@ -388,7 +388,7 @@ class CommandState:
         return replace(self, standing_since=now, reason=None) if self.standing_since is None else self
 
     def with_reason(self, reason: Proposition | None, now: float) -> CommandState:
-        """Notes why the car stands; a reason that is not known any more stays."""
+        """Records why the car stands; a reason that is no longer known is kept."""
         return self if reason is None or reason == self.reason else replace(self, reason=reason, reason_since=now)
 
     def after_stop(self, now: float) -> CommandState:

@@ -31,10 +31,10 @@ class CoWizardView:
         speed: speed of the car [m/s].
         lane: lane of the car, corrected by the turn options.
         station: distance along the lane, corrected by the turn options [m].
-        speaking: remaining duration of the own utterance [s].
+        speaking: remaining duration of its own utterance [s].
         other_speaking: whether the other speaker is talking.
         motion: state of motion.
-        hazard: class of what the car brakes or stands for; UNLABELED for nothing.
+        hazard: class of the object that the car brakes or stands for; UNLABELED for nothing.
         manoeuvre: manoeuvre prepared or under way.
         angle: its angle [degrees].
         cruise: cruise speed [km/h].

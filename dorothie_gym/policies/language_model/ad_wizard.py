@@ -1,4 +1,4 @@
-"""The Ad-Wizard's interface to a language model: what it sees, and the changes of world and task that it can make."""
+"""The Ad-Wizard's interface to a language model: its prompt, and the changes of world and task that it can make."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class AdWizardMemory(Memory):
 
     Attributes:
         order: change that is to be made; None for none.
-        tasks: tasks, and what is reached, as they were last.
+        tasks: last observed state of the tasks.
     """
 
     order: AdWizardAction | None = None
@@ -128,7 +128,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
     def accept(
         self, observation: ObservationMapping, memory: AdWizardMemory, answer: Mapping[str, str]
     ) -> tuple[AdWizardMemory, int]:
-        """Takes in the change, with its message."""
+        """Processes the change, with its message."""
         now = scalar(observation, "time")
         memory = replace(memory, note=answer["note"], again_at=now + float(answer["again"]))
         order = exception_options(observation, memory.town).get(answer["change"])
@@ -167,7 +167,7 @@ def exception_options(observation: ObservationMapping, town: Town) -> dict[str, 
 
 
 def _road_options(observation: ObservationMapping, town: Town) -> dict[str, AdWizardAction]:
-    """Returns what can be put on the road ahead, and the removal of props."""
+    """Returns the choices of objects to place on the road ahead, and of props to remove."""
     options: dict[str, AdWizardAction] = {}
     for ahead in PROPS_AHEAD:
         place = place_on_path(town, observation, float(ahead))

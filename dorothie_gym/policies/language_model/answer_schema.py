@@ -45,7 +45,7 @@ class ChoiceField:
         return {"type": "string", "enum": list(self.labels), "description": self.meaning}
 
     def read(self, value: object) -> str:
-        """Returns the value; raises `CallError` if it is none of the labels."""
+        """Returns the value; raises `CallError` if it is not one of the labels."""
         if value is None:
             return self.default
         if isinstance(value, str) and value in self.labels:
@@ -72,7 +72,7 @@ class WordsField:
         return {"type": "string", "pattern": f"^{_WORDS}{{0,{self.length}}}$", "description": self.meaning}
 
     def read(self, value: object) -> str:
-        """Returns the words in the characters of utterances; raises `CallError` if the value is no text."""
+        """Returns the words in the characters of utterances; raises `CallError` if the value is not a text."""
         if value is None:
             return ""
         if not isinstance(value, str):
@@ -110,7 +110,7 @@ class AnswerSchema:
         A code fence around the object is removed; fields that are missing or null have their defaults.
 
         Raises:
-            CallError: it is no JSON object, has no field of the schema or one that is unknown, or a value is not
+            CallError: it is not a JSON object, has no field of the schema or one that is unknown, or a value is not
                 allowed.
         """
         fenced = _FENCE.match(text[:MAX_ANSWER])

@@ -33,7 +33,7 @@ class Reply:
     Attributes:
         answer: text of the answer; None after a fault.
         fault: the fault; None for an answer.
-        reason: what was wrong; empty for an answer.
+        reason: fault; empty for an answer.
         tokens: number of tokens of prompts and answers, of both attempts.
         retried: whether a second attempt was made.
         latency: time of the call [s].
@@ -59,7 +59,7 @@ class Cassette:
         path: the file; created with the first call if it is missing.
 
     Raises:
-        PolicyLoadError: the file cannot be read, or a line is no recorded call.
+        PolicyLoadError: the file cannot be read, or a line is not a recorded call.
     """
 
     def __init__(self, path: Path) -> None:

@@ -41,7 +41,7 @@ class Completion:
 
 
 class IncompleteError(CallError):
-    """A completion that is no answer; it has cost tokens all the same.
+    """Completion without a valid answer; its tokens are charged nevertheless.
 
     Attributes:
         tokens: as of `Completion`.

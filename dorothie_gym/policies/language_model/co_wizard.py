@@ -1,4 +1,4 @@
-"""The Co-Wizard's interface to a language model: when it is asked, and what its answers do."""
+"""The Co-Wizard's interface to a language model: times of calls, and effects of answers."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
     def attend(
         self, observation: ObservationMapping, memory: CoWizardMemory, delay: float
     ) -> tuple[CoWizardMemory, tuple[str, ...]]:
-        """Follows the route, and notices what is worth a call."""
+        """Follows the route, and detects events that are worth a call."""
         view = CoWizardView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
         navigator = memory.navigator.followed(memory.town, view)
@@ -132,7 +132,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
     def accept(
         self, observation: ObservationMapping, memory: CoWizardMemory, answer: Mapping[str, str]
     ) -> tuple[CoWizardMemory, int]:
-        """Takes in goal, mark, status, words, and the action to carry out."""
+        """Processes goal, mark, status, words, and the action to carry out."""
         view = CoWizardView.read(observation, memory.town)
         memory = with_talk(memory, answer, view.time)
         memory = _with_goal(memory, view, answer["goal"])

@@ -1,4 +1,4 @@
-"""The Co-Wizard's prompt: what it observes, in words, and the choices that its answer may take."""
+"""The Co-Wizard's prompt: its observation in words, and the choices for its answer."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SHOWN_OBJECTS = 6
 """Number of objects in sight that a prompt shows."""
 
 SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
-"""Names of several places, of which some may be missing from the map."""
+"""Names of several places, some of which may be missing from the map."""
 
 STRAIGHT_ANGLE = 180
 """Index of the angle 0 in the mask of angles."""
@@ -190,7 +190,7 @@ def prompt_text(
         town: the map.
         navigator: route to the goal.
         step: next step on it.
-        events: what has happened.
+        events: events since the last call, in words.
         goal: name of the goal; empty for none.
         talk: the conversation.
         note: note of the model to itself.

@@ -17,12 +17,12 @@ URL_VARIABLE: Final = "OPENAI_BASE_URL"
 
 
 class SimulatedTime(enum.StrEnum):
-    """What happens to the session while the model answers."""
+    """Behaviour of the session while the model answers."""
 
     WAITS = "waits"
     """Simulated time stands still: an answer takes effect in the decision in which it was asked for."""
     CHARGED = "charged"
-    """The session goes on: an answer takes effect after as much simulated time as the call took."""
+    """The session continues: an answer takes effect after as much simulated time as the call took."""
 
 
 @shared
@@ -30,7 +30,7 @@ class SimulatedTime(enum.StrEnum):
 class LanguageModelConfig:
     """Settings of a language model as a policy.
 
-    The key is no setting: the environment variable `OPENAI_API_KEY` is read at each call, and never recorded.
+    The key is not a setting: the environment variable `OPENAI_API_KEY` is read at each call, and never recorded.
 
     Attributes:
         model: name of the model, as the endpoint knows it.
@@ -39,7 +39,7 @@ class LanguageModelConfig:
         max_tokens: largest number of tokens of an answer.
         temperature: temperature of sampling; 0 for the most likely answer.
         quiet_time: longest time between two calls [s]; the model may ask for a shorter one.
-        time: what happens to the session while the model answers.
+        time: behaviour of the session while the model answers.
         pictures: whether prompts contain the picture of the camera, where the role observes one.
         cassette: file in which calls are recorded, and from which recorded ones are answered; None for none.
         offline: whether only recorded calls are answered; a call that is not in the cassette is an error.
@@ -91,7 +91,7 @@ class LanguageModelConfig:
         return cls(model=model, url=url)
 
     def record(self) -> dict[str, object]:
-        """Returns in JSON types what answers and actions follow from: neither address nor cassette."""
+        """Returns the settings that determine answers and actions, in JSON types: neither address nor cassette."""
         return {
             "max_tokens": self.max_tokens,
             "temperature": self.temperature,

@@ -21,15 +21,15 @@ class Fault(enum.StrEnum):
     REJECTED = "rejected"
     """Another status than 200: a wrong key or model, or a request that the server does not support."""
     NOT_A_COMPLETION = "not a completion"
-    """Content that is no chat completion, such as a page of a gateway."""
+    """Content other than a chat completion, such as a page of a gateway."""
     REFUSED = "refused"
     """The model declined to answer."""
     CUT_OFF = "cut off"
     """The answer ended at the limit of tokens."""
     NOT_JSON = "not JSON"
-    """The answer is no JSON object."""
+    """The answer is not a JSON object."""
     WRONG_SCHEMA = "wrong schema"
-    """The answer is JSON of another schema, or names what is not possible now."""
+    """The answer is JSON of another schema, or names an action that is not possible now."""
 
 
 ABOUT_THE_ANSWER = frozenset({Fault.REFUSED, Fault.CUT_OFF, Fault.NOT_JSON, Fault.WRONG_SCHEMA})
@@ -44,7 +44,7 @@ class CallError(Exception):
 
     Attributes:
         fault: kind of the fault.
-        reason: what is wrong, on one line; the model reads it when it is asked once more.
+        reason: fault, on one line; the model reads it when it is asked once more.
         wait: time after which the server wants to be asked again [s].
     """
 

@@ -24,11 +24,11 @@ class Prompt:
     """Prompt for one answer.
 
     Attributes:
-        system: who the model is and what the fields of the answer mean; the same in all calls of a role.
-        text: what the role observes now.
+        system: role of the model and meanings of the answer's fields; the same in all calls of a role.
+        text: current observation of the role.
         schema: schema of the answer.
         picture: picture of the camera as the address of a PNG (`data:image/png;base64,...`); empty for none.
-        seed: seed of sampling, which also tells equal prompts apart.
+        seed: seed of sampling, which also distinguishes equal prompts.
     """
 
     system: str
@@ -96,7 +96,7 @@ class LanguageModel:
         return reply
 
     def _call(self, request: Mapping[str, object], schema: AnswerSchema) -> Reply:
-        """Makes a call of at most two attempts; the second after what the server asks for or with the model's error."""
+        """Makes a call of at most two attempts, the second after a requested delay or with the model's error."""
         endpoint, begun = ChatEndpoint(self._config.url), self._clock()
         tokens, retried = (0, 0), False
         while True:
@@ -131,7 +131,7 @@ def _added(first: tuple[int, int], second: tuple[int, int]) -> tuple[int, int]:
 
 
 def _with_error(request: Mapping[str, object], text: str, error: CallError) -> dict[str, object]:
-    """Returns the request of the second attempt: the conversation goes on with the answer and what is wrong with it."""
+    """Returns the request of the second attempt: the conversation is continued by the answer and its error."""
     messages = list(request["messages"])  # type: ignore[call-overload]
     if text:
         messages.append({"role": "assistant", "content": text[:2000]})

@@ -1,6 +1,7 @@
 """Navigator of the Co-Wizard's prompt: the route over the map to the goal, and the step that is due on it.
 
-What it says follows from the observation and the map, which the Co-Wizard knows. The model decides what of it to do.
+Its output depends only on the observation and the map, which the Co-Wizard knows. The model decides which steps to
+take.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class RouteStep:
         angle: turn angle, or 90 and -90 for a lane switch [degrees, positive left].
         distance: distance to where it takes place [m].
         due: whether it is to be commanded now.
-        place: what tells steps of one kind apart: the lane.
+        place: lane, which distinguishes steps of one kind.
     """
 
     action: PhysicalAction
@@ -91,7 +92,7 @@ class Navigator:
         return replace(self, goal=goal, route=route.with_progress(progress))
 
     def followed(self, town: Town, view: CoWizardView) -> Navigator:
-        """Updates the progress with the place of the car, and plans another route where it has left the former one."""
+        """Updates the progress with the place of the car, and plans another route if it has left the previous one."""
         navigator = self._past_roadblocks(town, view)
         route = navigator.route
         if route.progress is None or view.manoeuvring:
@@ -108,7 +109,7 @@ class Navigator:
         return replace(navigator, route=route)
 
     def _past_roadblocks(self, town: Town, view: CoWizardView) -> Navigator:
-        """Notes what blocks the lane that the car stands on, and plans around it."""
+        """Records an obstacle on the car's lane, and plans around it."""
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
         if not held_up:
             return self

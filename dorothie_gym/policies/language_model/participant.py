@@ -1,4 +1,4 @@
-"""The participant's interface to a language model: tasks, the way to the place it guides to, and what it says."""
+"""The participant's interface to a language model: tasks, the route to the place it guides to, and its remarks."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class ParticipantMemory(Memory):
         guide: name of the place that it guides the car to; empty for none.
         progress: route to that place; None for none.
         told: step of the route that was pointed out last: kind, and lane.
-        tasks: the list of tasks, with what is reached, as it was last.
+        tasks: last observed list of tasks, with their states.
         standing_since: time since which the car stands [s]; None if it drives.
         told_standing: whether the present standstill was pointed out.
     """
@@ -83,7 +83,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
     def attend(
         self, observation: ObservationMapping, memory: ParticipantMemory, delay: float
     ) -> tuple[ParticipantMemory, tuple[str, ...]]:
-        """Follows the route, and notices what is worth a call."""
+        """Follows the route, and detects events that are worth a call."""
         view = ParticipantView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
         memory = replace(memory, progress=_followed(memory, view))
@@ -126,7 +126,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
     def accept(
         self, observation: ObservationMapping, memory: ParticipantMemory, answer: Mapping[str, str]
     ) -> tuple[ParticipantMemory, int]:
-        """Takes in words, and the place to guide to."""
+        """Processes words, and the place to guide to."""
         view = ParticipantView.read(observation, memory.town)
         memory = with_talk(memory, answer, view.time)
         label = answer["guide"]

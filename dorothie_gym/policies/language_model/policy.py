@@ -1,4 +1,4 @@
-"""Policy that asks a language model: event-driven calls, and what their answers do."""
+"""Policy that asks a language model: event-driven calls, and the effects of their answers."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class LanguageModelState:
         seed: seed of the role in the session.
         memory: memory of the role.
         usage: usage of the model so far.
-        events: what has happened since the last call, in words.
+        events: events since the last call, in words.
         asked_at: time of the last call [s]; None before the first.
         delay: simulated time that the last answer took [s].
         busy_until: time until which the model is occupied with a call [s].
@@ -73,10 +73,11 @@ class LanguageModelState:
 
 
 class LanguageModelPolicy(Policy[LanguageModelState]):
-    """Plays a role by asking a language model when something has happened.
+    """Plays a role by calling a language model after events.
 
-    A call that brings no answer, for whatever reason, is a silent action with a name (`Fault`): the role goes on as
-    before, and is asked again at the next event. With equal replies, as from a cassette, equal sessions follow.
+    A call that brings no answer, for whatever reason, is a silent action with a name (`Fault`): the role continues as
+    before, and the model is asked again at the next event. With equal replies, as from a cassette, equal sessions
+    follow.
     """
 
     reads_mask = True
@@ -115,7 +116,7 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
         return dict(state.usage.to_json())
 
     def step(self, observation: ObservationMapping, state: LanguageModelState) -> tuple[ActionDict, LanguageModelState]:
-        """Takes in the observation, asks the model if something has happened, and acts on its last answer."""
+        """Processes the observation, calls the model after an event, and acts on its last answer."""
         now = scalar(observation, "time")
         memory, events = self._interface.attend(observation, state.memory, state.delay)
         state = replace(state, memory=memory, events=(*state.events, *events))

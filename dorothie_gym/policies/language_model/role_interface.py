@@ -1,4 +1,4 @@
-"""Interface of a role to a language model: when to ask, what to show, and what an answer does."""
+"""Interface of a role to a language model: times of calls, prompts, and effects of answers."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Memory:
     Attributes:
         town: the map.
         clock: times of the decisions.
-        talk: what was said and heard, the latest last.
+        talk: utterances that were said and heard, the latest last.
         note: note of the model to itself.
         again_at: time at which the model wants to be asked again [s].
         speech: spans that are still to be spoken.
@@ -111,15 +111,14 @@ class RoleInterface(ABC, Generic[M]):
 
     @abstractmethod
     def attend(self, observation: ObservationMapping, memory: M, delay: float) -> tuple[M, tuple[str, ...]]:
-        """Takes in an observation.
+        """Processes an observation.
 
         Args:
             observation: observation of the role, with its action mask.
             memory: memory of the decision before.
             delay: simulated time that an answer takes [s].
 
-        Returns:
-            The memory, and what has happened that is worth a call, in words.
+        Returns: The memory, and the events that are worth a call, in words.
         """
 
     @abstractmethod
@@ -129,12 +128,12 @@ class RoleInterface(ABC, Generic[M]):
         Args:
             observation: observation of the role, with its action mask.
             memory: result of `attend`.
-            events: what has happened, in words.
+            events: events since the last call, in words.
         """
 
     @abstractmethod
     def accept(self, observation: ObservationMapping, memory: M, answer: Mapping[str, str]) -> tuple[M, int]:
-        """Takes in an answer of the schema.
+        """Processes an answer of the schema.
 
         Args:
             observation: observation of the role at present.

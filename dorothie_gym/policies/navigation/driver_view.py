@@ -1,4 +1,4 @@
-"""Inputs of a driver of `Navigation-v0` in records: what the car's sensors, map and instructions tell.
+"""Inputs of a driver of `Navigation-v0` in records: information from the car's sensors, map and instructions.
 
 The records are filled from the arrays of a world (`look`), or from an observation of the Co-Wizard (`read_view`).
 """
@@ -43,7 +43,7 @@ _SECTORS, _PARAMETERS = len(SECTORS), len(WeatherParameter)
 
 
 class DriverView:
-    """What a driver knows of the car and its surroundings at a decision."""
+    """Knowledge of a driver about the car and its surroundings at a decision."""
 
     time: Float  # [s]
     speed: Float  # [m/s]
@@ -111,7 +111,7 @@ class DriverArrays(NamedTuple):
     """Inputs and observation of a driver; each is one record, or one row in a batch.
 
     Attributes:
-        inputs: (1,) what the driver knows of the car and its surroundings.
+        inputs: (1,) knowledge about the car and its surroundings.
         heard: (1,) the last instruction.
         costs: (1,) costs of routes to the goal, if one is known.
         streets: (s,) names of the town's streets in the session: ids of `StreetName`.
@@ -159,7 +159,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
         town: arrays of the town.
         exits: exits of its junctions.
         world: arrays of the world.
-        driver: arrays of the driver, of which the view is written.
+        driver: arrays of the driver, whose view is written.
     """
     car, control, frame, view = world.vehicles[0], world.car[0], world.clock[0].frame, driver.inputs[0]
     view.time, view.speed, view.hazard = frame / FRAME_RATE, car.speed, control.hazard
@@ -200,7 +200,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
 
 @compiled
 def believed_junction(exits: ExitArrays, before: int, lane: int) -> int:
-    """Returns the lane before the next junction with a choice, as its turn options and the estimated pose tell it.
+    """Returns the lane before the next junction with a choice, from its turn options and the estimated pose.
 
     Args:
         exits: exits of the town's junctions.
@@ -208,7 +208,7 @@ def believed_junction(exits: ExitArrays, before: int, lane: int) -> int:
         lane: lane at the estimated pose.
 
     Returns:
-        The lane, or -1 where more options than are observed do not tell it, and the pose does not either.
+        The lane, or -1 if neither the options, of which there are more than observed, nor the pose determine it.
     """
     first = exits.first[before]
     if exits.alone[before]:

@@ -72,11 +72,11 @@ Step: TypeAlias = tuple[int, int, int, int, int, int, int, float]
 
 @compiled
 def attend(world: WorldArrays, guide: InstructorArrays) -> None:
-    """Reads what the instructor sees now from the arrays of a world.
+    """Reads the instructor's view from the arrays of a world.
 
     Args:
         world: arrays of the world.
-        guide: the instructor, of which `now` and the static bodies in sight are written.
+        guide: the instructor, whose `now` and static bodies in sight are written.
     """
     view, plan, car, frame = guide.now[0], world.plan[0], world.vehicles[0], world.clock[0].frame
     view.lane, view.station, view.speed, view.time = plan.lane, plan.station, car.speed, frame / FRAME_RATE

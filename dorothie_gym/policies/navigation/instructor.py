@@ -26,7 +26,7 @@ class Guidance(enum.StrEnum):
     """Level at which the participant guides."""
 
     TURNS = "turns"
-    """Turn by turn, before each junction; at the end, the distance to the place where the car is to stop."""
+    """Turn by turn, before each junction; at the end, the distance to the stopping place."""
 
     GOALS = "goals"
     """By the name of the next goal; turn by turn only to places that are not on the Co-Wizard's map."""

@@ -42,7 +42,7 @@ class StepKind(enum.IntEnum):
 
 
 class ViewRecord:
-    """What the instructor sees at a decision."""
+    """View of the instructor at a decision."""
 
     station: Float  # place of the car [m]
     speed: Float  # [m/s]
@@ -114,7 +114,7 @@ class InstructorArrays(NamedTuple):
     """Instructor of an environment.
 
     Attributes:
-        now: (1,) what it sees now.
+        now: (1,) its current view.
         subgoals: subgoals, as they are now.
         marks: landmarks by their rows.
         names: `StreetName` of each street of the town.

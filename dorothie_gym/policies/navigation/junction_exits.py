@@ -34,7 +34,7 @@ class SectorExit:
     Attributes:
         angle: angle of the exit, from the car's own lane where that has one [degrees, positive left].
         lane: lane behind the junction.
-        own: whether the exit can be reached from the own lane; otherwise the car has to change lanes before.
+        own: whether the exit can be reached from the car's lane; otherwise the car has to change lanes before.
         connectors: lanes across the junction that lead to the exit, from all lanes of the direction.
     """
 
@@ -120,7 +120,7 @@ class ExitArrays(NamedTuple):
         street: (lanes,) int32 number of each lane's street.
         ahead: (lanes,) int32 lane before the next junction with a choice on the default lanes, -1 for none.
         first: (lanes,) int32 first of the lanes before a junction whose observed exits are the same as those of a lane;
-            -1 for lanes that no observed exits tell.
+            -1 for lanes that observed exits do not determine.
         alone: (lanes,) whether there is no other such lane.
     """
 

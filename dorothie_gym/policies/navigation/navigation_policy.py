@@ -87,7 +87,7 @@ def next_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) ->
     """Returns the step to carry out now; None where there is no other than those given already.
 
     It is the step that the instructor of `Navigation-v0` would give: turns shortly before they are due, destinations
-    by name, Stop with the distance to where the car is to stand.
+    by name, Stop with the distance to the stopping place.
     """
     intentions = state.intentions
     stopped = view.motion is Motion.STOPPED and view.standing
@@ -133,7 +133,7 @@ def _turn_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) -
 
 
 def note_driving(state: CoWizardState, view: CoWizardView) -> None:
-    """Updates the intentions of the Co-Wizard from what the car does, independently of the driver's commands.
+    """Updates the intentions of the Co-Wizard from the car's motion, independently of the driver's commands.
 
     Args:
         state: working copy of the state.

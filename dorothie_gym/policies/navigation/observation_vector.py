@@ -1,4 +1,4 @@
-"""Observation vector of `Navigation-v0`: numbers in [-1, 1] computed from what the Co-Wizard knows."""
+"""Observation vector of `Navigation-v0`: numbers in [-1, 1] computed from the Co-Wizard's knowledge."""
 
 from __future__ import annotations
 

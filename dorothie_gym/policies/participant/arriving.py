@@ -27,10 +27,10 @@ STOP_REPEAT = 5.0
 """Time after which the stop instruction is repeated [s]."""
 
 REACTION = 1.8
-"""Time in which a car that has heard an instruction to stop begins to brake [s]."""
+"""Time after which a car that has heard an instruction to stop begins to brake [s]."""
 
 PASSED = 15.0
-"""Distance behind the place up to which a stop instruction that is not heeded is repeated [m]."""
+"""Distance behind the place up to which a stop instruction that was not obeyed is repeated [m]."""
 
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
@@ -105,7 +105,7 @@ def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
 
 
 def prepare_stop(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
-    """Chooses the words to stop the car with ahead, because their duration decides when they have to be said."""
+    """Chooses the words of a stop instruction in advance, because their duration determines when to say them."""
     if not state.guidance.stop_text:
         _choose_stop_words(state, rng)
     if room_to_stop(state, view, left)[0] < -state.config.late_stop:
@@ -224,8 +224,8 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place.
 
-    A car that does not move is asked why instead of being told a third time; then it is told to go straight on, as a
-    junction may be what it waits before, and to start.
+    A car that does not move is asked why instead of being told a third time; then it is told to go straight on, in case
+    it waits before a junction, and to start.
     """
     assert state.route.progress is not None
     since = view.time if state.motion.standing_since is None else state.motion.standing_since

@@ -12,7 +12,7 @@ from dorothie_gym.policies.persona import Directions, Persona, within
 from dorothie_gym.policies.policy import replace
 
 BACKSEAT = 0.22
-"""Knowledge times talkativeness above which a participant guides to known places, too; two in five do."""
+"""Knowledge times talkativeness above which a participant also guides to known places; two in five do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class ParticipantConfig(GuidanceConfig):
         corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
         careful_speeds: speeds asked for where the goal is easily missed [km/h].
-        manoeuvre_cost: extra cost of each lane change and U-turn on a way that is to be described in words [m].
+        manoeuvre_cost: extra cost of each lane change and U-turn on a route that has to be described in words [m].
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
@@ -70,7 +70,7 @@ class ParticipantConfig(GuidanceConfig):
         arrival_distance: distance to the goal within which other remarks are dropped [m].
         elsewhere_distance: distance to the goal beyond which a standing car is elsewhere [m].
         explains_order: probability that the order of two tasks is explained by naming the first one.
-        nods_first: probability that a remark begins with an acknowledgement of what was heard meanwhile.
+        nods_first: probability that a remark begins with an acknowledgement of utterances heard meanwhile.
         just_said: time after an answer within which the same question needs no other one [s].
         unsure: probability that a yes is preceded by hesitation.
         checked_within: time within which a question refers to the last instruction [s].
@@ -152,7 +152,7 @@ class ParticipantStyle:
         names_street: probability that a street is added to a place or a turn.
         hurries: probability that the next task follows in the same breath as the report of the last.
         patience: standstill after which the reason is asked for [s].
-        chat: mean time between remarks beside the task [s].
+        chat: mean time between remarks unrelated to the task [s].
         waits: probability that a turn is announced only if the car asks, or shortly before the junction.
         hints: probability that a step is phrased as an explanation instead of an instruction.
         reasons: probability that a reason is given with a place or a step.
@@ -160,7 +160,7 @@ class ParticipantStyle:
         nods: probability that explanations of the car are acknowledged.
         curious: probability of a question why the car does something unexpected.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
-        puzzled: probability that words of the car said during an own utterance have to be repeated.
+        puzzled: probability that words of the car said during the participant's utterance have to be repeated.
         points_out: probability that a car is stopped by the statement that this is the place.
         thanks: probability that an answer of the car is acknowledged.
         verifies: probability that a destination is followed by the question whether the car knows it.
@@ -186,7 +186,7 @@ class ParticipantStyle:
 
     @classmethod
     def of(cls, persona: Persona, rng: np.random.Generator) -> ParticipantStyle:
-        """Returns the style of a persona; the random generator adds what is the speaker's own."""
+        """Returns the style of a persona; the random generator adds individual variation."""
         precise, vague = persona.directions is Directions.TURNS, persona.directions is Directions.VAGUE
         landmarks = persona.directions is Directions.LANDMARKS
         by_turns = persona.knowledge * persona.talkativeness > BACKSEAT

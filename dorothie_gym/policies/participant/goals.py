@@ -34,7 +34,7 @@ from dorothie_gym.tasks.purposes import Purpose, read_purposes
 
 
 def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Compares the subgoals with those of the last decision, and reports what has changed."""
+    """Compares the subgoals with those of the last decision, and reports changes."""
     before, tasks = state.task, str(view.raw["tasks"])
     state.speech = state.speech.hold(view.time + seconds_to_take_in(view))
     state.task = state.task.with_subgoals(view.subgoals, tasks)
@@ -81,7 +81,7 @@ def _report_done(
 
 
 def _wording_of_meeting(view: ParticipantView, subgoal: SeenSubgoal) -> Wording:
-    """Returns the wording of the report that somebody was picked up, or only met."""
+    """Returns the wording of the report that a person was picked up, or only met."""
     purpose = purpose_of(view, subgoal.index)
     picks_up = purpose is not None and purpose.action is not None and purpose.action.startswith("pick up")
     return Wording(topic="picked_up" if picks_up else "met")
@@ -156,7 +156,7 @@ def _go_first(
 
 
 def switch_target(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
-    """Puts off the target for another subgoal, which the car already knows or is about to hear of."""
+    """Postpones the target in favour of another subgoal, which the car already knows or is about to hear of."""
     state.task = state.task.put_off_target()
     state.forget_target()
     _aim_at(state, view, subgoal, landmark)
@@ -234,7 +234,7 @@ def _report_changed(
 
 
 def _line_of(subgoal: SeenSubgoal, subgoals: Sequence[SeenSubgoal], listed: str) -> str | None:
-    """Returns what the list of errands says of a subgoal; None if it is not on the list."""
+    """Returns the purpose of a subgoal in the list of errands; None if it is not on the list."""
     live = (each.index for each in subgoals if each.live)
     return dict(zip(live, listed.split("\n"), strict=False)).get(subgoal.index)
 
@@ -242,7 +242,7 @@ def _line_of(subgoal: SeenSubgoal, subgoals: Sequence[SeenSubgoal], listed: str)
 def _report_more(
     state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator
 ) -> None:
-    """Tells what else is to be done at the target, or, by chance, at the place of a later errand."""
+    """States further tasks at the target, or, by chance, at the place of a later errand."""
     if subgoal.index == state.task.target:
         state.say(*story_remark(state, view, rng))
         return
@@ -268,7 +268,7 @@ def _report_same_place(
     landmark: SeenLandmark,
     rng: np.random.Generator,
 ) -> None:
-    """Tells what else is to be done at the target, or which place of its name is meant now."""
+    """States further tasks at the target, or which place of its name is meant now."""
     reason = story_remark(state, view, rng) if former.place == landmark.place else ()
     state.say(*(reason or (intend(Function.REQUEST, act_builders.destination(landmark.name, landmark.street)),)))
 
@@ -321,15 +321,15 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 _SPOKEN_OF = 15.0
-"""Time for which who was spoken of is understood as "she" [s]."""
+"""Time for which "she" refers to the person mentioned last [s]."""
 
 
 PURPOSES = 0.75
-"""Probability that an errand is explained by what it is for rather than by why it matters."""
+"""Probability that an errand is explained by its purpose rather than by its reason."""
 
 
 def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns what the target is for, or why it matters, as the story tells; nothing where the story does not."""
+    """Returns the purpose of the target, or its reason, from the story; nothing if the story gives none."""
     told, goal = purpose_of_target(state, view), state.task.goal
     if told is None or goal is None:
         return ()
@@ -358,7 +358,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> bool:
-    """Returns whether a recent remark has told what the target is for, and thereby who or what is spoken of."""
+    """Returns whether a recent remark has stated the target's purpose, and thereby the person or thing in question."""
     if not state.speech.has_just_spoken(view.time, _SPOKEN_OF):
         return False
     recent = (said for item in state.speech.said[-3:] for said in item.meaning)
@@ -367,19 +367,19 @@ def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: Seen
 
 
 def _as_afterthought(item: Remark) -> Remark:
-    """Returns a reason as it is said behind what it is a reason for: "because ..."."""
+    """Returns the wording of a reason after the clause that it explains: "because ..."."""
     if item.wording.topic != "reason":
         return item
     return replace(item, wording=dataclasses.replace(item.wording, topic="reason_after"))
 
 
 def purpose_of_target(state: ParticipantState, view: ParticipantView) -> Purpose | None:
-    """Returns the purpose of the target; None without a target, or if the list does not tell."""
+    """Returns the purpose of the target; None without a target, or if the list does not name it."""
     return None if state.task.target is None else purpose_of(view, state.task.target)
 
 
 def purpose_of(view: ParticipantView, index: int) -> Purpose | None:
-    """Returns the purpose of a subgoal, by its index; None if the list does not tell."""
+    """Returns the purpose of a subgoal, by its index; None if the list does not name it."""
     live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
     return dict(zip(live, read_purposes(str(view.raw["tasks"])), strict=False)).get(index)
 

@@ -1,4 +1,4 @@
-"""Hints of the participant that help to find the target, from its map and from what the place looks like; feelings."""
+"""Hints of the participant that help to find the target, from its map and the look of the place; feelings."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ _SIGNS = {
 }
 
 _CLOSE, _FAR = 120.0, 220.0
-"""Way to the target up to which it is called close, and from which on it is called far [m]."""
+"""Route length up to which the target is called close, and from which it is called far [m]."""
 
 _MEASURED = 60.0, 350.0
-"""Ways to the target whose length is told [m]."""
+"""Range of route lengths that are stated [m]."""
 
 _PROGRESS = frozenset({Predicate.CLOSE, Predicate.DISTANCE, Predicate.RIGHT_WAY})
-"""What is told to a car that finds the way by itself."""
+"""Facts that are stated to a car that finds its own route."""
 
 _IN_MIND = 12.0
 """Time for which a place that was named is understood as "it" [s]."""
@@ -51,7 +51,7 @@ _FEELINGS = 0.25
 
 
 def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark that helps to find the target or tells a feeling; nothing where all of it has been said."""
+    """Returns a remark that helps to find the target or expresses a feeling; nothing if all has been said."""
     felt = _feeling(state, view)
     if felt is not None and rng.random() < _FEELINGS:
         return (_said(state, felt),)
@@ -77,12 +77,12 @@ def is_in_mind(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _can_name(fact: Proposition) -> bool:
-    """Returns whether a fact can be said with the name of the place: not with that of another one besides."""
+    """Returns whether a fact can be said together with the name of the place: not if it names another place."""
     return fact.get("landmark") is None
 
 
 def looks_remark(state: ParticipantState, goal: SeenLandmark, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about what a place looks like, as the scene of the camera has it; nothing if it is unknown."""
+    """Returns a remark about the look of a place, as in the camera's scene; none if it is unknown."""
     features = list(_looks(goal))
     return (_said(state, features[int(rng.integers(len(features)))]),) if features else ()
 
@@ -112,7 +112,7 @@ def _said(state: ParticipantState, content: Proposition, *, names_place: bool = 
 
 
 def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Proposition]:
-    """Yields what is known of the way to the target and of its place."""
+    """Yields known facts about the route to the target and about its place."""
     goal, progress = state.task.goal, state.route.progress
     if goal is None:
         return
@@ -142,7 +142,7 @@ def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Propositi
 
 
 def corner_fact(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> Proposition | None:
-    """Returns at which corner a place lies; None if it lies at none, or the streets have no names."""
+    """Returns the corner at which a place lies; None if there is none, or if the streets have no names."""
     cross = corner_of(state.town, state.town.lanes[goal.lane].street, goal.x, goal.y)
     names = view.raw["street_names"]
     crossing = StreetName(int(names[cross])) if cross is not None and cross < len(names) else StreetName.UNKNOWN
@@ -164,13 +164,13 @@ def _side(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) ->
 
 
 def _rounded(metres: float) -> int:
-    """Returns a length as it is told: to tens, from 200 m on to fifties [m]."""
+    """Returns a length rounded for speech: to tens, from 200 m on to fifties [m]."""
     step = 10.0 if metres < 195.0 else 50.0
     return round(step * round(metres / step))
 
 
 def _feeling(state: ParticipantState, view: ParticipantView) -> Proposition | None:
-    """Returns what the participant feels now, and why; None for nothing particular, or if it was said before."""
+    """Returns the participant's current feeling, and its reason; None if there is none, or if it was stated before."""
     goal, progress, motion = state.task.goal, state.route.progress, state.motion
     if motion.standstill(view.time) > state.style.patience and view.time >= motion.excused_until:
         felt = Proposition.of(Predicate.FEELS, feeling="impatient", cause=Proposition.of(Predicate.STANDS))

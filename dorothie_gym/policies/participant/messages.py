@@ -1,4 +1,4 @@
-"""Messages to the participant: the time to read them or to hear them out, and what is told of them."""
+"""Messages to the participant: the time to read or hear them, and remarks about them."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this
 
 
 def refers_back(text: str) -> bool:
-    """Returns whether a text has a pronoun, so that who or what is meant has to be said before."""
+    """Returns whether a text has a pronoun, whose antecedent has to be mentioned before."""
     return _PRONOUN.search(text) is not None
 
 
 def seconds_to_take_in(view: ParticipantView) -> float:
-    """Returns the time to read the message that has just arrived, or to hear a caller out [s]; 0 without one."""
+    """Returns the time to read the message that has just arrived, or to listen to a caller [s]; 0 without one."""
     message = _message(view)
     if message is None:
         return 0.0
@@ -43,7 +43,7 @@ def seconds_to_take_in(view: ParticipantView) -> float:
 def message_remark(
     state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
-    """Returns who has just sent a message about an errand, and why; nothing without a reason, or by chance."""
+    """Returns remarks on sender and reason of the last message about an errand; none without a reason, or by chance."""
     read = _message(view)
     if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
         return ()

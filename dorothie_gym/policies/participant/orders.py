@@ -1,4 +1,4 @@
-"""Orders of the participant: what the car is to do, asked for, answered, or said again."""
+"""Orders of the participant: actions and destinations that it requests, gives as answers, or repeats."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FUNCTIONS: Final = MappingProxyType(
         DialogueMove.CLARIFY: CommunicativeFunction.CORRECTION,
     }
 )
-"""What is done with an order, by the move."""
+"""Communicative function of an order, by move."""
 
 
 def order(
@@ -31,18 +31,18 @@ def order(
     place: LandmarkName | None = None,
     urgent: bool = False,
 ) -> Remark:
-    """Returns the remark that the car is to carry out an action.
+    """Returns the remark that instructs the car to carry out an action.
 
     Args:
         move: an instruction, an answer to an open question, or a clarification.
         action: the action.
         wording: further particulars; direction and speed are part of the content.
-        street: street on which, or onto which.
-        place: place at which.
+        street: street of the action, or street to enter.
+        place: place of the action.
         urgent: whether it may be said without leaving the car time to answer.
 
     Raises:
-        KeyError: the move is none of the three.
+        KeyError: the move is not one of the three.
     """
     particulars = Wording() if wording is None else wording
     wanted = act_builders.action(

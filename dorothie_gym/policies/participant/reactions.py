@@ -1,4 +1,4 @@
-"""Remarks of the participant about weather, obstacles, standstills, and beside the task."""
+"""Remarks of the participant about weather, obstacles, standstills, and subjects unrelated to the task."""
 
 from __future__ import annotations
 
@@ -36,10 +36,12 @@ _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATI
 """Parameters of the weather that have a reaction of their own."""
 
 _HASTE, _HURRIED = 5, 0.75
-"""Speed that a hurried participant adds to what suits the sight [km/h], and the trait `hurries` of such a one."""
+"""Speed that a hurried participant adds to the speed suitable for the sight [km/h], and the trait `hurries` from which
+it does so.
+"""
 
 _SPEEDING_UP = 130.0
-"""Way to the place on which the participant asks for no more speed [m]."""
+"""Route length to the place below which the participant does not ask for more speed [m]."""
 
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the head lights [s]."""
@@ -152,7 +154,7 @@ def _mention_view(state: ParticipantState, view: ParticipantView, rng: np.random
 
 
 def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Asks the car to slow down in bad weather, to what suits the sight, and to speed up afterwards."""
+    """Asks the car to slow down in bad weather, to a speed suitable for the sight, and to speed up afterwards."""
     fog = weather(view.raw, WeatherParameter.FOG_DENSITY)
     rain = weather(view.raw, WeatherParameter.PRECIPITATION)
     config, limit = state.config, limit_of(view.raw)
@@ -257,7 +259,7 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
 
 
 def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Says something beside the task when no step of the guidance is near."""
+    """Makes a remark unrelated to the task when no step of the guidance is near."""
     progress = state.route.progress
     if view.time < state.conversation.chat_at or view.standing or progress is None or state.task.goal is None:
         return
@@ -275,7 +277,7 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 
 def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
-    """Returns a question about the drive that names nothing: what the car knows, or how it gets on."""
+    """Returns a general question about the drive: what the car knows, or how the drive is going."""
     asked = [Proposition.of(predicate) for predicate in (Predicate.SAFE, Predicate.VISIBILITY, Predicate.RIGHT_WAY)]
     asked += [Proposition.of(Predicate.LOCALISED), Proposition.of(Predicate.LOCALISED, negated=True)]
     if state.task.goal is not None and not state.guidance.guiding:

@@ -58,16 +58,16 @@ _REPLIES = frozenset(
 _SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
 
 _POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
-"""What a car says that cannot see well."""
+"""Remarks of a car with a poor view."""
 
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 """Moves that may follow an acknowledgement in the same breath."""
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
-"""Actions that are wanted at once and are not steps of the way."""
+"""Actions that are wanted immediately and are not steps of the route."""
 
 _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
-"""Beginning of a question for the destination of which no more was understood."""
+"""Beginning of a question for the destination, the rest of which was not understood."""
 
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
 """Words by which the car says that it has come to a place."""
@@ -224,10 +224,10 @@ def _explanation(
 def _answer_to_why(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Takes up why the car stands.
+    """Reacts to the car's reason for a standstill.
 
-    Denies that it has arrived, where it has not, names the way that it does not know, and repeats where to go if it
-    still stands at the place of a former errand.
+    Denies a wrong claim of arrival, gives directions that the car asks for, and repeats the destination if it still
+    stands at the place of a previous errand.
     """
     goal, said, places, asked = state.task.goal, words.text.lower(), act.values(Slot.LANDMARK), state.speech.last
     if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:
@@ -250,7 +250,7 @@ def _answer_to_why(
 
 
 def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
-    """Returns the sign that an explanation was heard: a reason for a stop, something to be seen, or anything else."""
+    """Returns an acknowledgement of an explanation: a reason for a stop, something to be seen, or anything else."""
     said = {value for act in heard.acts for value in act.slots}
     objects = any(isinstance(value, ObjectClass) for value in said)
     reason = ActionValue.STOP in said or (objects and view.standing)
@@ -335,7 +335,7 @@ def _confusion(
 
 
 def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated as it was: a question, a yes or no, small talk, an action no step names."""
+    """Returns whether a remark is repeated unchanged: a question, a yes or no, small talk, an action no step names."""
     if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)

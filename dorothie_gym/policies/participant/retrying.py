@@ -1,4 +1,4 @@
-"""Another attempt, and a remark about it, where the guidance of the participant has failed twice in the same way."""
+"""Another attempt, and a remark about it, if the participant's guidance has failed twice in the same way."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ REMARK_EXPIRES = 8.0
 
 
 def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bool) -> None:
-    """Remarks that the place was missed again, and goes round the block instead of turning round.
+    """Remarks that the place was missed again, and guides round the block instead of turning round.
 
     Args:
         state: working copy of the state.
         view: observation.
-        passed: whether the car has driven past the place; otherwise it has left the way shortly before it.
+        passed: whether the car has driven past the place; otherwise it has left the route shortly before it.
     """
     state.guidance = replace(state.guidance, passes=state.guidance.passes + passed)
     passes, goal = state.guidance.passes, state.task.goal
@@ -45,7 +45,7 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
 
 
 def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView) -> bool:
-    """Counts a turn that was announced and not taken; returns whether another way is tried because of it."""
+    """Counts a turn that was announced and not taken; returns whether another route is tried because of it."""
     step = state.guidance.step
     assert step is not None
     state.guidance = state.guidance.after_wrong_turn(step)
@@ -60,7 +60,7 @@ def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView) -> bool
 
 
 def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
-    """Chooses another way after U-turns or lane changes that did not bring the car on its way."""
+    """Chooses another route after U-turns or lane changes that brought no progress."""
     progress, guidance = state.route.progress, state.guidance
     assert progress is not None
     if any(item.act.move in _ANSWERS for item in state.speech.queue):
@@ -86,7 +86,7 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
 
 
 def why_standing(state: ParticipantState, view: ParticipantView) -> Remark:
-    """Returns the question why the car stands although it was told to drive on, instead of telling it a third time."""
+    """Returns the question why the car stands, instead of a third instruction to drive on."""
     stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
     state.conversation = state.conversation.after_asking_why(view.time)
     return intend(CommunicativeFunction.SET_QUESTION, stands)
@@ -99,7 +99,7 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
 
 
 def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
-    """Plans a way that avoids manoeuvres, and says why."""
+    """Plans a route that avoids manoeuvres, and says why."""
     progress = state.route.progress
     assert progress is not None
     cost = state.config.way_round_cost

@@ -25,14 +25,14 @@ StepKey: TypeAlias = tuple[str, int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class ConversationState:
-    """Course of the conversation beside the guidance.
+    """Course of the conversation apart from the guidance.
 
     Attributes:
         heard_at: time of the last utterance of the car [s].
         puzzled_by: utterance of the car that was not understood and has to be repeated.
         asked_at: time of the last question why the car stands [s].
         wondered_at: time at which unexpected behaviour was last asked about or ignored [s].
-        chat_at: time of the next remark beside the task [s].
+        chat_at: time of the next remark unrelated to the task [s].
         lights_at: time at which the head lights were last mentioned [s].
         slowed: whether a lower speed for the weather has been requested or was not needed.
         bad_weather_since: start of the present bad weather [s]; infinite in good weather.
@@ -72,7 +72,7 @@ class ConversationState:
         return replace(self, wondered_at=now)
 
     def with_next_chat(self, at: float) -> ConversationState:
-        """Sets the time of the next remark beside the task [s]."""
+        """Sets the time of the next remark unrelated to the task [s]."""
         return replace(self, chat_at=at)
 
     def after_mentioning_lights(self, now: float) -> ConversationState:
@@ -99,7 +99,7 @@ class ConversationState:
         return replace(self, slowed=slowed)
 
     def with_noticed(self, noticed: Noticed) -> ConversationState:
-        """Sets what has been noticed of weather and crowds."""
+        """Sets the noticed weather and crowds."""
         return self if noticed is self.noticed else replace(self, noticed=noticed)
 
     def after_hurrying(self) -> ConversationState:
@@ -109,7 +109,7 @@ class ConversationState:
 
 @dataclass(frozen=True, kw_only=True)
 class TaskProgress:
-    """Subgoals, and the target: the subgoal that the car is to do now.
+    """Subgoals, and the target: the car's current subgoal.
 
     Attributes:
         subgoals: subgoals at the last decision.
@@ -122,9 +122,9 @@ class TaskProgress:
         same_breath: whether the next task is named in the same breath as the report of the last one.
         next_at: time before which the next task is not named unless the car asks [s].
         resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
-        put_off: subgoals that were interrupted and are to be resumed.
-        told: what has been said about the way to the target, its place, and what the speaker feels about it.
-        finished: landmark of the last errand that is done, and when it was done [s].
+        put_off: interrupted subgoals, which will be resumed.
+        told: statements made about the route to the target, its place, and the speaker's feelings about it.
+        finished: landmark of the last completed errand, and the time of its completion [s].
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()
@@ -154,7 +154,7 @@ class TaskProgress:
         return replace(self, target=None, goal=None, announced=False, described=False, told=frozenset())
 
     def after_telling(self, said: Proposition) -> TaskProgress:
-        """Records what has been said about the target."""
+        """Records a statement about the target."""
         return replace(self, told=self.told | {said})
 
     def after_announcement(self, now: float) -> TaskProgress:

@@ -34,7 +34,7 @@ class ParticipantView:
         speed: speed of the car [m/s].
         lane: lane of the car.
         station: distance along the lane [m].
-        speaking: remaining duration of the own utterance [s].
+        speaking: remaining duration of its own utterance [s].
         other_speaking: whether the other speaker is talking.
         landmarks: all landmarks.
         subgoals: all subgoals.

@@ -29,18 +29,18 @@ _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionVal
 """Actions that are left to the car."""
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
-"""Actions that determine the way."""
+"""Actions that determine the route."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 JUST_DONE = 12.0
-"""Time for which the last errand is what a car that asks whether it has arrived means [s]."""
+"""Time for which a car that asks whether it has arrived refers to the last errand [s]."""
 
 
 def check(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Confirms what the car wants verified, or corrects it."""
+    """Confirms or corrects a check of the car."""
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     goal = state.task.goal
     if goal is not None and landmarks:
@@ -59,7 +59,7 @@ def check(
 
 
 def checked(state: ParticipantState, act: DialogueAct, words: ParsedText) -> Proposition:
-    """Returns what the car wants verified or proposes: a destination, an action, or the present destination."""
+    """Returns the subject of a check or proposal of the car: a destination, an action, or the current destination."""
     place = act_builders.first_name(act.values(Slot.LANDMARK))
     street = next((value for value in act.values(Slot.STREET) if isinstance(value, StreetName)), None)
     wanted = next((value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue)), None)
@@ -216,7 +216,7 @@ def go_first(name: LandmarkName) -> Remark:
 
 
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
-    """Accepts a detour that is the participant's own, and insists on the own one otherwise."""
+    """Accepts a detour that is the participant's own; otherwise insists on the participant's."""
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     if own is None or own in act.values(Slot.STREET):
@@ -260,7 +260,7 @@ def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def correct_arrival(state: ParticipantState, view: ParticipantView, said: Proposition | None = None) -> None:
-    """Denies what a car that stands just before the target asks or says, by default that it is there; sends it on."""
+    """Denies a question or statement (by default that it has arrived) of a car just before the target; sends it on."""
     assert state.task.goal is not None
     arrived = Proposition.of(Predicate.ARRIVED, place=state.task.goal.name)
     state.say_only(denied(said or arrived), replace(creep_instruction(state, view), joined=True))

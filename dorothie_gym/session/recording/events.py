@@ -206,7 +206,7 @@ class InfractionRecord:
         type: the rule: one of `events.INFRACTIONS`.
         lane: lane of the car; None if not recorded, like `station`.
         station: distance along the lane [m].
-        x: of the car [m], or None; `y` likewise.
+        x: x coordinate of the car [m], or None; `y` likewise.
         key: number of the counterpart (of a body, or of a light or sign); None without one.
         other: class of the counterpart; None without one.
         own_fault: whether the car ran into the counterpart of a collision; True for the other types.

@@ -31,7 +31,7 @@ AUDIO_FOLDER: Final = "utterance"
 """Optional audio of dialogue moves, as their field `audio` names it; the folder of SDN's layout."""
 
 ANNOTATIONS_FOLDER: Final = "annotations"
-"""Optional logs of annotators (`dorothie_gym.lab.annotation`), which are no part of the session."""
+"""Optional logs of annotators (`dorothie_gym.lab.annotation`), which are not part of the session."""
 
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, SEATS_FILE, FRAMES_FILE, JOURNAL_FILE)
 

@@ -38,7 +38,7 @@ def parse_version(value: object, where: str, current: str = FORMAT_VERSION) -> t
         current: version that this package writes.
 
     Raises:
-        SessionError: it is no version, or of another major number than the current one.
+        SessionError: it is not a version, or its major number differs from the current one.
     """
     match = _VERSION.fullmatch(value) if isinstance(value, str) else None
     if match is None:

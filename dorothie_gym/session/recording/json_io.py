@@ -96,8 +96,8 @@ def from_line(text: str, where: str) -> dict[str, JsonValue]:
     """Returns the JSON object of a text.
 
     Raises:
-        SessionError: it is no JSON object, contains a field twice, or is beyond the limits of `parse_json`; the message
-            begins with `where`.
+        SessionError: it is not a JSON object, contains a field twice, or is beyond the limits of `parse_json`; the
+            message begins with `where`.
     """
     with raising(SessionError):
         value = parse_json(text, where)

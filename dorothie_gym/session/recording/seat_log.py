@@ -1,6 +1,6 @@
-"""Log of the people at the seats of a session (`seats.jsonl`): who came and left, pauses, and how typed text was read.
+"""Log of the people at the seats of a session (`seats.jsonl`): arrivals, departures, pauses, and typed text.
 
-The log does not take part in a replay: what people did in the session is in the log of actions. Times are frames of the
+A replay does not use this log: the actions of people are in the log of actions. Times are frames of the
 session; it has no dates and no names of people.
 """
 
@@ -113,7 +113,7 @@ def read_seat_log(folder: Path | str) -> tuple[SeatEvent, ...] | None:
 
 
 class SeatLogWriter:
-    """Appends events to the log of the seats; what was appended survives the death of the process.
+    """Appends events to the log of the seats; appended events survive a crash of the process.
 
     Args:
         folder: folder of a session, which must exist.

@@ -349,7 +349,7 @@ def _audio(folder: Path) -> Mapping[str, Path]:
 
 @contextmanager
 def new_session_folder(folder: Path) -> Iterator[Path]:
-    """Yields a folder to fill, which gets its name when the block is left and is removed when the block fails.
+    """Yields a temporary folder, which is renamed at the end of the block, and removed if the block fails.
 
     Raises:
         SessionError: a file or folder of that name exists.

@@ -189,7 +189,7 @@ def light_rows(lights: Mapping[int, LightColour | str]) -> Rows:
     """Returns states of lights as rows of `LIGHT_DTYPE`, in order of the ids of their signals.
 
     Raises:
-        SessionError: an id is no whole number, or a state is no colour of a light.
+        SessionError: an id is not a whole number, or a state is not a colour of a light.
     """
     rows = np.empty(len(lights), dtype=LIGHT_DTYPE)
     try:

@@ -43,8 +43,8 @@ class SessionWriter:
     """Appends events and frames to the folder of a session; appended data survives the death of the process.
 
     At any moment, the folder holds a finished session, an interrupted one that loads up to the last append, or, before
-    the header was written, none (`session_state`). A finished session, pictures and audio survive a power failure, too.
-    Actors, lights and weather are optional, at each frame.
+    the header was written, none (`session_state`). A finished session, including pictures and audio, also survives a
+    power failure. Actors, lights and weather are optional, at each frame.
 
     Args:
         folder: folder of the session.
@@ -144,7 +144,7 @@ class SessionWriter:
         """Writes a picture (PNG) of a frame.
 
         Raises:
-            SessionError: it is no PNG, or the frame number is out of range.
+            SessionError: it is not a PNG file, or the frame number is out of range.
         """
         self._check_open("no picture can be added")
         if not png.startswith(b"\x89PNG\r\n\x1a\n"):
@@ -157,7 +157,7 @@ class SessionWriter:
         """Writes the audio (FLAC) of a dialogue move, whose field `audio` has the name.
 
         Raises:
-            SessionError: it is no FLAC, or the name is that of another kind of file.
+            SessionError: it is not a FLAC file, or the name is that of another kind of file.
         """
         self._check_open("no audio can be added")
         if not flac.startswith(b"fLaC"):

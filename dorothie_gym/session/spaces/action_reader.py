@@ -72,7 +72,7 @@ class ActionReader:
                 raise ValueError(f"field {short_repr(unknown[0])} is unknown; the fields are {fields}")
 
     def integer(self, name: str) -> int:
-        """Returns an integer field; raises `ValueError` if it is no integer or out of range."""
+        """Returns an integer field; raises `ValueError` if it is not an integer or is out of range."""
         low, high = self._table.ranges[name]
         value = self._action.get(name, 0) if name in OPTIONAL_FIELDS else self._action[name]
         if type(value) is int and low <= value <= high:

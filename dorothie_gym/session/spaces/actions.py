@@ -71,7 +71,7 @@ class Speech:
     Attributes:
         act: the dialogue act.
         text: its words; empty to have them generated.
-        meaning: propositions that the speaker states, asks or asks for. They are recorded, and observed by nobody.
+        meaning: propositions that the speaker states, asks or asks for. They are recorded, but no role observes them.
         onset: time from the decision to the first word of an utterance [s]; a span that continues one has none.
         pace: speaking rate relative to that of the environment.
     """

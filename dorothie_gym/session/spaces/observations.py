@@ -236,7 +236,7 @@ def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True
 
 
 def camera_perception_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
-    """Returns the specifications of the fields that participant and Co-Wizard have besides where they see by a camera.
+    """Returns the specifications of the additional fields of participant and Co-Wizard with perception by the camera.
 
     The Co-Wizard's `landmarks` then also contain, behind those that are not hidden, the hidden ones that have been in
     view.

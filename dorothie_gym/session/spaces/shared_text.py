@@ -1,8 +1,8 @@
 """Text space whose values reach `gymnasium.vector.AsyncVectorEnv` through shared memory.
 
 `AsyncVectorEnv` reads its shared memory once, when it is made. Arrays are views on the memory; the texts of
-`gymnasium.spaces.Text` are copies of what the memory held then, and stay so (Gymnasium 1.0 to 1.4). The functions that
-this module registers for its own class return a tuple that reads the memory whenever it is used.
+`gymnasium.spaces.Text` are copies of its content at that time, and are never updated (Gymnasium 1.0 to 1.4). The
+functions that this module registers for its own class return a tuple that reads the memory whenever it is used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class SharedText(spaces.Text):
 class SharedTexts(tuple[str, ...]):
     """Texts of several environments in shared memory: a tuple of their present values.
 
-    As the arrays beside it, it changes with the next step if `AsyncVectorEnv` was made with `copy=False`. Copies are
+    Like the arrays, it changes with the next step if `AsyncVectorEnv` was made with `copy=False`. Copies are
     plain tuples. The object itself is an empty tuple: code that ignored its methods would fail, not see old texts.
     """
 

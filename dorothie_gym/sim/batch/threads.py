@@ -200,11 +200,11 @@ def turns_of(count: int, threads: int) -> NDArray[np.int64]:
 
 
 def take(turns: NDArray[np.int64], home: int) -> int:
-    """Takes the next number of the own block, whose worlds are in the processor's cache; then those of other blocks.
+    """Takes the next number of the thread's block, whose worlds are cached, and then those of other blocks.
 
     Args:
         turns: see `turns_of`.
-        home: number of the own block.
+        home: number of the thread's block.
 
     Returns:
         A number that no other thread gets, or -1 when there is none left.

@@ -65,7 +65,7 @@ def step_alone(
         world: arrays of the world, changed in place.
         substeps: how many.
         dt: time of each [s].
-        acceleration: of vehicles of the kind `Kind.EGO` [m/s^2].
+        acceleration: acceleration of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
 
     Returns:
@@ -92,8 +92,8 @@ class VectorWorld(CachedViews):
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
     threads have not reached yet, so that a late or busy thread does fewer.
-    What happens in a world depends on its own arrays only: not on the other worlds, its place among them, or the
-    threads. Threads share nothing that is written to, and hold the interpreter's lock between calls only.
+    A world depends only on its own arrays: not on the other worlds, its place among them, or the threads. Threads share
+        nothing that is written to, and hold the interpreter's lock between calls only.
 
     Attributes:
         town: arrays of the town.

@@ -1,4 +1,4 @@
-"""Preparation of the substeps of a decision, and what the ego sees after them (compiled).
+"""Preparation of the substeps of a decision, and the ego's view after them (compiled).
 
 The path is lengthened, and the stretch of it around the ego is written for the motion control, with goals, cruise speed
 and manoeuvre.
@@ -136,7 +136,7 @@ def place_on_path(world: WorldArrays, lane: int, station: float) -> float:
 
 @compiled
 def note_props(world: WorldArrays, frame: int) -> None:
-    """Notes the props that the ego sees, for the feasibility of manoeuvres."""
+    """Records the props that the ego sees, for the feasibility of manoeuvres."""
     car, plan, seen_props = world.vehicles[0], world.plan[0], world.seen_props
     count = see(world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0)
     plan.props = 0

@@ -46,7 +46,7 @@ REACHED = 0.2
 """Overlap with the new lane from which on a switching ego is in the way there [m]."""
 
 BESIDE_EGO = 7.0
-"""Distance ahead and behind within which vehicles are beside the ego [m]; those within a second behind, too."""
+"""Distance ahead and behind within which vehicles are beside the ego [m]; as are those within a second behind."""
 
 BEFORE_IT = 0.5
 """Distance before the beginning of a manoeuvre at which the ego waits [m]."""
@@ -62,7 +62,7 @@ TRAFFIC_LIGHT, TRAFFIC_SIGN = int(ObjectClass.TRAFFIC_LIGHT.value), int(ObjectCl
 
 @inlined
 def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
-    """Finds what limits the ego's speed most, requests junctions, and notes the limit in the record `car`.
+    """Finds the strictest limit of the ego's speed, requests junctions, and writes the limit to the record `car`.
 
     Args:
         town: arrays of the town.

@@ -60,7 +60,7 @@ def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED * U_TURN_SP
     """Returns the distance over which the ego brakes to the speed of a U-turn [m].
 
     Args:
-        speed: of the ego [m/s].
+        speed: speed of the ego [m/s].
         squared_speed: square of the speed of a U-turn [m^2/s^2]; the scripted roles count on 12.0.
     """
     return max(0.0, speed * speed - squared_speed) / (2 * PLANNED_BRAKING)

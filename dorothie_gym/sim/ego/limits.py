@@ -128,7 +128,7 @@ MIN_SWITCH = 14.0
 
 U_TURN_REACH = 14.0
 """Room ahead of its middle that the ego needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m
-for its side, and what is kept free beside it."""
+for its side, and the clearance beside it."""
 
 U_TURN_SAMPLES = 4
 """Step in the points of a U-turn, half a metre apart, at which traffic checks for a conflict."""

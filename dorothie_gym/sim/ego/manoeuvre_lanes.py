@@ -1,7 +1,7 @@
 """Lanes of a manoeuvre, and the pieces of path along them (compiled).
 
-The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`. A search for a turn notes what it has
-seen behind them. Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
+The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`. A search for a turn appends its search
+tree after them. Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LAID = 180.0
 """Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is seldom laid again."""
 
 SWITCH_COST = 20.0
-"""Misfit by which an exit of the own lane is preferred to that of a lane beside it [degrees]."""
+"""Misfit by which an exit of the car's lane is preferred to that of an adjacent lane [degrees]."""
 
 SETTLE = 15.0
 """Way along a newly entered lane before it is changed, where there is room [m]."""
@@ -189,7 +189,7 @@ def _closest_exit(town: TownArrays, lane: int, angle: int) -> int:
 
 @compiled
 def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, station: float) -> bool:
-    """Notes the lanes beside a row of the search to which there is room to switch; returns whether they fit in."""
+    """Adds the lanes next to a row of the search to which there is room to switch; returns whether they fit in."""
     step = world.steps[row]
     lane, changes = town.lanes[step.lane], step.changes
     left, right = lane.left, lane.right
@@ -212,7 +212,7 @@ def _is_seen(world: WorldArrays, root: int, lane: int) -> bool:
 
 @compiled
 def _reach(world: WorldArrays, lane: int, before: int, changes: int, change: bool) -> bool:
-    """Notes a lane that the search has reached from another row."""
+    """Adds a lane that the search has reached from another row."""
     if not add_step(world, lane, change):
         return False
     step = world.steps[world.plan[0].steps - 1]
@@ -291,7 +291,7 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
         town: arrays of the town.
         world: arrays of the world.
         station: beginning of the path on the first lane [m].
-        speed: of the ego [m/s], which the length of lane switches depends on.
+        speed: speed of the ego [m/s], which the length of lane switches depends on.
         write: whether the points are written or only counted.
     """
     count, steps, at = int(world.plan[0].steps), world.steps, station
@@ -326,7 +326,7 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
 def lay_head(
     town: TownArrays, world: WorldArrays, first: int, end: int, oncoming: int, begin: float, write: bool
 ) -> None:
-    """Lays what comes before the steps of the plan: the rest of the manoeuvre under way, or a U-turn.
+    """Lays the path before the steps of the plan: the rest of the manoeuvre under way, or a U-turn.
 
     Args:
         town: arrays of the town.

@@ -295,7 +295,7 @@ def command(town: TownArrays, world: WorldArrays, action: int, angle: int, speed
         world: arrays of the world.
         action: number of a `PhysicalAction`.
         angle: degrees, positive left; for JTurn and LaneSwitch.
-        speed: of the ego [m/s].
+        speed: speed of the ego [m/s].
 
     Returns:
         A `Refusal`: the action was carried out, or nothing has changed.
@@ -419,13 +419,13 @@ def _replace(
         town: arrays of the town.
         world: arrays of the world, with the first steps of the plan.
         station: beginning of the path on the first of them [m].
-        speed: of the ego [m/s], which the length of lane switches depends on.
+        speed: speed of the ego [m/s], which the length of lane switches depends on.
         first: first point of the present path that is kept, see `lay_head`.
         end: the one after the last.
         oncoming: lane on which a U-turn ends, or -1.
         start: distance along the ego's lane at which the U-turn begins [m].
         action: manoeuvre of the new plan: number of a `PhysicalAction`, or 0.
-        angle: of the manoeuvre [degrees].
+        angle: angle of the manoeuvre [degrees].
         connector: connector and lane of a turn, or -1.
         way_out: see there.
         fresh: whether the ego is not on the present path, but at the beginning of the new one.

@@ -198,7 +198,7 @@ def _brake_surely(world: WorldArrays) -> None:
 
 @inlined
 def _note_sweep(world: WorldArrays) -> None:
-    """Notes the part of a U-turn that is still to come, to which others give way also while the ego waits in it."""
+    """Records the remaining part of a U-turn, to which others give way even while the ego waits in it."""
     car = world.car[0]
     at = int(car.at)
     car.sweeping = bool(car.action == U_TURN and world.course[at].manoeuvre and car.s >= BEGUN)

@@ -60,7 +60,7 @@ class PerceivedBody:
         length: [m].
         width: [m].
         speed: along its heading [m/s].
-        height: of the road it is on [m].
+        height: height of the road it is on [m].
     """
 
     key: int
@@ -114,7 +114,7 @@ def safe_speed(speed: float, left: float, friction: float) -> float:
     """Returns the speed from which the ego can still stop.
 
     Args:
-        speed: of the body ahead, along the path [m/s].
+        speed: speed of the body ahead, along the path [m/s].
         left: room to it [m].
         friction: share of the dry road's grip.
     """
@@ -124,7 +124,7 @@ def safe_speed(speed: float, left: float, friction: float) -> float:
 
 @inlined
 def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key: int, tight: bool, line: bool) -> float:
-    """Notes a body or line as the ego's limit if it allows less speed than `best` [m/s]; returns the lesser speed."""
+    """Records a body or line as the ego's limit if it allows less speed than `best` [m/s]; returns the lower speed."""
     safe = safe_speed(speed, room(kind, gap, speed, tight, line), 1.0)
     if safe >= best:
         return best
@@ -134,7 +134,7 @@ def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key:
 
 @inlined
 def bodies_ahead(town: TownArrays, world: WorldArrays, seen: int) -> float:
-    """Finds the body on the path, or soon there, that allows the least speed, and notes the distance of a roadblock.
+    """Finds the body on the path, or soon there, that allows the least speed, and records the distance of a roadblock.
 
     Args:
         town: arrays of the town.

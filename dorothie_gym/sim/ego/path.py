@@ -171,11 +171,12 @@ def find_sweeps(
 
     Args:
         course: points of the whole path.
-        sweeps: of those from `first` on, written; the car enters the path there along its direction.
+        sweeps: sweeps of the points from `first` on, which are written; the car enters the path there along its
+            direction.
         first: first point.
         end: point behind the last one.
-        length: of the car [m].
-        width: of the car [m].
+        length: length of the car [m].
+        width: width of the car [m].
     """
     off = 0.0  # heading of the car to the right of the path [rad]
     for k in range(first, end):

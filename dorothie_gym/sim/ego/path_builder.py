@@ -27,7 +27,7 @@ PATH_SPACING = 1.0
 """Distance between points of a path [m]."""
 
 SAME_PLACE = 1e-3
-"""Points that are no farther apart than this are one point [m]."""
+"""Largest distance of points that count as one point [m]."""
 
 TURNING_RADIUS = 4.5
 """Radius of a U-turn [m]: a little over the 3.8 m of highway-env's bicycle at full lock (60 degrees, 5 m long)."""

@@ -51,7 +51,7 @@ class PolylineLane(AbstractLane):
     """A lane of a town for the vehicles, observations and viewer of highway-env.
 
     Stations and lateral distances are metres along and to the right of the centre line; before the start and after the
-    end of the lane they go on straight. A lane never changes after it is built, so copies of it are the lane itself.
+    end, the lane is extended straight. A lane never changes after it is built, so copies of it are the lane itself.
 
     Attributes:
         town_lane: the town's lane.
@@ -92,7 +92,7 @@ class PolylineLane(AbstractLane):
         self.share(LaneTable.of([lane]), 0)
 
     def share(self, table: LaneTable, row: int) -> None:
-        """Measures with a row of a table that other lanes use, too."""
+        """Measures with a row of a table that other lanes also use."""
         self.row = row
         self._points, self._offsets, self._ends = table.points, table.offsets, table.ends
         shape = self._points, self._offsets, self._ends, row

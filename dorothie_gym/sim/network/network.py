@@ -30,7 +30,7 @@ def road_edges(town: Town) -> dict[tuple[str, str], list[Lane]]:
     """Edges of the road graph in the order of their first lanes' ids, each with its lanes from left to right.
 
     Lanes that are linked share a node. Lanes of one road and direction that begin side by side and end side by side are
-    one edge. Whatever else joins the same two nodes (connectors that fan out, say) is the same edge, too.
+    one edge. Anything else that joins the same two nodes (such as connectors that fan out) is also the same edge.
     """
     nodes = _Nodes(2 * len(town.lanes))
     for link in town.links:
@@ -229,7 +229,7 @@ class TownNetwork(RoadNetwork):
             np_random: source of the choice between several continuations.
 
         Returns:
-            An index; the current one at the end of a lane that does not go on.
+            An index; the current one at the end of a lane without a continuation.
         """
         if route and route[0][:2] == current_index[:2]:
             route.pop(0)

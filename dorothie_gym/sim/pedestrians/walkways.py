@@ -70,10 +70,10 @@ class Walkways(NamedTuple):
 
 
 def build_walkways(network: TownNetwork, lanes: RecordArray[LaneRecord]) -> Walkways:
-    """Builds all footways and crosswalks, and notes passages in `lanes`.
+    """Builds all footways and crosswalks, and writes passages to `lanes`.
 
     Args:
-        network: of the town.
+        network: network of the town.
         lanes: `town_records.LaneRecord`, complete but for the passages.
     """
     town = network.town
@@ -119,7 +119,7 @@ class _Corner(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """Ways round corners, numbered on after the pavements, and what one comes to beyond each end of each way."""
+    """Footways round corners, numbered after the pavements, and the footways beyond each end of each footway."""
 
     laid: list[_Corner]
     onward: dict[_End, _End]
@@ -295,7 +295,7 @@ def _lights(
     crossings: RecordArray[CrossingRecord],
     passages: RecordArray[PassageRecord],
 ) -> NDArray[np.int32]:
-    """Notes for each crosswalk the lanes that lead onto it from a light which stands right before it."""
+    """Records for each crosswalk the lanes that lead onto it from a light right before it."""
     passing: defaultdict[int, set[int]] = defaultdict(set)
     for lane in town.lanes:
         record = lanes[lane.id]

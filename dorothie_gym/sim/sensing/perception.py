@@ -83,7 +83,7 @@ def see(
         x: position of the observer [m].
         y: [m].
         frame: present frame.
-        skip: row of the observer among the vehicles, -1 if it is none of them.
+        skip: row of the observer among the vehicles, -1 if it is not one of them.
 
     Returns:
         Number of perceived bodies.

@@ -87,7 +87,7 @@ def rain_extinction(rate: float) -> float:
     Ivey, Lehtipuu and Button (J. Safety Research 7, 1975) measured a sight of 2000 ft / i^0.68 at 40 mph and i in/h.
 
     Args:
-        rate: of the rain [mm/h].
+        rate: rate of the rain [mm/h].
     """
     return float(FIVE_PERCENT / _RAIN_RANGE * pm.power(rate / 25.4, _RAIN_EXPONENT))
 
@@ -99,7 +99,7 @@ def daylight(altitude: float, cloudiness: float) -> float:
     Solar Energy 24, 1980).
 
     Args:
-        altitude: of the sun [degrees].
+        altitude: altitude of the sun [degrees].
         cloudiness: share of the sky in [0, 1].
     """
     angles, lux = zip(*_CLEAR_SKY, strict=True)

@@ -1,4 +1,4 @@
-"""Records of what moves or lies in a world, of its clock and of its lights; protocols of what they have in common."""
+"""Records of the bodies of a world, its clock and its lights; protocols of their common fields."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class PlacedBody(Protocol):
 
 
 class SizedBody(PlacedBody, Protocol):
-    """A record of a vehicle, prop or perceived body: its outline, too."""
+    """For a vehicle, prop or perceived body, also its outline."""
 
     length: float
     width: float

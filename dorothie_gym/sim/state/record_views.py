@@ -115,7 +115,7 @@ class BodyView(CachedViews, Generic[Record_co]):
     """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
 
     Attributes:
-        road: on which the body is.
+        road: road of the body.
     """
 
     RECORDS: ClassVar[str]

@@ -1,4 +1,4 @@
-"""Records of what the ego perceives, of its pose estimate, and of the watch over its driving."""
+"""Records of the ego's perception, its pose estimate, and the monitoring of its driving."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class LineMarkRecord:
 
 
 class WatchRecord:
-    """Watch over the rules: breaches so far by `codes.Breach`, and the last frame of those that go on for a while."""
+    """Watch over the rules: breaches so far by `codes.Breach`, and the last frame of lasting ones."""
 
     counts: Annotated[NDArray[np.int64], "i8", (len(Breach),)]
     last: Annotated[NDArray[np.int64], "i8", (len(Breach),)]

@@ -230,7 +230,7 @@ def _link(town: Town, lanes: RecordArray[LaneRecord]) -> NDArray[np.int32]:
 
 
 def _find_cycling(lanes: RecordArray[LaneRecord], neighbours: NDArray[np.int32]) -> None:
-    """Notes on which lanes cyclists ride: on slow ones, unless all ways on lead to faster ones, as from ramps."""
+    """Records the lanes on which cyclists ride: slow ones, unless all their exits lead to faster ones, as on ramps."""
     lanes["cycling"] = lanes["limit"] <= CYCLIST_ROADS
     changed = True
     while changed:
@@ -243,7 +243,7 @@ def _find_cycling(lanes: RecordArray[LaneRecord], neighbours: NDArray[np.int32])
 
 
 def _relate(town: Town, lanes: RecordArray[LaneRecord], rules: RightOfWay) -> NDArray[np.uint8]:
-    """Numbers the junctions and connectors, and says of each pair of one junction what they are to each other."""
+    """Numbers the junctions and connectors, and computes the relation of each pair of connectors of a junction."""
     rows: list[NDArray[np.uint8]] = []
     begin = 0
     numbers = {junction.id: k for k, junction in enumerate(town.junctions)}

@@ -163,7 +163,7 @@ def _held_up_beside(town: TownArrays, world: WorldArrays, i: int) -> float:
 def _first_on(town: TownArrays, world: WorldArrays, i: int, k: int, lane: LaneRecord) -> tuple[int, float]:
     """Returns node (-1 for none) and station [m] of the first body ahead on the `k`-th lane of a plan.
 
-    A body near the start of a lane that begins where this one does is in the way, too.
+    A body near the start of a lane that begins at the same place also blocks it.
     """
     vehicle, nodes = world.vehicles[i], world.nodes
     own = vehicle.station if k == 0 else -math.inf

@@ -154,7 +154,7 @@ def around(
         town: arrays of the town.
         world: arrays of the world.
         number: lane of the place.
-        station: of the place [m].
+        station: station of the place [m].
         body: a body that is left out.
 
     Returns:

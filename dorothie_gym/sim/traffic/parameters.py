@@ -97,7 +97,7 @@ CYCLIST_LENGTH, CYCLIST_WIDTH = 1.8, 0.7
 """Size of a bicycle with its rider [m] (AASHTO, Guide for the Development of Bicycle Facilities, 2012: 70 x 30 in)."""
 
 CYCLIST_SPEEDS = 15.0 / 3.6, 20.0 / 3.6
-"""Slowest and fastest cyclist [m/s]: the middle of what is measured in towns (Dozza & Werneke 2014: 14 to 20 km/h)."""
+"""Slowest and fastest cyclist [m/s]: the middle of speeds measured in towns (Dozza & Werneke 2014: 14 to 20 km/h)."""
 
 CYCLIST_ACCELERATION = 1.0
 """Greatest acceleration of a cyclist [m/s^2]."""
@@ -201,7 +201,7 @@ LINE_GAP = 1.0
 
 ROOM_BEHIND = 10.5
 """Free lane that a vehicle wants behind a junction before it enters: its length, the distance that it keeps when it
-stands, and what it takes to have left the junction [m]."""
+stands, and the length needed to clear the junction [m]."""
 
 ROOM_SIGHT = 60.0
 """Distance behind a junction within which slow vehicles count against its room [m]."""

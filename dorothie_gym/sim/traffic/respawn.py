@@ -110,7 +110,7 @@ def faces_turning_car(world: WorldArrays, vehicle: VehicleRecord, turning: bool)
 
     Args:
         world: arrays of the world; the ego is the first of its vehicles.
-        vehicle: of the traffic.
+        vehicle: vehicle of the traffic.
         turning: whether the ego is in a U-turn.
     """
     car = world.vehicles[0]

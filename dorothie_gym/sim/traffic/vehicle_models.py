@@ -112,11 +112,11 @@ def slip_towards(
     """Returns the sine of the slip angle that brings a vehicle to a lane.
 
     Args:
-        points: of all lanes.
+        points: points of all lanes.
         lane: the lane.
         vehicle: the vehicle.
-        segment: of the lane that is closest to it.
-        station: of the vehicle along the lane [m].
+        segment: segment of the lane that is closest to it.
+        station: station of the vehicle along the lane [m].
         off: how far to the right of its place across the lane it is [m].
     """
     ahead = value_near(points, lane, segment, 3, station + vehicle.speed * TAU_PURSUIT)

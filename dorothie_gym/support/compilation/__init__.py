@@ -1,9 +1,9 @@
 """Compilation of the world's inner loops with numba.
 
-With ``NUMBA_DISABLE_JIT=1`` all functions stay plain Python. Compiled ones keep IEEE arithmetic (no fastmath). What
-Python calls is compiled as a whole (`dispatcher`), with large tuples of arrays passed by address (`by_reference`), and
-its machine code is kept in the user's cache folder under a hash of its content (`cache`). Where the folder cannot be
-written, every process compiles again, and one ``RuntimeWarning`` explains how to avoid it.
+With ``NUMBA_DISABLE_JIT=1`` all functions stay plain Python. Compiled ones keep IEEE arithmetic (no fastmath).
+Functions that Python calls are compiled as a whole (`dispatcher`), with large tuples of arrays passed by address
+(`by_reference`), and their machine code is kept in the user's cache folder under a hash of their content (`cache`).
+Where the folder cannot be written, every process compiles again, and one ``RuntimeWarning`` explains how to avoid it.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def fixed(function: F) -> F:
 
 
 def _kind(array: NDArray[np.generic]) -> tuple[object, ...]:
-    """Returns what the type of an array depends on."""
+    """Returns the properties that determine the type of an array."""
     return array.dtype, array.ndim, array.flags.num
 
 

@@ -3,7 +3,7 @@
 numba passes a named tuple by value, item by item: a tuple of thirty arrays is two hundred arguments of every function
 that takes it, and most of the compiler's work. A class with the decorator `by_reference` is one pointer instead, to a
 table with the address and the shape of each array. Reading an item loads them from the table, which never changes
-during a call, so that LLVM may keep what it has loaded.
+during a call, so that LLVM may keep loaded values.
 
 The table lies on the stack of the call from Python (or of `gives_row`), whose arguments keep the arrays alive. Compiled
 code reads items; it cannot create such tuples, unpack them, or return them or their arrays to Python.
@@ -42,7 +42,7 @@ class Reference(types.Type):  # type: ignore[misc]  # numba has no type informat
     Attributes:
         members: name and type of each item, in order.
         offsets: place of each item in the table [bytes].
-        size: of the table [bytes].
+        size: size of the table [bytes].
     """
 
     def __init__(self, name: str, members: tuple[tuple[str, types.Type], ...]) -> None:
@@ -58,7 +58,7 @@ class Reference(types.Type):  # type: ignore[misc]  # numba has no type informat
 
     @property
     def key(self) -> tuple[str, tuple[tuple[str, types.Type], ...]]:
-        """What makes types equal for numba."""
+        """Key by which numba compares types."""
         return self.name, self.members
 
     def member(self, item: str) -> types.Type | None:

@@ -1,7 +1,7 @@
 """Machine code on disk, named by content: the fingerprint of a function is part of the name of its files.
 
 An update of the package compiles only functions that are different, or that call different ones; copies of the package
-share what is equal in them. The folder is `compiled` in the user's cache folder, or `NUMBA_CACHE_DIR`.
+share equal functions. The folder is `compiled` in the user's cache folder, or `NUMBA_CACHE_DIR`.
 
 A file holds the machine code for one signature and processor. It is signed under its name, by a key in the same folder:
 damaged machine code would end the process without a message.
@@ -77,7 +77,7 @@ class _Files:
 
     Args:
         folder: folder of the files and of their key.
-        base: what their names begin with.
+        base: prefix of their names.
     """
 
     def __init__(self, folder: Path, base: str) -> None:
@@ -166,7 +166,7 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
         return f"{module}.{self._py_func.__qualname__}-".replace("<", "").replace(">", "")
 
     def _delete_others(self) -> None:
-        """Deletes files of other versions of the function, and parts of files, that nobody has used for `KEPT`."""
+        """Deletes files of other versions of the function, and parts of files, that were not used for `KEPT`."""
         assert self._folder is not None
         for file in self._folder.glob(f"{self._stem()}*"):
             if file.suffix in (ENDING, _OLD_ENDING, PART) and not self._is_current(file):

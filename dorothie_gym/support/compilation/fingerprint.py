@@ -89,7 +89,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def _code_lines(function: FunctionType) -> Iterator[str]:
-    """Yields what decides about the machine code: no comments, docstrings or line numbers."""
+    """Yields the parts that determine the machine code: no comments, docstrings or line numbers."""
     for code in _codes(function.__code__):
         constants = code.co_consts
         if code is function.__code__ and function.__doc__ is not None and constants[:1] == (function.__doc__,):

@@ -1,4 +1,4 @@
-"""Checks of what is said: truth, reasons, arrival times, answers, exceptions and loops."""
+"""Checks of the content of utterances: truth, reasons, arrival times, answers, exceptions and loops."""
 
 import lazy_loader
 

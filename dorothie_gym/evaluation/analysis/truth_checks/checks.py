@@ -1,4 +1,4 @@
-"""Figures of what is said in a corpus: each a share of the cases that the records can decide, with their number."""
+"""Figures of the content of a corpus: shares of the cases that the recordings can decide, with their numbers."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "loops": "sessions without an order given three times at one place, unremarked",
     }
 )
-"""Titles of the figures besides those of the exceptions."""
+"""Titles of the figures except those of the exceptions."""
 
 _EXCEPTIONS: Final = "exceptions/"
 
@@ -67,7 +67,7 @@ class TalkChecks:
     Attributes:
         right: number of cases that are right, by figure; exceptions as "exceptions/KIND".
         cases: number of cases that can be decided.
-        unperceived: number of exceptions that nobody could perceive, by kind.
+        unperceived: number of exceptions that no role could perceive, by kind.
     """
 
     right: Counter[str] = field(default_factory=Counter)
@@ -132,7 +132,7 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None) -> No
 
 
 def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:
-    """Holds what is stated against the world."""
+    """Compares statements with the world."""
     for move in world.session.moves():
         for said in move.meaning if move.act.move in _FACTUAL else ():
             right = is_true(world, said, move.start, move.speaker)
@@ -154,7 +154,7 @@ def _check_time(checks: TalkChecks, world: SessionWorld, move: MoveRecord, said:
 
 
 def _check_answers(checks: TalkChecks, session: Session) -> None:
-    """Checks whether answers are about what was asked."""
+    """Checks whether answers are about the question."""
     asked: MoveRecord | None = None
     for move in session.moves():
         if move.act.move in _QUESTIONS and move.meaning:
@@ -212,7 +212,7 @@ def _check_exceptions(checks: TalkChecks, session: Session, world: SessionWorld 
 
 
 def mentions_story(session: Session) -> bool | None:
-    """Returns whether somebody says a name or a thing of the story; None if the story has neither."""
+    """Returns whether a speaker mentions a name or a thing from the story; None if the story has neither."""
     texts = (session.header.story, *(str(row["description"]) for row in session.header.subgoals))
     things = (item for text in texts for item in find_items(text))
     wanted = {words.casefold() for words in (*read_people(*texts), *things)}

@@ -1,4 +1,4 @@
-"""Loops: orders that are given again and again at one place, without a remark about it and another attempt."""
+"""Loops: orders that are repeated at one place, without a remark about it and another attempt."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _AGAIN: Final = re.compile(r"\b(again|twice|third time|(going|go) (back and fort
 
 
 class _Order(NamedTuple):
-    """Order: who gives it, what it is, and position [m] and heading [degrees] of the car."""
+    """Order: its speaker and content, and position [m] and heading [degrees] of the car."""
 
     speaker: Role
     act: DialogueAct
@@ -66,7 +66,7 @@ class _Order(NamedTuple):
 
 
 def has_loop(session: Session) -> bool:
-    """Returns whether a speaker gives an order `SAME_ORDERS` times at one place, and nobody remarks on it.
+    """Returns whether a speaker gives an order `SAME_ORDERS` times at one place without a remark on it.
 
     Indirect orders count ("we should be turning left"). A remark about the repetition, or another errand, begins a new
     count. Where no place is recorded, all orders about one errand count as given at one place.

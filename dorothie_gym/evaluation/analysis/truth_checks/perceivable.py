@@ -36,7 +36,7 @@ LOSS: Final = 0.85
 """Share of the range of sight below which a fault of the camera shows."""
 
 BLIND_WAY: Final = 25.0
-"""Way without GPS after which the position is uncertain [m]."""
+"""Distance without GPS after which the position is uncertain [m]."""
 
 CROWD: Final = 3
 """Least number of vehicles or pedestrians in a crowd."""

@@ -1,4 +1,4 @@
-"""Truth of what is said about tasks, destinations and plans, held against what was recorded afterwards."""
+"""Truth of statements about tasks, destinations and plans, compared with later recorded events."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _COUNTERMANDS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_N, D
 
 
 def is_carried_out(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether the car carries out an announced action; None if it is told otherwise or the session ends."""
+    """Returns whether the car carries out an announced action; None after another order or the session's end."""
     value, direction = said.get("action"), said.get("direction")
     commands = _COMMANDS.get(value) if isinstance(value, ActionValue) else None
     if commands is None or speaker is not Role.CO_WIZARD:
@@ -76,8 +76,8 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
     """Returns whether a place is one of the open tasks; without a place, whether one has been named.
 
     Statements of the Co-Wizard that agree with its recorded beliefs count as true: it may have misheard the place.
-    Whether an open task is not the one to be done now cannot be told, nor which of several places of a name is meant
-    by its street.
+    It cannot be decided whether an open task is not the current one, nor which of several places of a name is meant by
+    its street.
     """
     place, own = said.get("place"), speaker is Role.CO_WIZARD
     if place is None:
@@ -106,7 +106,7 @@ def has_status(world: SessionWorld, said: Proposition, time: float, speaker: Rol
 
 
 def is_nearer(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether the way to a place is shorter than that to another one."""
+    """Returns whether the route to a place is shorter than that to another one."""
     ways = []
     for name in (said.get("place"), said.get("landmark")):
         rows = world.landmarks(name) if isinstance(name, LandmarkName) else []

@@ -1,4 +1,4 @@
-"""Recorded world of a session: what was the case at a time."""
+"""Recorded world of a session: facts at a time."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class SessionWorld:
         return abs(wrap_degrees(math.degrees(away - float(row["heading"]))))
 
     def way_to(self, time: float, landmark: LandmarkRow) -> float:
-        """Returns the length of the shortest way from the car to a landmark [m]; infinity if there is none."""
+        """Returns the length of the shortest route from the car to a landmark [m]; infinity if there is none."""
         route = router(self.town).route(self.place(time), (landmark["lane"], landmark["station"]))
         return route.length if route is not None else math.inf
 
@@ -178,7 +178,7 @@ class SessionWorld:
 
         Args:
             time: [s].
-            kinds: of the actors.
+            kinds: kinds of the actors.
             distance: largest distance from the middle of the car [m].
             angle: largest angle to its heading [degrees].
         """

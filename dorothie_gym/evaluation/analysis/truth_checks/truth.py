@@ -19,7 +19,9 @@ from dorothie_gym.session.recording.header import LandmarkRow
 from dorothie_gym.tasks.landmark_designs import features_of
 
 CLOSE, FAR = 130.0, 200.0
-"""Ways up to the first length count as short, and from the second on as long [m]; in between, both may be said."""
+"""Routes up to the first length count as short, and from the second on as long [m]; in between, both statements are
+true.
+"""
 
 PLAIN_SIGHT, SIGHT = 20.0, 120.0
 """An actor within the first distance is seen, one beyond the second is not [m]; in between it may be hidden."""
@@ -28,7 +30,7 @@ TIME_FACTOR: Final = 1.5
 """Largest ratio of a claimed and an actual time that agree; times up to `SHORT_TIME` agree in any case."""
 
 SHORT_TIME: Final = 15.0
-"""Differences of times that nobody minds [s]."""
+"""Largest irrelevant difference of times [s]."""
 
 _POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
 _SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
@@ -49,13 +51,13 @@ Evaluator = Callable[[SessionWorld, Proposition, float, Role], bool | None]
 
 
 def is_true(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether a proposition is true; None if the record cannot tell.
+    """Returns whether a proposition is true; None if the recording does not determine it.
 
     Args:
         world: the recorded world.
         said: the proposition.
-        time: when it is said [s].
-        speaker: who says it.
+        time: time of the statement [s].
+        speaker: speaker of the statement.
     """
     evaluator = _EVALUATORS.get(said.predicate)
     held = None if evaluator is None or said.asks else evaluator(world, said, time, speaker)
@@ -63,7 +65,7 @@ def is_true(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
 
 
 def is_right_cause(world: SessionWorld, cause: Proposition, effect: Proposition | None, time: float) -> bool | None:
-    """Returns whether a cause held when its effect did, at a time [s]; None if the record cannot tell."""
+    """Returns whether a cause held when its effect did, at a time [s]; None if the recording does not determine it."""
     evaluator = _CAUSES.get(cause.predicate)
     if evaluator is None:
         return None

@@ -100,7 +100,7 @@ class Batch:
         move_time: (B, M) when its utterance was over [s]; the time of the point for an utterance in progress.
         move_text: (B, M) words of the move.
         move_mask: (B, M).
-        utterance_text, utterance_recognised: (B, U) its words; what was recognised.
+        utterance_text, utterance_recognised: (B, U) its words; the recognised words.
         utterance_speaker: (B, U).
         utterance_time: (B, U) [s].
         utterance_mask: (B, U).
@@ -294,7 +294,7 @@ def _now(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: i
 
 
 def _objects(columns: Columns, look: Ints, size: int) -> tuple[Ints, Reals, Flags]:
-    """Returns kind, values and mask of the nearest objects of looks of any shape; -1 is no look."""
+    """Returns kind, values and mask of the nearest objects of looks of any shape; -1 means no look."""
     starts = columns.looks.start
     none = look < 0
     safe = np.where(none, 0, look)

@@ -33,7 +33,7 @@ _STARTS: Final = ("start", "member_start")
 
 
 def fault_in(columns: Columns) -> str | None:
-    """Returns what is wrong with columns; None if a reader can rely on them."""
+    """Returns the fault of columns; None if a reader can rely on them."""
     return next(_faults(columns), None)
 
 

@@ -231,7 +231,7 @@ class TownGraph:
     """Lane graph of a town (L lanes, E edges, s streets); without lanes if the town is unknown.
 
     Attributes:
-        name: of the town.
+        name: name of the town.
         lanes: (L, 14) columns as in `dorothie_gym.maps.lane_graph.FEATURES` [m, degrees].
         road: (L,) number of its road within the town, 0.. without gaps.
         junction: (L,) 0 outside of junctions, else 1.. without gaps.
@@ -262,7 +262,7 @@ class Columns:
         texts: every distinct text: utterances, recognised words, names of streets and landmarks.
         towns: towns of the sessions, by name.
         unreadable: sessions that could not be read, (name, reason) each.
-        unpointed: flagged events that are no point, (session, event, reason) each.
+        unpointed: flagged events that are not points, (session, event, reason) each.
     """
 
     key: str
@@ -283,7 +283,7 @@ class Columns:
 
     @functools.cached_property
     def times(self) -> RecordTimes:
-        """Times that decide what is visible at a point, in tenths."""
+        """Times that determine visibility at a point, in tenths of a second."""
         said, moves = self.utterances, self.moves
         first = np.searchsorted(moves.utterance, np.arange(len(said.tenth) + 1))  # moves lie in the order of utterances
         return RecordTimes(

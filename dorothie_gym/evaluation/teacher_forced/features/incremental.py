@@ -1,8 +1,8 @@
 """Columns of a session in progress.
 
-Observations are kept as they are and encoded when columns are requested; what no batch of a later point can show is
-dropped, so that the cost of a decision does not grow with the session. The columns give the same batches as those that
-`extract` makes of the whole session (tests/baselines/benchmark_co_wizard/test_parity.py).
+Observations are kept as they are and encoded when columns are requested; data that no batch of a later point can
+contain are dropped, so that the cost of a decision does not grow with the session. The columns give the same batches as
+those that `extract` makes of the whole session (tests/baselines/benchmark_co_wizard/test_parity.py).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The points of a task: where each stands in the columns, what is visible there, and its label."""
+"""Points of a task: position in the columns, visible rows, and label of each."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class PointTable:
         label_slots: (n, 69) slot values; all False in NfD.
         label_action: (n,) class of NfD, 0..5; -1 in UfN and RfN.
         label_angle: (n,) its angle [degrees, positive left]; NaN where unknown, and in UfN and RfN.
-        label_belief: (n, 5) way to the next frame dx, dy [m], its heading [degrees], way to the goal dx, dy [m], in the
-            town's axes; NaN where unknown.
+        label_belief: (n, 5) displacement to the next frame dx, dy [m], its heading [degrees], displacement to the goal
+            dx, dy [m], in the town's axes; NaN where unknown.
         skipped: flagged events that are points of no task (`task` None), and points of this task that are scored in
             part, with reasons. Sessions that cannot be read are in `Columns.unreadable`.
     """

@@ -48,8 +48,8 @@ class SessionColumns:
         arrays: by "group.field".
         texts: distinct texts.
         town: name of the town.
-        seed: of the session, -1 where there is none.
-        unpointed: flagged events that are no point, (event, reason) each.
+        seed: seed of the session, -1 where there is none.
+        unpointed: flagged events that are not points, (event, reason) each.
         signature: hash of the above, independent of the layout of the session.
     """
 

@@ -89,7 +89,7 @@ def _trimmed(
     edges: NDArray[np.int32],
     segments: Array,
 ) -> Cells:
-    """Leaves out candidates that make no difference: the lowest ones of the same material as what is below them."""
+    """Omits candidates that make no difference: the lowest ones whose material equals that of the surface below."""
     counts = np.diff(entries)
     owner = np.repeat(np.arange(len(counts)), counts)
     different = table[:, 0] != base[owner]

@@ -112,7 +112,7 @@ def noise_at(noise: NDArray[np.uint8], place: int) -> float:
 
 @inlined
 def grain_weight(footprint: float) -> float:
-    """Returns the strength of grains, which are finer than a large footprint [m]."""
+    """Returns the strength of grains, which large footprints [m] average out."""
     return max(0.0, 1.0 - footprint * 6.0)
 
 

@@ -1,6 +1,6 @@
 """Lookup of the material of the ground at a point: the top-most polygon of the map that contains it, exactly.
 
-A grid of square cells says for most points what lies there. In a cell with several materials, the polygons that have an
+A grid of square cells gives the material at most points. In a cell with several materials, the polygons that have an
 edge in it are tried from the top: a path from the corner of the cell to the point, first along y and then along x, is
 crossed an odd number of times by the edges of a polygon if one end is inside and the other outside.
 """
@@ -128,9 +128,9 @@ def part_of(left: float, top: float, inverse: float, columns: int, rows: int, x:
     Args:
         left: first x of the grid [m].
         top: first y of the grid [m].
-        inverse: of the width of a cell [1/m].
-        columns: of cells.
-        rows: of cells.
+        inverse: inverse of the width of a cell [1/m].
+        columns: number of columns of cells.
+        rows: number of rows of cells.
         x: [m].
         y: [m].
     """
@@ -208,7 +208,7 @@ def materials_between(
 
     Args:
         ground: materials.
-        sheet: of the ground.
+        sheet: sheet of the ground.
         part: square of the corner at (x0, y0), see `part_of`.
         other: square of the corner at (x1, y1).
         x0: smallest x.

@@ -20,7 +20,7 @@ class Relief(enum.IntEnum):
     """Effect of a material on the height of the ground."""
 
     PAINT = 0
-    """Lies on what is below it."""
+    """Lies on the surface below it."""
     FLAT = 1
     """At the height of the lanes."""
     RAISED = 2

@@ -56,7 +56,7 @@ def cut_ground(
 
     Args:
         regions: areas by value, without overlaps; the rest of the plane is `Area.RAISED`.
-        low: smallest x and y of what is cut into cells (2,) [m].
+        low: smallest x and y of the area that is cut into cells (2,) [m].
         high: largest x and y of it [m].
         height: height at positions (n, 2) [m], None where all is level.
     """

@@ -52,7 +52,7 @@ def _parts(areas: Sequence[BaseGeometry]) -> NDArray[np.object_]:
 
 
 def find_regions(polygons: Sequence[Painted]) -> Regions:
-    """Returns the areas of a sheet: what is painted later covers what is painted earlier."""
+    """Returns the areas of a sheet: later layers cover earlier ones."""
     flat: BaseGeometry = shapely.Polygon()
     slope: BaseGeometry = shapely.Polygon()
     layers = [(LOOKS[polygon.material].relief, polygon.points) for polygon in polygons]
@@ -66,7 +66,7 @@ def find_regions(polygons: Sequence[Painted]) -> Regions:
 
 
 def _with(area: BaseGeometry, other: BaseGeometry, more: bool) -> BaseGeometry:
-    """Returns an area with or without another one."""
+    """Returns the union or difference of two areas."""
     operation = shapely.union if more else shapely.difference
     return only_areas(operation(area, other))
 

@@ -29,7 +29,7 @@ class Sheet:
 
     Attributes:
         polygons: in the order of painting.
-        outside: material where there is none of them.
+        outside: material where there is no polygon.
         low, high: bounds (2,) [m].
         level: 0 on the ground, 1 and more for bridges, -1 for tunnels.
         stretches: parts of lanes of a bridge or tunnel.

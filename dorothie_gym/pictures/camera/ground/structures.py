@@ -131,8 +131,8 @@ def add_tunnel(
 
     Args:
         builder: receives the triangles.
-        level: of the tunnels.
-        number: of their sheet.
+        level: level of the tunnels.
+        number: number of their sheet.
         field: heights.
         floors: areas of their floors.
         cover: area of the ground above.

@@ -139,9 +139,9 @@ class TunnelFloors(NamedTuple):
     """Floors of tunnels.
 
     Attributes:
-        area: of all of them.
+        area: union of all areas.
         pavements: area of those that are a kerb higher.
-        heights: of the roads (n,) at positions (n, 2) [m].
+        heights: heights of the roads (n,) at positions (n, 2) [m].
     """
 
     area: BaseGeometry
@@ -154,8 +154,8 @@ def add_faces(builder: MeshBuilder, edges: Edges, tunnels: TunnelFloors | None =
 
     Args:
         builder: receives the triangles.
-        edges: of the ground.
-        tunnels: whose mouths are left open, if there are any.
+        edges: edges of the ground.
+        tunnels: tunnels whose mouths are left open, if there are any.
     """
     if tunnels is not None:
         shapely.prepare((tunnels.area, tunnels.pavements))

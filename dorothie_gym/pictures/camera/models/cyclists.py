@@ -19,7 +19,7 @@ PEDAL_PHASES = 8
 """Phases of one turn of the pedals."""
 
 PEDAL_CYCLE = 4.3
-"""Way of one turn of the pedals [m]: a wheel of 28 inches and two turns of it."""
+"""Distance covered in one turn of the pedals [m]: a wheel of 28 inches and two turns of it."""
 
 _WHEEL = 0.34  # [m]
 _AXLE = CYCLIST_LENGTH / 2.0 - _WHEEL

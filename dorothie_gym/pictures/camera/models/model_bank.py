@@ -160,7 +160,7 @@ def pedestrian_model(walker: PedestrianRecord, distance: float) -> int:
 
 @compiled
 def prop_model_index(prop: PropRecord) -> int:
-    """Returns the model of a prop, which its size tells."""
+    """Returns the model of a prop, which is determined by its size."""
     for k in range(_PROPS):
         if _PROP_SIZES[k, 0] == prop.length and _PROP_SIZES[k, 1] == prop.width:
             return FIRST_PROP + k
@@ -181,9 +181,9 @@ def place_bodies(
     """Lists the models of all bodies near a camera.
 
     Args:
-        vehicles: of a world; empty rows are left out, here and below.
-        pedestrians: of the world.
-        props: of the world.
+        vehicles: vehicles of a world; empty rows are left out, here and below.
+        pedestrians: pedestrians of the world.
+        props: props of the world.
         eye: x and y of the camera [m].
         reach: distance up to which bodies are listed [m].
         own: key of the vehicle that carries the camera, which is left out; -1 for none.

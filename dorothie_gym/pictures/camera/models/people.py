@@ -18,12 +18,12 @@ PHASES = 8
 """Phases of a walking cycle of two steps."""
 
 STANDING = PHASES
-"""Pose of somebody who stands, after the phases."""
+"""Pose of a standing person, after the phases."""
 
 POSES = PHASES + 1
 
 CYCLE = 1.4
-"""Way that a person walks in one cycle [m] (two steps of 0.7 m, Knoblauch et al. 1996)."""
+"""Distance that a person walks in one cycle [m] (two steps of 0.7 m, Knoblauch et al. 1996)."""
 
 _THIGH, _SHANK, _SOLE = 0.43, 0.42, 0.07  # [m]
 _SWING, _ARM_SWING = 0.42, 0.42  # [rad] largest angles of thighs and arms

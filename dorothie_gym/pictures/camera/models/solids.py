@@ -109,7 +109,7 @@ class ModelBuilder:
             start: centre of one end [m].
             end: centre of the other end [m].
             radii: at both ends [m].
-            slot: of its colour.
+            slot: slot of its colour.
             sides: number of its sides.
             shade: brightness.
             closed: whether its ends are closed.

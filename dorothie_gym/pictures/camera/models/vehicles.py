@@ -55,7 +55,7 @@ class _Form:
     """Outline of a car [m].
 
     Attributes:
-        stations: of the body from front to back, as (x, height, half its width).
+        stations: stations of the body from front to back, as (x, height, half its width).
         cabin: x of the lower front and rear edge, and height of the belt line there.
         roof: x of the upper front and rear edge, and height.
         roof_side: half the width of the roof.

@@ -60,7 +60,7 @@ class Style(enum.IntEnum):
 
 @dataclass(frozen=True)
 class _Manner:
-    """How a quarter is built.
+    """Style of the buildings of a quarter.
 
     Attributes:
         styles: shares of the styles.
@@ -104,7 +104,7 @@ class Building:
 
     Attributes:
         centre: (x, y) [m].
-        heading: direction of somebody who looks at its front from the street [rad].
+        heading: viewing direction of a person who looks at its front from the street [rad].
         length: along the street [m].
         depth: away from it [m].
         storeys: number of storeys.

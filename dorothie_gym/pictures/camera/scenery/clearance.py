@@ -1,4 +1,4 @@
-"""Room for scenery: what the map draws is kept free, and a lot is reserved for the landmark of each site."""
+"""Room for scenery: everything that the map draws is kept free, and a lot is reserved for the landmark of each site."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def _sights(town: Town, site: Site, lot: Lot) -> list[shapely.Polygon]:
 
 
 def _before(town: Town, site: Site, distance: float) -> tuple[float, float]:
-    """Returns the position (x, y) [m] on the way to a site at a distance before its stop, as far as there is a lane."""
+    """Returns the position (x, y) [m] at a distance before the stop at a site, as far as there is a lane."""
     lane, station = town.lanes[site.lane], site.station
     seen = {lane.id}
     while station < distance and (before := [k for k in town.predecessors(lane.id) if k not in seen]):
@@ -156,7 +156,7 @@ def _before(town: Town, site: Site, distance: float) -> tuple[float, float]:
 
 
 def _footways(town: Town) -> list[shapely.Polygon]:
-    """Returns the ways of pedestrians, also round corners and beside roads without pavements."""
+    """Returns the footways of pedestrians, also round corners and beside roads without pavements."""
     arrays = town_arrays(network_of(town))
     lines = [arrays.walk_points[way.first : way.last + 1, :2] for way in arrays.walks if way.length > 0.0]
     return [shapely.LineString(line).buffer(FOOTWAY) for line in lines]

@@ -1,4 +1,4 @@
-"""Landmarks of a session as buildings that one recognises: brands by colours, form and totem, others by a pictogram."""
+"""Landmarks of a session as recognisable buildings: brands by colours, form and totem, others by a pictogram."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: 
     """Returns the landmarks of a session; the triangles of each have its `landmark_key` as instance.
 
     Args:
-        landmarks: of the session.
-        lots: of the sites of the town, by their ids.
+        landmarks: landmarks of the session.
+        lots: lots of the sites of the town, by their ids.
         ground: heights of the ground.
     """
     parts = []
@@ -137,7 +137,7 @@ class _Works:
         colour: Rgb = (255, 255, 255), turned: float = 0.0, kind: ObjectClass = ObjectClass.BUILDING,
         surface: Surface = Surface.NONE,
     ) -> None:  # fmt: skip
-        """Adds an upright panel around a place, read from the street, or by somebody turned from there [rad].
+        """Adds an upright panel around a place, read from the street, or by a viewer turned from there [rad].
 
         Panels with names and pictograms are lit signs.
         """

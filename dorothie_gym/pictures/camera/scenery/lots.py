@@ -16,7 +16,7 @@ class Lot:
     Attributes:
         site: id of the site.
         place: position of the site (x, y) [m].
-        heading: direction of somebody who looks at it from its street [rad].
+        heading: viewing direction of a person who looks at it from its street [rad].
         front: middle of its front edge (x, y) [m].
         length: along the street [m].
         depth: away from the street [m].

@@ -136,7 +136,7 @@ def _signal_of(town: Town, post: Post) -> int:
 
 
 def _traffic_light() -> tuple[Mesh, dict[Colour, tuple[int, int]]]:
-    """Returns a light that is read by somebody who looks along x, and the triangles of its lenses."""
+    """Returns a light for a viewer who looks along x, and the triangles of its lenses."""
     builder, kind = MeshBuilder(), ObjectClass.TRAFFIC_LIGHT
     top = _HEAD + 1.5 * _BETWEEN + 0.06
     builder.prism(disc((0.0, 0.0), 0.075, 6), -0.1, top, colour=_METAL, kind=ObjectClass.POLE)
@@ -160,7 +160,7 @@ def _traffic_light() -> tuple[Mesh, dict[Colour, tuple[int, int]]]:
 
 
 def _round(x: float, z: float, radius: float, corners: int, turn: float = 0.0) -> Array:
-    """Returns corners (n, 3) of an upright polygon, from the right side upwards, for somebody who looks along x."""
+    """Returns corners (n, 3) of an upright polygon, from the right side upwards, for a viewer who looks along x."""
     angles = turn + np.arange(corners) * (2.0 * math.pi / corners)
     return np.column_stack((np.full(corners, x), radius * pn.cos(angles), z + radius * pn.sin(angles)))
 
@@ -169,7 +169,7 @@ def _polygon(
     builder: MeshBuilder, corners: Array, colour: tuple[int, int, int], kind: ObjectClass, *,
     texture: Texture = Texture.PLAIN, surface: Surface = Surface.NONE, backwards: bool = False,
 ) -> None:  # fmt: skip
-    """Adds a convex polygon (n, 3), anticlockwise for somebody who looks along x, with one repeat of a texture."""
+    """Adds a convex polygon (n, 3), anticlockwise for a viewer who looks along x, with one repeat of a texture."""
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     size = float(np.ptp(corners[:, 1:], axis=0).max())
     places = (corners[:, 1:] - middle[1:]) / size + 0.5
