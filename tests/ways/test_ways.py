@@ -94,7 +94,7 @@ def test_an_utterance_meets_its_reply_by_the_files_of_the_page() -> None:
     from tests.ways.typed_words import send_message
 
     table = Table("participant=human", seed=7)
-    tick = "lab/console/room.py:Room.tick"
+    tick, listen = "lab/console/room.py:Room.tick", "policies/co_wizard/dialogue_update.py:listen"
     stages = [
         Stage("lab/console/server.py:_receive", "lab/console/room.py:Room.receive"),  # a queue
         Stage(tick, "lab/console/speech_input.py:typed_acts"),  # another one, of the seat
@@ -102,19 +102,20 @@ def test_an_utterance_meets_its_reply_by_the_files_of_the_page() -> None:
         Stage(tick, "dialogue/conversation.py:Conversation.say"),  # until the words have been spoken
         Stage(tick, "dialogue/conversation.py:Conversation.deliver"),
         Stage(tick, "session/observations.py:ObservationBuilder.build"),  # read at the next decision
-        Stage(tick, "policies/speech.py:SpeakingState.say"),  # the reply: spoken and delivered as above
+        Stage(tick, listen),
+        Stage(listen, "policies/speech.py:SpeakingState.say"),  # the reply: spoken and delivered as above
         Stage(tick, "lab/console/talk_log.py:TalkLog.hear"),
         Stage(tick, "lab/console/seat_frames.py:SeatFrames.of"),
     ]
     said = {"k": "say", "n": 1, "text": "turn left at the next intersection"}
 
-    def speakers() -> list[Role]:
-        return [utterance.speaker for utterance in table.room.engine.session.dialogue.said]
+    def answered() -> bool:
+        speakers = [utterance.speaker for utterance in table.room.engine.session.dialogue.said]
+        return speakers[-2:] == [Role.PARTICIPANT, Role.CO_WIZARD]
 
     with traced(stages):
         token = table.room.seats["participant"].token
-        send_message(table.room, token, said, then=lambda: table.until(lambda: Role.CO_WIZARD in speakers()))
-    assert speakers()[:2] == [Role.PARTICIPANT, Role.CO_WIZARD]
+        send_message(table.room, token, said, joined=lambda: table.run(1.0), sent=lambda: table.until(answered))
     check(UTTERANCE, stages)
 
 

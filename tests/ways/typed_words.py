@@ -4,17 +4,33 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from dorothie_gym.lab.console.room import Room
 from dorothie_gym.lab.console.server import Console
 
 
-def send_message(room: Room, token: str, message: Mapping[str, object], *, then: Callable[[], None]) -> None:
-    """Joins the seat of a token and sends a message; calls `then` when it has been read, before the connection ends."""
-    texts = [json.dumps({"k": "join", "token": token}), json.dumps(message)]
-    incoming = iter([{"type": "websocket.connect"}, *({"type": "websocket.receive", "text": text} for text in texts)])
+def send_message(
+    room: Room, token: str, message: Mapping[str, object], *, joined: Callable[[], None], sent: Callable[[], None]
+) -> None:
+    """Joins the seat of a token and sends a message over one connection.
+
+    Args:
+        room: room with the seat.
+        token: token of the seat.
+        message: the message.
+        joined: called after the seat was joined, before the message.
+        sent: called when the message has been read, before the connection ends.
+    """
+
+    def messages() -> Iterator[dict[str, Any]]:
+        yield {"type": "websocket.connect"}
+        yield {"type": "websocket.receive", "text": json.dumps({"k": "join", "token": token})}
+        joined()
+        yield {"type": "websocket.receive", "text": json.dumps(message)}
+
+    incoming = messages()
 
     async def talk() -> None:
         read = asyncio.Event()
@@ -35,7 +51,7 @@ def send_message(room: Room, token: str, message: Mapping[str, object], *, then:
         }  # fmt: skip
         serving = asyncio.create_task(Console([room]).app()(scope, receive, send))
         await read.wait()
-        then()
+        sent()
         serving.cancel()
         await asyncio.gather(serving, return_exceptions=True)
 
