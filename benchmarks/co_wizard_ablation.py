@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
-from dorothie_gym.baselines.co_wizard.features import ordered_exit
-from dorothie_gym.baselines.co_wizard.files import load_network
-from dorothie_gym.baselines.co_wizard.memory import FRESH, SPEEDS, Memory, Update
-from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
-from dorothie_gym.baselines.co_wizard.remarks import Sources, filled
-from dorothie_gym.baselines.imitation.drawing import drawn
+from dorothie_gym.baselines.roles.co_wizard.decision import Inputs, Scene
+from dorothie_gym.baselines.roles.co_wizard.features import ordered_exit
+from dorothie_gym.baselines.roles.co_wizard.files import load_network
+from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, SPEEDS, Memory, Update
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
+from dorothie_gym.baselines.roles.co_wizard.remarks import Sources, filled
+from dorothie_gym.baselines.roles.learned_role.drawing import drawn
 from dorothie_gym.cli.output import reporting_errors, session_progress
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.maps import Town

@@ -21,11 +21,11 @@ from safetensors import safe_open
 
 from dorothie_gym import __version__
 from dorothie_gym.baselines.checkpoints import KIND, ModelCard
-from dorothie_gym.baselines.co_wizard import files as co_wizard
 from dorothie_gym.baselines.experiment import RESULT_FILE
-from dorothie_gym.baselines.participant import files as participant
 from dorothie_gym.baselines.rl.checkpoint import TENSORS, load_model, save_model
 from dorothie_gym.baselines.rl.run import BEST, PROGRESS
+from dorothie_gym.baselines.roles.co_wizard import files as co_wizard
+from dorothie_gym.baselines.roles.participant import files as participant
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.evaluation.closed_loop.running import command_of
 from dorothie_gym.ontology import Role

@@ -8,9 +8,9 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines import checkpoints, loaders
-from dorothie_gym.baselines.co_wizard import files as co_wizard_files
-from dorothie_gym.baselines.participant import files as participant_files
 from dorothie_gym.baselines.rl import checkpoint
+from dorothie_gym.baselines.roles.co_wizard import files as co_wizard_files
+from dorothie_gym.baselines.roles.participant import files as participant_files
 from dorothie_gym.policies.policy_loader import MODEL_LOADERS
 
 

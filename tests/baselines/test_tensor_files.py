@@ -18,8 +18,8 @@ import torch
 from torch import nn
 
 from dorothie_gym.baselines import checkpoints
-from dorothie_gym.baselines.co_wizard.files import load_network
 from dorothie_gym.baselines.rl.checkpoint import load_model
+from dorothie_gym.baselines.roles.co_wizard.files import load_network
 from dorothie_gym.baselines.tensor_files import read_header, read_tensors, save_tensors
 from dorothie_gym.errors import DorothieGymError, InputFileError
 

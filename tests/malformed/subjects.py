@@ -299,8 +299,8 @@ def _training(folder: Path) -> Training:
 
 
 def _co_wizard_model(folder: Path) -> None:
-    from dorothie_gym.baselines.co_wizard.files import KIND, MODEL_FORMAT, ModelPage, save_network
-    from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork, Layout
+    from dorothie_gym.baselines.roles.co_wizard.files import KIND, MODEL_FORMAT, ModelPage, save_network
+    from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork, Layout
 
     form = (
         '{"content":null,"meaning":[["goal",0,[["place",["from","goal"]]]]],"move":"Acknowledge",'
@@ -315,8 +315,8 @@ def _co_wizard_model(folder: Path) -> None:
 
 
 def _participant_model(folder: Path) -> None:
-    from dorothie_gym.baselines.participant.files import KIND, MODEL_FORMAT, ModelPage, save_network
-    from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
+    from dorothie_gym.baselines.roles.participant.files import KIND, MODEL_FORMAT, ModelPage, save_network
+    from dorothie_gym.baselines.roles.participant.network import Layout, ParticipantNetwork
 
     form = (
         '{"content":null,"meaning":[["goal",0,[["place",["from","goal"]]]]],"move":"Instruct",'

@@ -1,0 +1,97 @@
+"""The scripted participant as a teacher: run beside a session, it says what it would choose and say.
+
+The teacher observes what the player observes. What the player said instead is put into its state (`settle`), so that it
+goes on from the player's course, not from its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, Choice, Memory
+from dorothie_gym.maps.town import Town
+from dorothie_gym.policies.participant.config import ParticipantStyle
+from dorothie_gym.policies.participant.policy import ScriptedParticipant
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import Remark
+from dorothie_gym.session.spaces.actions import ActionDict
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lesson:
+    """What the teacher does in a decision.
+
+    Attributes:
+        target: number of the subgoal that is its target; None for none.
+        guiding: whether it guides the car.
+        remarks: what it decides to say now, in one breath or the next.
+        action: its action.
+    """
+
+    target: int | None
+    guiding: bool
+    remarks: tuple[Remark, ...]
+    action: ActionDict
+
+    def choice(self, memory: Memory) -> Choice:
+        """Returns the choice by which a memory gets the teacher's target."""
+        same = self.target is None or self.target == memory.records.task.target
+        return Choice(target=KEEP_TARGET if same or self.target is None else self.target, guiding=self.guiding)
+
+
+class Teacher:
+    """Scripted participant beside a session."""
+
+    def __init__(self, town: Town, limits: SpaceLimits, seed: int, style: ParticipantStyle | None = None) -> None:
+        """Prepares the teacher.
+
+        Args:
+            town: the map.
+            limits: sizes of the spaces.
+            seed: seed of its draws, that of the recorded policy where a recorded session is followed.
+            style: style; None for the persona of the seed.
+        """
+        self._policy = ScriptedParticipant(limits, style)
+        self.state: ParticipantState = self._policy.initial_state(seed, town)
+        self._former = self.state
+
+    def decide(self, observation: ObservationMapping) -> Lesson:
+        """Takes a decision."""
+        self._former = former = self.state
+        action, state = self._policy.step(observation, former)
+        self.state = state
+        spoke = state.speech.last is not former.speech.last
+        after = (*state.speech.said[-1:], *state.speech.queue) if spoke else state.speech.queue
+        return Lesson(
+            target=state.task.target,
+            guiding=state.guidance.guiding,
+            remarks=_new(former.speech.queue, after),
+            action=action,
+        )
+
+    def settle(self, memory: Memory, *, spoke: bool) -> None:
+        """Puts into the state what the player has chosen and said instead.
+
+        Args:
+            memory: the player's memory after the decision.
+            spoke: whether the player has decided to say something.
+        """
+        records, state, former = memory.records, replace(self.state), self._former
+        state.speech = records.speech
+        if not spoke:
+            heard_at = max(former.conversation.heard_at, state.conversation.heard_at)
+            state.conversation = former.conversation.after_hearing(heard_at)
+        if records.task.target == state.task.target:
+            state.task, state.route = records.task, records.route
+            state.guidance = records.guidance.with_guiding(state.guidance.guiding)
+        self.state = state
+
+
+def _new(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...]:
+    """Returns the remarks that were not there before, whatever their words."""
+    known = [(one.act, one.meaning) for one in before]
+    return tuple(one for one in after if (one.act, one.meaning) not in known)
