@@ -1,8 +1,7 @@
 """Answers of the learned Co-Wizard that follow from its evidence, and which of its remarks the evidence rules out.
 
-Whether a question is answered is chosen by the network. What a yes/no question is answered follows from the evidence
-for what it asks (`beliefs.evidence`); why the car stands or turns round, from its state and memory (`reasons`); when it
-arrives, from its route. What was not understood is said again from memory.
+Whether a question is answered is chosen by the network. The answers are those that the scripted Co-Wizard would give
+with the knowledge of the memory (`policies.co_wizard.answers`). What was not understood is said again from memory.
 """
 
 from __future__ import annotations
@@ -11,17 +10,16 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.beliefs import evidence, seconds_to_goal
 from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.roles.co_wizard.memory import Memory, seconds_since
-from dorothie_gym.baselines.roles.co_wizard.reasons import why_standing, why_turning_round
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, ObjectClass, Slot, SlotValue, StreetName
-from dorothie_gym.policies.co_wizard.answers import arrival
+from dorothie_gym.policies.co_wizard.answers import arrival, judged, why_standing, why_turning_round
+from dorothie_gym.policies.co_wizard.proposition_truth import believes
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.speech import Remark, intend, repeated
+from dorothie_gym.policies.speech import Remark, repeated
 
 _OPEN_QUESTIONS: Final[Mapping[SlotValue, tuple[Predicate, ...]]] = MappingProxyType(
     {
@@ -45,7 +43,6 @@ SAID_AGAIN_AFTER: Final = 8.0
 _ANSWERS: Final = (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM)
 _REASONS_AND_TIMES: Final = (Predicate.BECAUSE, Predicate.STANDS, Predicate.ARRIVES_IN)
 _STATEMENTS: Final = (*_ANSWERS, DialogueMove.REPLY_W, DialogueMove.EXPLAIN)
-_ABOUT_THE_GOAL: Final = (Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS)
 
 
 def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -> Remark | None:
@@ -65,16 +62,9 @@ def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -
     asked = _verified(utterance, memory)
     if asked is None:
         return None
-    if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
-        asked = Proposition.of(asked.predicate, negated=asked.negated, place=memory.goal)
-    held, elided = evidence(memory, view, asked), [name for name, _ in asked.arguments]
-    if held is None:
-        return intend(CommunicativeFunction.UNCERTAIN_ANSWER, asked, elided=elided)
-    if held:
-        checks = utterance.asks is DialogueMove.CHECK
-        yes = CommunicativeFunction.CONFIRM if checks else CommunicativeFunction.AFFIRMATIVE_ANSWER
-        return intend(yes, asked, elided=elided)
-    return intend(CommunicativeFunction.NEGATIVE_ANSWER, asked.opposite, elided=elided)
+    checks = utterance.asks is DialogueMove.CHECK
+    yes = CommunicativeFunction.CONFIRM if checks else CommunicativeFunction.AFFIRMATIVE_ANSWER
+    return judged(memory, view, asked, yes)
 
 
 def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
@@ -95,7 +85,7 @@ def _open_answer(utterance: Utterance, memory: Memory, view: CoWizardView) -> Re
     asked = utterance.heard.words.asked
     if asked is None or asked.predicate is not Predicate.ARRIVES_IN:
         return None
-    return arrival(memory.goal, seconds_to_goal(memory, view))
+    return arrival(memory, view)
 
 
 def is_answer(remark: Remark, answer: Remark) -> bool:
@@ -165,7 +155,7 @@ def _is_denied(memory: Memory, view: CoWizardView, said: Proposition) -> bool:
     if said.predicate is Predicate.BECAUSE:
         cause = said.get("cause")
         return said.get("at") is None and isinstance(cause, Proposition) and _is_denied(memory, view, cause)
-    return evidence(memory, view, said) is False
+    return believes(memory, view, said) is False
 
 
 def _is_about(answer: Proposition, utterance: Utterance) -> bool:

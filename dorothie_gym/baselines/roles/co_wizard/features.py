@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.beliefs import GPS_VARIANCE, LOST_VARIANCE, evidence, goal_left
 from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.roles.co_wizard.memory import (
     AWAY,
@@ -22,7 +21,7 @@ from dorothie_gym.maps.model import Exit
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, ObjectClass
-from dorothie_gym.policies.co_wizard.proposition_truth import is_red_ahead
+from dorothie_gym.policies.co_wizard.proposition_truth import believes, distance_to_goal, is_red_ahead
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import RouteStep
@@ -100,7 +99,8 @@ def _distance(metres: float) -> list[float]:
 
 def car_vector(memory: Memory, view: CoWizardView) -> list[float]:
     """Returns the state of the car; it does not change within a decision."""
-    standing = None if memory.standing_since is None else view.time - memory.standing_since
+    standing = None if memory.standstill.since is None else view.time - memory.standstill.since
+    variances = memory.config.gps_variance, memory.config.lost_variance
     fault, limit = camera_fault(view.raw), limit_of(view.raw)
     hazard = HAZARDS.index(view.hazard) if view.hazard in HAZARDS else -1 if view.hazard is ObjectClass.UNLABELED else 5
     return [
@@ -114,7 +114,7 @@ def car_vector(memory: Memory, view: CoWizardView) -> list[float]:
         min(standing or 0.0, 30.0) / 30.0, float((standing or 0.0) > 4.0), float((standing or 0.0) > 5.0),
         *_one_hot(-1 if limit is None else tuple(Limit).index(limit), len(Limit)), float(is_dark(view.raw)),
         float(fault is not None), sight(view.raw) / 100.0, suitable_speed(sight(view.raw)) / 60.0,
-        math.tanh(view.variance), float(view.variance > GPS_VARIANCE), float(view.variance > LOST_VARIANCE),
+        math.tanh(view.variance), *(float(view.variance > most) for most in variances),
         float(is_red_ahead(memory.town, view)),
     ]  # fmt: skip
 
@@ -186,7 +186,7 @@ def _stop_at(memory: Memory, view: CoWizardView, distance: float | None) -> list
 def _remembered(memory: Memory, view: CoWizardView) -> list[float]:
     hot = [value for name, size in VARIABLES.items() for value in _one_hot(memory.value(name), size)]
     ages = [value for at in memory.changed_at for value in _time(seconds_since(view.time, at))]
-    left = goal_left(memory, view)
+    left = distance_to_goal(memory, view)
     fault = float(any(status is GoalStatus.COMPLETE for _, status in memory.statuses))
     return [
         *hot, *ages, float(memory.goal is not None), float(memory.goal_mark >= 0), float(memory.goal in SHARED_NAMES),
@@ -203,7 +203,7 @@ def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], q
     ages = [math.exp(-seconds_since(view.time, said[topic]) / 10.0) if topic in said else 0.0 for topic in TOPICS]
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
     asked = None if latest is None else latest.asked
-    found = None if asked is None else evidence(memory, view, asked)
+    found = None if asked is None else believes(memory, view, asked)
     places = () if latest is None else latest.places
     on_map = [any(mark.name is name for mark in view.landmarks) for name in places]
     return [

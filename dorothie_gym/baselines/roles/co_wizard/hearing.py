@@ -16,7 +16,8 @@ from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX, LABELS, DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, SlotValue, StreetName
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.observation_parser import HeardUtterance
 
 WORD_BUCKETS: Final = 4096
@@ -95,30 +96,18 @@ class Utterance:
             return self.heard.words.asked
         for act in self.heard.acts:
             if act.move in (DialogueMove.QUERY_YN, DialogueMove.CHECK):
-                return _asked_by_slots(self, [value for value in act.slots if value.label != "Queried"])
+                objects, actions = (_known(act.values(slot)) for slot in (Slot.OBJECT, Slot.ACTION))
+                return act_builders.asked_by_slots(objects, actions, self.places, self.streets)
         return None
+
+
+def _known(values: Sequence[SlotValue]) -> list[SlotValue]:
+    return [value for value in values if value.label != "Queried"]
 
 
 def _explained(act: DialogueAct) -> ActionValue | None:
     """Returns the action of an act that has a reason to be asked for."""
     return next((value for value in (ActionValue.STOP, ActionValue.U_TURN) if value in act.slots), None)
-
-
-def _asked_by_slots(utterance: Utterance, values: Sequence[object]) -> Proposition | None:
-    objects = [value for value in values if isinstance(value, ObjectClass)]
-    actions = [value for value in values if isinstance(value, ActionValue)]
-    places, streets = utterance.places, utterance.streets
-    if ActionValue.LIGHT_CHANGE in actions:
-        return Proposition.of(Predicate.LIGHTS_ON)
-    if objects:
-        return Proposition.of(Predicate.SEES, object=min(objects, key=lambda value: int(value.value)))
-    if places and streets:
-        return Proposition.of(Predicate.LOCATED, place=places[0], street=streets[0])
-    if places:
-        return Proposition.of(Predicate.KNOWS, place=places[0])
-    if actions:
-        return Proposition.of(Predicate.DOES, action=min(actions, key=lambda value: int(value.value)))
-    return Proposition.of(Predicate.ON_STREET, street=streets[0]) if streets else None
 
 
 def word_rows(text: str) -> NDArray[np.int64]:

@@ -14,20 +14,22 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.reasons import reason_to_stand
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
-from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.policies.co_wizard.config import CoWizardConfig
+from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
+from dorothie_gym.policies.knowledge import TOLD_TO_STOP, Standstill
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import Navigator
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import DecisionClock, replace
-from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
+from dorothie_gym.policies.route_progress import RouteProgress, default_lane_distance, default_lane_place
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
@@ -125,10 +127,7 @@ class Memory:
         statuses: status of errands by place.
         updates: belief updates to be sent, the next first.
         plan: junctions of the route as sent last.
-        standing_since: start of the standstill [s]; None while the car moves.
-        stood_until: end of the last standstill [s].
-        reason: why the car stands, or stood last, as far as that could be told.
-        reason_since: since when it has stood for this reason [s].
+        standstill: present or last standstill, and the reason for it.
         told_to_stop_at: time at which it halted because of an utterance [s].
         told_to_turn_round_at: last time at which it was to turn round because of one [s].
         physical: last own physical action; None for none.
@@ -158,10 +157,7 @@ class Memory:
     statuses: tuple[tuple[LandmarkName, GoalStatus], ...] = ()
     updates: tuple[Mental, ...] = ()
     plan: tuple[int, ...] = ()
-    standing_since: float | None = 0.0
-    stood_until: float = -AWAY
-    reason: Proposition | None = None
-    reason_since: float = -AWAY
+    standstill: Standstill = Standstill()
     told_to_stop_at: float = -AWAY
     told_to_turn_round_at: float = -AWAY
     physical: PhysicalAction | None = None
@@ -174,6 +170,79 @@ class Memory:
     heard_at: float = -AWAY
     last: Remark | None = None
     clock: DecisionClock = DecisionClock()
+
+    # --- what it knows, see `CoWizardKnowledge` -----------------------------------------------------------------------
+
+    @property
+    def config(self) -> CoWizardConfig:
+        """Thresholds of the judgements: those of the scripted Co-Wizard."""
+        return _CONFIG
+
+    @property
+    def goal_is_on_map(self) -> bool:
+        """Whether the place of the goal is taken from the map."""
+        return self.goal_mark >= 0
+
+    @property
+    def goal_is_findable(self) -> bool:
+        """Whether a goal that is shown on the map could be found; what was described is not kept."""
+        return True
+
+    @property
+    def progress(self) -> RouteProgress | None:
+        """Route to the goal and the progress on it."""
+        return self.navigator.route.progress
+
+    @property
+    def is_halted(self) -> bool:
+        """Whether the car is to stand."""
+        return bool(self.value("halted"))
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether the car has stopped at its goal."""
+        return bool(self.value("arrived"))
+
+    @property
+    def is_sent_on(self) -> bool:
+        """Whether the car has only stopped where it was told to drive to: that is not kept."""
+        return False
+
+    @property
+    def is_pausing(self) -> bool:
+        """Whether the car stops until the way is known."""
+        return bool(self.value("pausing"))
+
+    @property
+    def is_directed(self) -> bool:
+        """Whether a turn that the participant asked for is ahead."""
+        return bool(self.value("order"))
+
+    @property
+    def is_to_turn_round(self) -> bool:
+        """Whether a U-turn that the participant asked for has not begun yet."""
+        return self.value("manoeuvre") == U_TURN
+
+    @property
+    def asks_for_detour(self) -> bool:
+        """Whether a question about a detour is open."""
+        return bool(self.value("detour"))
+
+    @property
+    def blocked_at(self) -> float:
+        """Time at which an obstacle was last found [s]."""
+        return self.navigator.blocked_at
+
+    @property
+    def stop_reason(self) -> Proposition:
+        """Why the car stopped on an instruction; what else was said then is not kept."""
+        return TOLD_TO_STOP
+
+    def rests_for(self, now: float) -> ObjectClass:
+        """Returns for what the car stops by a decision: that is not kept."""
+        return ObjectClass.UNLABELED
+
+    # --- what it remembers --------------------------------------------------------------------------------------------
 
     def distance_to(self, place: Place | None, view: CoWizardView) -> float | None:
         """Returns the distance to a place along the default lanes [m]; None if it is not near on them, or no place."""
@@ -191,18 +260,12 @@ class Memory:
             heard_at=view.time if heard else self.heard_at,
             navigator=self.navigator.followed(self.town, view),
         )
-        return memory._standing(view)._carrying_on(view)
-
-    def _standing(self, view: CoWizardView) -> Memory:
-        """Brings the standstill and the reason for it up to date; a reason that cannot be told any more stays."""
-        if not view.standing:
-            ended = self.stood_until if self.standing_since is None else view.time
-            return replace(self, standing_since=None, stood_until=ended)
-        memory = self if self.standing_since is not None else replace(self, standing_since=view.time, reason=None)
-        reason = reason_to_stand(memory, view)
-        if reason is None or reason == memory.reason:
-            return memory
-        return replace(memory, reason=reason, reason_since=view.time)
+        standstill = memory.standstill.observed(view.time, standing=view.standing)
+        memory = replace(memory, standstill=standstill)
+        if view.standing:
+            reason = reason_to_stand(memory, view)
+            memory = replace(memory, standstill=standstill.with_reason(reason, view.time))
+        return memory._carrying_on(view)
 
     def updated(
         self,
@@ -340,6 +403,7 @@ class Memory:
         return replace(self, said_at=said, spoke_at=view.time, asked_at=asked, asked_lane=lane, last=last)
 
 
+_CONFIG: Final = CoWizardConfig()
 _INDEX: Final[Mapping[str, int]] = MappingProxyType({name: k for k, name in enumerate(VARIABLES)})
 
 

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from dorothie_gym.baselines.roles.co_wizard.answers import answer_to, is_answer, said_again
-from dorothie_gym.baselines.roles.co_wizard.beliefs import seconds_to_goal
 from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.roles.co_wizard.memory import Memory
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
@@ -21,6 +20,7 @@ from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
+from dorothie_gym.policies.co_wizard.proposition_truth import seconds_to_goal
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace
@@ -76,8 +76,8 @@ def sources(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance])
     found["near"] = None if near is None else near.name
     pace = suitable_speed(sight(view.raw))
     found |= {"suitable": pace, "slow": pace - 5, "sight": 10 * round(sight(view.raw) / 10.0)}
-    if memory.standing_since is not None:
-        found["since"] = round(memory.standing_since)
+    if memory.standstill.since is not None:
+        found["since"] = round(memory.standstill.since)
     unnamed = (None, StreetName.UNKNOWN, LandmarkName.UNKNOWN)
     return {name: value for name, value in found.items() if value not in unnamed}
 

@@ -25,8 +25,9 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
+from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
-from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState, Directive, Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState

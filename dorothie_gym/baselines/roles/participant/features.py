@@ -8,7 +8,7 @@ from typing import Final
 
 from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.roles.participant.memory import Event, Memory
-from dorothie_gym.baselines.roles.participant.records import is_last_stretch, next_step
+from dorothie_gym.baselines.roles.participant.records import next_step
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import router
@@ -20,9 +20,10 @@ from dorothie_gym.policies.observation_parser import SeenSubgoal, is_dark, is_fo
 from dorothie_gym.policies.participant.arriving import about_to_arrive, room_to_stop
 from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
+from dorothie_gym.policies.participant.proposition_truth import believes, is_elsewhere
+from dorothie_gym.policies.participant.route_steps import is_last_stretch
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.participant.yes_no_answers import JUST_DONE
-from dorothie_gym.policies.route_progress import first_new_street, light_ahead, next_choice
+from dorothie_gym.policies.route_progress import light_ahead, next_choice
 from dorothie_gym.policies.turn_lanes import turn_lanes
 from dorothie_gym.policies.view_range import camera_fault, sight, suitable_speed
 
@@ -240,7 +241,7 @@ def _question(memory: Memory, view: ParticipantView, utterances: Sequence[Uttera
         return [0.0] * QUESTION_SIZE
     true = answer_to(memory, view, latest)
     told = latest.heard.words.told
-    holds = None if told is None else evidence(memory, view, told)
+    holds = None if told is None else believes(memory.records, view, told)
     places = latest.places
     other = [name for name in places if goal is None or name is not goal.name]
     open_places = [_name_of(view, subgoal) for subgoal in view.subgoals if subgoal.open and subgoal.allowed]
@@ -286,74 +287,12 @@ def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bo
     if plans and asked.get("direction") is None and direction is not None:
         action = asked.get("action")
         asked = Proposition.of(asked.predicate, negated=asked.negated, action=action, direction=direction)
-    found = evidence(memory, view, asked)
+    found = believes(memory.records, view, asked)
     if asked.predicate is Predicate.KNOWS and utterance.heard.words.asked is None:
         # a place alone: a check means the errand, another question means where the car stands
         checks = any(act.move is DialogueMove.CHECK for act in utterance.heard.acts)
-        return found and (checks or not _is_elsewhere(memory, view))
+        return found and (checks or not is_elsewhere(memory.records, view))
     return found
-
-
-def _is_elsewhere(memory: Memory, view: ParticipantView) -> bool:
-    """Returns whether the car stands far from the target."""
-    progress = memory.records.route.progress
-    far = progress is not None and progress.left(view.station) > memory.records.config.elsewhere_distance
-    return view.standing and far
-
-
-def evidence(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
-    """Returns whether a proposition is true by what the participant knows and sees; None where nothing tells."""
-    found = _holds(memory, view, said)
-    return found if found is None else found is not said.negated
-
-
-def _holds(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
-    records, goal = memory.records, memory.records.task.goal
-    progress, place, street = records.route.progress, said.get("place"), said.get("street")
-    about_goal = goal is not None and place in (None, goal.name)
-    left = math.inf if progress is None else progress.left(view.station)
-    match said.predicate:
-        case Predicate.SEES:
-            return any(thing.kind is said.get("object") for thing in view.objects)
-        case Predicate.GOAL | Predicate.KNOWS | Predicate.LOCATED | Predicate.TASK:
-            return about_goal and (street is None or (goal is not None and goal.street is street))
-        case Predicate.ON_STREET:
-            return street_of(view.raw, records.town, view.lane) is street
-        case Predicate.ARRIVED:
-            done, at = records.task.finished
-            if done is not None and place in (None, done) and view.standing and view.time - at <= JUST_DONE:
-                return True
-            return about_goal and view.standing and about_to_arrive(records, view) and abs(left) < 2.0
-        case Predicate.CLOSE:
-            return about_goal and left < 120.0
-        case Predicate.RIGHT_WAY:
-            return None if progress is None else not progress.astray
-        case Predicate.WILL | Predicate.DOES:
-            return _is_wanted(memory, view, said)
-        case Predicate.STANDS:
-            return view.standing
-        case _:
-            return None
-
-
-_LEFT_TO_THE_CAR: Final = (ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START)
-"""Actions that the participant leaves to the car."""
-
-
-def _is_wanted(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
-    """Returns whether an action that the car plans or proposes is the next step; None without a route."""
-    step = next_step(memory.records, view)
-    if step is None:
-        return None
-    direction, action, street = said.get("direction"), said.get("action"), said.get("street")
-    if action in _LEFT_TO_THE_CAR:
-        return True
-    if street is not None and action is None:
-        own = first_new_street(view.raw, memory.records.town, view.lane, memory.records.route.progress)
-        return own is None or own is street
-    if step.direction is Direction.STRAIGHT or step.key[0] == "on":
-        return action in (ActionValue.LANE_FOLLOW, ActionValue.J_TURN, None) and direction in (None, Direction.STRAIGHT)
-    return action in (step.action, None) and direction in (step.direction, None)
 
 
 # --- Errands ----------------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.baselines.roles.participant.records import is_last_stretch, note_remark, topic_of
+from dorothie_gym.baselines.roles.participant.records import note_remark, topic_of
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
@@ -26,6 +26,7 @@ from dorothie_gym.policies.participant.guidance import follow_route
 from dorothie_gym.policies.participant.policy import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.retrying import stop_circling
+from dorothie_gym.policies.participant.route_steps import is_last_stretch
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace

@@ -4,89 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
 from dorothie_gym.policies.participant.arriving import about_to_arrive
 from dorothie_gym.policies.participant.guidance import note_step
-from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+from dorothie_gym.policies.participant.route_steps import RouteStep, route_step
+from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.route_progress import RouteJunction
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.policies.turn_lanes import next_turn, turn_lanes
-
-
-@dataclass(frozen=True, kw_only=True)
-class RouteStep:
-    """Next step on the route to the target.
-
-    Attributes:
-        key: identity.
-        distance: distance to it [m].
-        action: action of the car that it asks for.
-        direction: direction of a turn or lane switch; None for others.
-        junction: junction of a turn; None for others.
-    """
-
-    key: StepKey
-    distance: float
-    action: ActionValue
-    direction: Direction | None = None
-    junction: RouteJunction | None = None
-
-
-def is_last_stretch(records: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether there is a route, and no junction or manoeuvre left on it before the target."""
-    progress = records.route.progress
-    if progress is None or progress.route is None:
-        return False
-    ahead = progress.next_crossing(records.town, view.station), progress.next_manoeuvre(view.station)
-    return ahead == (None, None)
 
 
 def next_step(records: ParticipantState, view: ParticipantView) -> RouteStep | None:
     """Returns the next step on the route; None without a route."""
-    progress, town = records.route.progress, records.town
-    if progress is None or progress.route is None:
-        return None
-    crossing, manoeuvre = next_turn(progress, town, view.station), progress.next_manoeuvre(view.station)
-    nearer = manoeuvre is not None and (crossing is None or manoeuvre[1] < crossing.distance)
-    if nearer and manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN:
-        return RouteStep(key=("round", 0, 0), distance=manoeuvre[1], action=ActionValue.U_TURN)
-    switch = nearer and (crossing is None or _needs_switch(records, view, crossing))
-    if crossing is not None and not switch:
-        straight = crossing.direction is Direction.STRAIGHT
-        return RouteStep(
-            key=("turn", crossing.lane, crossing.exit.connector),
-            distance=crossing.distance,
-            action=ActionValue.LANE_FOLLOW if straight else ActionValue.J_TURN,
-            direction=crossing.direction,
-            junction=crossing,
-        )
-    if manoeuvre is not None and manoeuvre[0] is not LaneEntry.U_TURN:
-        left = manoeuvre[0] is LaneEntry.CHANGE_LEFT
-        return RouteStep(
-            key=("lane", view.lane, int(left)),
-            distance=manoeuvre[1],
-            action=ActionValue.LANE_SWITCH,
-            direction=Direction.LEFT if left else Direction.RIGHT,
-        )
-    left_over = progress.left(view.station)
-    return RouteStep(key=("on", view.lane, 0), distance=left_over, action=ActionValue.LANE_FOLLOW)
-
-
-def _needs_switch(records: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
-    """Returns whether the lane before a junction has to be asked for; "turn left" includes the way to a turn lane."""
     progress = records.route.progress
-    assert progress is not None
-    if crossing.lane in turn_lanes(records.town):
-        return crossing.direction is Direction.STRAIGHT
-    return progress.needs_switch(records.town, view.lane, view.station, crossing)
+    return None if progress is None or progress.route is None else route_step(records, view)
 
 
 # --- Own remarks ------------------------------------------------------------------------------------------------------

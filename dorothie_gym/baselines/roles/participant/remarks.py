@@ -14,7 +14,7 @@ from typing import Any, Final
 from dorothie_gym.baselines.roles.co_wizard import remarks as forms
 from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.roles.participant.memory import Event, Memory
-from dorothie_gym.baselines.roles.participant.records import RouteStep, is_last_stretch, next_step
+from dorothie_gym.baselines.roles.participant.records import next_step
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
@@ -25,6 +25,7 @@ from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
 from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.route_steps import RouteStep, is_last_stretch
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street

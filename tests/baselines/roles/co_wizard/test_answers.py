@@ -9,8 +9,8 @@ from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
-from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.knowledge import TOLD_TO_STOP, Standstill
 from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
@@ -109,7 +109,7 @@ def test_reason_for_an_earlier_standstill_is_remembered_with_its_time(scene):
 def test_driver_that_was_told_to_stop_says_so_and_does_not_claim_it_otherwise(scene):
     view, memory = scene
     view = replace(view, time=30.0, speed=0.0)
-    bound = replace(memory, goal=LandmarkName.KFC, goal_mark=0, standing_since=None)
+    bound = replace(memory, goal=LandmarkName.KFC, goal_mark=0, standstill=Standstill(since=None))
     halting = Update(values=with_value(bound, "halted", 1), fresh=(False,) * 3)
     told = replace(bound, heard_at=29.0).updated(halting, view, (), (), None).seen(view, heard=False)
     unasked = replace(bound, heard_at=2.0).updated(halting, view, (), (), None).seen(view, heard=False)
