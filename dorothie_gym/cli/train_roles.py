@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.roles.learned_role.rounds import Stage
+    from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit
 
 OnStage = Callable[[str, int, int], None]
 
@@ -56,7 +56,8 @@ class RoleReport:
 
 
 def _train_co_wizard(request: Request) -> RoleReport:
-    from dorothie_gym.baselines.roles.co_wizard.training import CoWizardTraining, train_co_wizard
+    from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining
+    from dorothie_gym.baselines.roles.co_wizard.training import train_co_wizard
     from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS
 
     folder = request.folder("co-wizard")
@@ -79,7 +80,7 @@ def _train_participant(request: Request) -> RoleReport:
     return _fits("participant", stages)
 
 
-def _fits(role: str, stages: Sequence[Stage]) -> RoleReport:
+def _fits(role: str, stages: Sequence[FinishedFit]) -> RoleReport:
     return RoleReport(
         role=role,
         lines=tuple(f"{one.name}: {one.examples:,} examples, loss {one.loss:.3f}" for one in stages),

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.roles.co_wizard.memory import Memory, seconds_since
+from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
+from dorothie_gym.baselines.roles.learned_role.encoding import seconds_since
+from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
@@ -45,7 +46,7 @@ _REASONS_AND_TIMES: Final = (Predicate.BECAUSE, Predicate.STANDS, Predicate.ARRI
 _STATEMENTS: Final = (*_ANSWERS, DialogueMove.REPLY_W, DialogueMove.EXPLAIN)
 
 
-def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -> Remark | None:
+def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizardView) -> Remark | None:
     """Returns the answer to a question whose answer follows from the evidence; None if none has just been asked.
 
     These are questions that yes or no answers, why the car stands or turns round, and when it arrives.
@@ -67,7 +68,7 @@ def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -
     return judged(memory, view, asked, yes)
 
 
-def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
+def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None:
     """Returns what a yes/no question asks; a check that names no more is about the present goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
@@ -76,7 +77,7 @@ def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
     return utterance.asked or Proposition.of(Predicate.GOAL, place=memory.goal)
 
 
-def _open_answer(utterance: Utterance, memory: Memory, view: CoWizardView) -> Remark | None:
+def _open_answer(utterance: Utterance, memory: WorkingMemory, view: CoWizardView) -> Remark | None:
     """Returns the answer to why the car stands or turns round, or when it arrives; None to other questions."""
     if utterance.asks_why is ActionValue.STOP:
         return why_standing(memory, view)
@@ -98,7 +99,7 @@ def is_answer(remark: Remark, answer: Remark) -> bool:
     return not remark.meaning or (bool(answer.meaning) and remark.meaning[0].predicate is answer.meaning[0].predicate)
 
 
-def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
+def said_again(utterance: Utterance | None, memory: WorkingMemory) -> Remark | None:
     """Returns the last own remark, said again, if the participant has just not understood it."""
     if utterance is None or memory.last is None or not utterance.heard.acts:
         return None
@@ -112,7 +113,7 @@ def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
 def is_sayable(
     remark: Remark,
     topic: str,
-    memory: Memory,
+    memory: WorkingMemory,
     view: CoWizardView,
     utterance: Utterance | None,
     answer: Remark | None = None,
@@ -146,12 +147,12 @@ def is_sayable(
     return _is_about(remark.meaning[0], utterance)
 
 
-def _waits_for_answer(utterance: Utterance, memory: Memory) -> bool:
+def _waits_for_answer(utterance: Utterance, memory: WorkingMemory) -> bool:
     """Returns whether an utterance asks something, and nothing has been said since."""
     return memory.spoke_at < utterance.time and any(act.move in QUESTIONS for act in utterance.heard.acts)
 
 
-def _is_denied(memory: Memory, view: CoWizardView, said: Proposition) -> bool:
+def _is_denied(memory: WorkingMemory, view: CoWizardView, said: Proposition) -> bool:
     if said.predicate is Predicate.BECAUSE:
         cause = said.get("cause")
         return said.get("at") is None and isinstance(cause, Proposition) and _is_denied(memory, view, cause)

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.roles.co_wizard.decision import Inputs, Scene
-from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, Memory
-from dorothie_gym.baselines.roles.co_wizard.remarks import Sources, form_of
+from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept
+from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, WorkingMemory
+from dorothie_gym.baselines.roles.co_wizard.remarks import form_of
 from dorothie_gym.baselines.roles.co_wizard.teacher import Lesson
-from dorothie_gym.baselines.roles.learned_role.batches import IDLE_SHARE, UNKNOWN, TensorBatch, reals, whole
+from dorothie_gym.baselines.roles.learned_role.decision import Inputs
+from dorothie_gym.baselines.roles.learned_role.examples import (
+    IDLE_SHARE,
+    UNKNOWN,
+    ExampleBatch,
+    form_numbers,
+    reals,
+    weights_of,
+    whole,
+    word_tensor,
+)
+from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
 from dorothie_gym.session.spaces.actions import Physical
 
 
@@ -47,13 +58,13 @@ class Example:
 
 
 def make_example(
-    scene: Scene, listening: Inputs, acting: Inputs, commands: Sequence[Physical | None], lesson: Lesson,
+    percept: CoWizardPercept, listening: Inputs, acting: Inputs, commands: Sequence[Physical | None], lesson: Lesson,
     available: Sources, rng: np.random.Generator, *, talks: bool = True,
 ) -> Example | None:  # fmt: skip
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        scene: what was perceived.
+        percept: what was perceived.
         listening: inputs of the first step.
         acting: inputs of the second step.
         commands: possible commands.
@@ -63,9 +74,9 @@ def make_example(
         talks: whether the remarks, or silence, are learnt.
     """
     update = lesson.update
-    before = scene.memory.values
+    before = percept.memory.values
     idle = not (
-        scene.heard
+        percept.heard
         or lesson.physical
         or lesson.remarks
         or update.goal
@@ -89,7 +100,9 @@ def make_example(
     )  # fmt: skip
 
 
-def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Memory, lesson: Lesson) -> Example | None:
+def correcting_example(
+    percept: CoWizardPercept, listening: Inputs, acting: Inputs, led: WorkingMemory, lesson: Lesson
+) -> Example | None:
     """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
 
     Where the own goal is another place than the teacher's, and the utterance does not say which, the player is to
@@ -97,17 +110,17 @@ def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Mem
     against the directions that it is given.
 
     Args:
-        scene: what the player perceived, with its own memory.
+        percept: what the player perceived, with its own memory.
         listening: inputs of the first step.
         acting: inputs of the second step, from which nothing is learnt.
         led: memory that the teacher has led to.
         lesson: what the teacher did.
     """
-    own, update = scene.memory, lesson.update
+    own, update = percept.memory, lesson.update
     same_goal = own.goal is led.goal and own.goal_mark == led.goal_mark
     if own.values == update.values and same_goal and not update.goal:
         return None
-    latest = scene.latest
+    latest = percept.latest
     goal = UNKNOWN
     if same_goal:
         goal = int(GoalEvent.KEEP)
@@ -126,7 +139,7 @@ def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Mem
 
 
 @dataclass(frozen=True, eq=False)
-class Batch(TensorBatch):
+class CoWizardExamples(ExampleBatch[Example]):
     """Examples as tensors; the first axis of each is that of the examples."""
 
     REMARKS: ClassVar[tuple[str, ...]] = ("first", "second")
@@ -148,34 +161,25 @@ class Batch(TensorBatch):
     second: torch.Tensor
     weight: torch.Tensor
 
-
-def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
-    """Returns examples as tensors.
-
-    Args:
-        found: the examples, at least one.
-        forms: forms of remarks that are numbered; others are not learnt. The first one, "", stands for silence.
-    """
-    numbers = {form: k for k, form in enumerate(forms)}
-
-    def number(form: str | None) -> int:
-        return UNKNOWN if form is None else numbers.get(form, UNKNOWN)
-
-    return Batch(
-        listening=reals([one.listening.state for one in found]),
-        words=torch.from_numpy(np.stack([one.listening.words for one in found]).astype(np.int16)),
-        places=reals([one.listening.options for one in found]),
-        place_count=whole([len(one.listening.rows) for one in found]),
-        before=whole([one.before for one in found]),
-        values=whole([one.values for one in found]),
-        fresh=reals([np.asarray(one.fresh, dtype=np.float32) for one in found]),
-        goal=whole([one.goal for one in found]),
-        status=whole([one.status for one in found]),
-        acting=reals([one.acting.state for one in found]),
-        commands=reals([one.acting.options for one in found]),
-        command_count=whole([len(one.acting.rows) for one in found]),
-        command=whole([one.command for one in found]),
-        first=whole([number(one.remarks[0]) for one in found]),
-        second=whole([number(one.remarks[1]) for one in found]),
-        weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
-    )
+    @classmethod
+    def of(cls, found: Sequence[Example], forms: Sequence[str]) -> Self:
+        """Returns examples as tensors, see `ExampleBatch`."""
+        remarks = form_numbers([one.remarks for one in found], forms)
+        return cls(
+            listening=reals([one.listening.state for one in found]),
+            words=word_tensor([one.listening.words for one in found]),
+            places=reals([one.listening.options for one in found]),
+            place_count=whole([len(one.listening.rows) for one in found]),
+            before=whole([one.before for one in found]),
+            values=whole([one.values for one in found]),
+            fresh=reals([np.asarray(one.fresh, dtype=np.float32) for one in found]),
+            goal=whole([one.goal for one in found]),
+            status=whole([one.status for one in found]),
+            acting=reals([one.acting.state for one in found]),
+            commands=reals([one.acting.options for one in found]),
+            command_count=whole([len(one.acting.rows) for one in found]),
+            command=whole([one.command for one in found]),
+            first=remarks[:, 0],
+            second=remarks[:, 1],
+            weight=weights_of([one.weight for one in found]),
+        )

@@ -6,20 +6,25 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.roles.co_wizard.memory import (
-    AWAY,
     ORDERS,
     STATUSES,
     VARIABLES,
-    Memory,
-    seconds_since,
+    WorkingMemory,
 )
-from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.baselines.roles.learned_role.encoding import (
+    AWAY,
+    TOPICS,
+    age_scales,
+    distance_scales,
+    one_hot,
+    seconds_since,
+    time_scales,
+)
+from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit
 from dorothie_gym.ontology.actions import PhysicalAction
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, ObjectClass
 from dorothie_gym.policies.co_wizard.proposition_truth import believes, distance_to_goal, is_red_ahead
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -46,9 +51,6 @@ HAZARDS: Final = (
     ObjectClass.TRAFFIC_SIGN,
 )
 PHYSICAL: Final = tuple(PhysicalAction)
-TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
-"""What remarks are about: their predicate or, without content, their move."""
-
 _SILENCES: Final = (4.0, 7.0, 8.0, 10.0)  # silences after which the scripted Co-Wizard asks [s]
 
 MAX_PLACES: Final = 24
@@ -59,7 +61,12 @@ MAX_COMMANDS: Final = 20
 
 
 def state_vector(
-    memory: Memory, view: CoWizardView, step: RouteStep | None, utterances: Sequence[Utterance], *, queued: bool
+    memory: WorkingMemory,
+    view: CoWizardView,
+    step: RouteStep | None,
+    utterances: Sequence[Utterance],
+    *,
+    queued: bool,
 ) -> list[float]:
     """Returns the state of road, memory and talk.
 
@@ -78,26 +85,12 @@ def state_vector(
     ]
 
 
-def _one_hot(index: int, size: int) -> list[float]:
-    hot = [0.0] * size
-    if 0 <= index < size:
-        hot[index] = 1.0
-    return hot
-
-
-def _time(seconds: float) -> list[float]:
-    """Returns a time [s] on several scales."""
-    seconds = min(seconds, AWAY)
-    return [float(seconds <= 0.01), math.exp(-seconds / 1.0), math.exp(-seconds / 4.0), math.exp(-seconds / 15.0)]
-
-
 def _distance(metres: float) -> list[float]:
     """Returns a distance [m] on several scales."""
-    metres = min(max(metres, -50.0), 1000.0)
-    return [math.tanh(metres / scale) for scale in (1.0, 5.0, 25.0, 100.0)]
+    return distance_scales(metres, (1.0, 5.0, 25.0, 100.0))
 
 
-def car_vector(memory: Memory, view: CoWizardView) -> list[float]:
+def car_vector(memory: WorkingMemory, view: CoWizardView) -> list[float]:
     """Returns the state of the car; it does not change within a decision."""
     standing = None if memory.standstill.since is None else view.time - memory.standstill.since
     variances = memory.config.gps_variance, memory.config.lost_variance
@@ -105,21 +98,21 @@ def car_vector(memory: Memory, view: CoWizardView) -> list[float]:
     hazard = HAZARDS.index(view.hazard) if view.hazard in HAZARDS else -1 if view.hazard is ObjectClass.UNLABELED else 5
     return [
         min(view.time, 60.0) / 60.0, float(view.time < 5.0), view.speed / 15.0, float(view.standing),
-        view.cruise / 60.0, float(view.lights), *_one_hot(int(view.motion), len(Motion)),
-        *_one_hot(hazard, len(HAZARDS) + 1),
+        view.cruise / 60.0, float(view.lights), *one_hot(int(view.motion), len(Motion)),
+        *one_hot(hazard, len(HAZARDS) + 1),
         min(float(view.raw["hazard_distance"][0]), 60.0) / 60.0,
-        *_one_hot(-1 if view.manoeuvre is None else PHYSICAL.index(view.manoeuvre), len(PHYSICAL)),
+        *one_hot(-1 if view.manoeuvre is None else PHYSICAL.index(view.manoeuvre), len(PHYSICAL)),
         math.sin(math.radians(view.angle)), math.cos(math.radians(view.angle)), float(view.manoeuvring),
-        *(_time(standing) if standing is not None else [0.0] * 4), float(standing is not None),
+        *(time_scales(standing) if standing is not None else [0.0] * 4), float(standing is not None),
         min(standing or 0.0, 30.0) / 30.0, float((standing or 0.0) > 4.0), float((standing or 0.0) > 5.0),
-        *_one_hot(-1 if limit is None else tuple(Limit).index(limit), len(Limit)), float(is_dark(view.raw)),
+        *one_hot(-1 if limit is None else tuple(Limit).index(limit), len(Limit)), float(is_dark(view.raw)),
         float(fault is not None), sight(view.raw) / 100.0, suitable_speed(sight(view.raw)) / 60.0,
         math.tanh(view.variance), *(float(view.variance > most) for most in variances),
         float(is_red_ahead(memory.town, view)),
     ]  # fmt: skip
 
 
-def _road(memory: Memory, view: CoWizardView) -> list[float]:
+def _road(memory: WorkingMemory, view: CoWizardView) -> list[float]:
     choice, meant = view.choice, junction_meant(memory.town, view.here, view.choice)
     directions = () if choice is None else tuple(direction_of(way) for way in choice.exits)
     ordered = ordered_exit(memory, view, meant)
@@ -145,7 +138,7 @@ def _road(memory: Memory, view: CoWizardView) -> list[float]:
     ]
 
 
-def ordered_exit(memory: Memory, view: CoWizardView, choice: Choice | None) -> Exit | None:
+def ordered_exit(memory: WorkingMemory, view: CoWizardView, choice: Choice | None) -> Exit | None:
     """Returns the exit of a junction that the turn in the memory means, whether or not junctions are to be passed."""
     order = ORDERS[memory.value("order")]
     if order is None or choice is None:
@@ -154,7 +147,7 @@ def ordered_exit(memory: Memory, view: CoWizardView, choice: Choice | None) -> E
     return find_exit(memory.town, choice, direction, streets_named(view.raw["street_names"], memory.street))
 
 
-def _route(memory: Memory, view: CoWizardView, step: RouteStep | None) -> list[float]:
+def _route(memory: WorkingMemory, view: CoWizardView, step: RouteStep | None) -> list[float]:
     left, progress = memory.navigator.left(view), memory.navigator.route.progress
     target = memory.distance_to(memory.target, view)
     near = memory.distance_to(memory.navigator.goal, view)
@@ -163,18 +156,18 @@ def _route(memory: Memory, view: CoWizardView, step: RouteStep | None) -> list[f
     return [
         float(memory.navigator.arrives), *_distance(left), float(step is not None),
         float(step is not None and step.due),
-        *_one_hot(-1 if step is None else PHYSICAL.index(step.action), len(PHYSICAL)),
+        *one_hot(-1 if step is None else PHYSICAL.index(step.action), len(PHYSICAL)),
         *_distance(AWAY if step is None else step.distance), 0.0 if step is None else step.angle / 90.0,
         float(near is not None), *_distance(AWAY if near is None else near - stopping_distance(view.speed)),
         float(target is not None), *_stop_at(memory, view, target),
         float(progress is not None and progress.turns_round_first(memory.town, view.station)), float(here),
         float(crossing is not None and progress is not None and progress.changes_before(crossing)),
-        *_time(seconds_since(view.time, memory.navigator.blocked_at)), memory.navigator.route.misses / 3.0,
+        *age_scales(view.time, memory.navigator.blocked_at), memory.navigator.route.misses / 3.0,
         float(progress is not None and progress.astray > 0),
     ]  # fmt: skip
 
 
-def _stop_at(memory: Memory, view: CoWizardView, distance: float | None) -> list[float]:
+def _stop_at(memory: WorkingMemory, view: CoWizardView, distance: float | None) -> list[float]:
     """Returns how far a place is beyond where the car would stop, now and a decision later."""
     if distance is None:
         return [0.0] * 6
@@ -183,22 +176,22 @@ def _stop_at(memory: Memory, view: CoWizardView, distance: float | None) -> list
     return [*_distance(left), float(left + later <= 0.4), float(distance < -2.0)]
 
 
-def _remembered(memory: Memory, view: CoWizardView) -> list[float]:
-    hot = [value for name, size in VARIABLES.items() for value in _one_hot(memory.value(name), size)]
-    ages = [value for at in memory.changed_at for value in _time(seconds_since(view.time, at))]
+def _remembered(memory: WorkingMemory, view: CoWizardView) -> list[float]:
+    hot = [value for name, size in VARIABLES.items() for value in one_hot(memory.value(name), size)]
+    ages = [value for at in memory.changed_at for value in age_scales(view.time, at)]
     left = distance_to_goal(memory, view)
     fault = float(any(status is GoalStatus.COMPLETE for _, status in memory.statuses))
     return [
         *hot, *ages, float(memory.goal is not None), float(memory.goal_mark >= 0), float(memory.goal in SHARED_NAMES),
-        *_time(seconds_since(view.time, memory.goal_at)), float(left is not None and abs(left) < 2.0),
+        *age_scales(view.time, memory.goal_at), float(left is not None and abs(left) < 2.0),
         float(left is not None and left < 120.0), float(left is not None and left < 70.0),
         float(bool(memory.statuses)), fault, float(bool(memory.updates)),
-        *_one_hot(-1 if memory.physical is None else PHYSICAL.index(memory.physical), len(PHYSICAL)),
-        *_time(seconds_since(view.time, memory.physical_at)),
+        *one_hot(-1 if memory.physical is None else PHYSICAL.index(memory.physical), len(PHYSICAL)),
+        *age_scales(view.time, memory.physical_at),
     ]  # fmt: skip
 
 
-def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], queued: bool) -> list[float]:
+def _talk(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utterance], queued: bool) -> list[float]:
     said = dict(memory.said_at)
     ages = [math.exp(-seconds_since(view.time, said[topic]) / 10.0) if topic in said else 0.0 for topic in TOPICS]
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
@@ -207,8 +200,8 @@ def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], q
     places = () if latest is None else latest.places
     on_map = [any(mark.name is name for mark in view.landmarks) for name in places]
     return [
-        *ages, *_time(seconds_since(view.time, memory.heard_at)), *_time(seconds_since(view.time, memory.spoke_at)),
-        *_time(seconds_since(view.time, memory.asked_at)), float(memory.asked_at > memory.heard_at), float(queued),
+        *ages, *age_scales(view.time, memory.heard_at), *age_scales(view.time, memory.spoke_at),
+        *age_scales(view.time, memory.asked_at), float(memory.asked_at > memory.heard_at), float(queued),
         *(float(seconds_since(view.time, max(memory.asked_at, memory.heard_at)) > wait) for wait in _SILENCES),
         *(float(seconds_since(view.time, memory.spoke_at) > wait) for wait in (4.0, 8.0, 10.0, 20.0)),
         float(view.speaking > 0.0), float(view.other_speaking), float(memory.heard_at > -AWAY),
@@ -222,12 +215,14 @@ def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], q
 # --- Places on the map ------------------------------------------------------------------------------------------------
 
 
-def place_vectors(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance]) -> list[list[float]]:
+def place_vectors(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utterance]) -> list[list[float]]:
     """Returns a vector for each row of the landmarks up to `MAX_PLACES`; rows that are not in use are missing."""
     return [_place(mark, memory, view, utterances) for mark in view.landmarks if mark.row < MAX_PLACES]
 
 
-def _place(mark: SeenLandmark, memory: Memory, view: CoWizardView, utterances: Sequence[Utterance]) -> list[float]:
+def _place(
+    mark: SeenLandmark, memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utterance]
+) -> list[float]:
     x, y = view.position
     distance = math.hypot(mark.x - x, mark.y - y)
     alike = [other for other in view.landmarks if other.name is mark.name]
@@ -253,7 +248,7 @@ def _place(mark: SeenLandmark, memory: Memory, view: CoWizardView, utterances: S
         float(mark.name is memory.former), float(mark.place in memory.ruled_out), float(mark.name in SHARED_NAMES),
         float(len(free) > 1), float(bool(free) and free[0] is mark),
         float(any(other.street in latest.streets for other in free) if latest is not None else False),
-        *_one_hot(STATUSES.index(status) if status in STATUSES else -1, len(STATUSES)), *_distance(distance),
+        *one_hot(STATUSES.index(status) if status in STATUSES else -1, len(STATUSES)), *_distance(distance),
         float(distance < 45.0),
     ]  # fmt: skip
 
@@ -262,7 +257,7 @@ def _place(mark: SeenLandmark, memory: Memory, view: CoWizardView, utterances: S
 
 
 def command_vectors(
-    commands: Sequence[Physical | None], memory: Memory, view: CoWizardView, step: RouteStep | None
+    commands: Sequence[Physical | None], memory: WorkingMemory, view: CoWizardView, step: RouteStep | None
 ) -> list[list[float]]:
     """Returns a vector for each physical action that can be commanded, "none" among them."""
     meant = junction_meant(memory.town, view.here, view.choice)
@@ -273,7 +268,7 @@ def command_vectors(
 
 def _command(
     command: Physical | None,
-    memory: Memory,
+    memory: WorkingMemory,
     view: CoWizardView,
     step: RouteStep | None,
     way: Exit | None,
@@ -291,7 +286,7 @@ def _command(
     asked = (action is PhysicalAction.U_TURN and wanted == 1) or (sideways and wanted == (2 if angle > 0 else 3))
     ordered = turns and way is not None and way.angle == angle
     return [
-        0.0, *_one_hot(PHYSICAL.index(action), len(PHYSICAL)), *(float(direction is one) for one in Direction),
+        0.0, *one_hot(PHYSICAL.index(action), len(PHYSICAL)), *(float(direction is one) for one in Direction),
         angle / 90.0, float(command.up), float(on_route), float(on_route and step is not None and step.due),
         float(prepared), float(asked), float(ordered), float(ordered and memory.value("skip") == 0),
         float(turns and direction is Direction.STRAIGHT and memory.value("skip") > 0),

@@ -6,12 +6,12 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
-from dorothie_gym.baselines.roles.co_wizard.examples import Batch
+from dorothie_gym.baselines.roles.co_wizard.examples import CoWizardExamples
 from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
 from dorothie_gym.baselines.roles.learned_role.supervised import changed_weights, entropy, weighted_mean
 
 
-def loss_of(network: CoWizardNetwork, batch: Batch) -> Tensor:
+def loss_of(network: CoWizardNetwork, batch: CoWizardExamples) -> Tensor:
     """Returns the sum of the mean losses of all outputs [nats]."""
     weight, words = batch.weight, batch.words.long()
     before, values = batch.before.long(), batch.values.long()

@@ -1,19 +1,19 @@
 """Working memory of the learned Co-Wizard: what it has committed itself to, written by its own network.
 
 At each decision the network predicts the next value of each variable in `VARIABLES`, and an event of the goal
-(`GoalEvent`, or a place on the map). `Memory.updated` stores both. What is kept besides follows from them and from the
-own observation: times, the navigator's route, and where a slow approach ends.
+(`GoalEvent`, or a place on the map); `WorkingMemory.updated` stores both. What is kept besides follows from them and
+from the own observation: times, the navigator's route, and where a slow approach ends.
 """
 
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
+from dorothie_gym.baselines.roles.learned_role.encoding import AWAY
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
@@ -86,9 +86,6 @@ PLACE_SIGHT: Final = 80.0
 REACTION: Final = 3.0
 """Time within which the memory is changed because of what was heard [s]."""
 
-AWAY: Final = 300.0
-"""Time that stands for "never" or "long ago" [s]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Update:
@@ -108,7 +105,7 @@ class Update:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Memory:
+class WorkingMemory:
     """Working memory.
 
     Attributes:
@@ -252,7 +249,7 @@ class Memory:
         """Returns the value of a variable."""
         return self.values[_INDEX[name]]
 
-    def seen(self, view: CoWizardView, *, heard: bool) -> Memory:
+    def seen(self, view: CoWizardView, *, heard: bool) -> WorkingMemory:
         """Brings standstill, route and times up to date with an observation."""
         memory = replace(
             self,
@@ -274,7 +271,7 @@ class Memory:
         named: Sequence[LandmarkName],
         streets: Sequence[StreetName],
         distance: int | None,
-    ) -> Memory:
+    ) -> WorkingMemory:
         """Stores an output of the network.
 
         Args:
@@ -307,7 +304,7 @@ class Memory:
         memory = memory._with_status(update, named)
         return memory._with_goal(update.goal, view, named)
 
-    def _carrying_on(self, view: CoWizardView) -> Memory:
+    def _carrying_on(self, view: CoWizardView) -> WorkingMemory:
         """Carries the place of a slow approach along, and sends the plan if the route has changed."""
         memory = self
         if self.value("creeping") and not self.value("halted") and view.manoeuvre is not PhysicalAction.U_TURN:
@@ -324,7 +321,7 @@ class Memory:
             return memory
         return replace(memory, plan=plan)._sending(Mental(action=MentalAction.PLAN_UPDATE, plan=plan))
 
-    def _marked(self, view: CoWizardView, ahead: float) -> Memory:
+    def _marked(self, view: CoWizardView, ahead: float) -> WorkingMemory:
         """Marks the goal as close ahead, so that the car approaches it slowly."""
         place, name = default_lane_place(self.town, view.here, ahead), self.goal or LandmarkName.UNKNOWN
         where = LanePosition(lane=place[0], metres=round(place[1]))
@@ -333,7 +330,7 @@ class Memory:
             memory = memory._sending(Mental(action=MentalAction.GOAL_UPDATE, goals=(name,)))
         return memory._sending(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=where))
 
-    def _sending(self, update: Mental) -> Memory:
+    def _sending(self, update: Mental) -> WorkingMemory:
         kept = tuple(
             one
             for one in self.updates
@@ -341,7 +338,7 @@ class Memory:
         )
         return replace(self, updates=(*kept, update))
 
-    def _with_status(self, update: Update, named: Sequence[LandmarkName]) -> Memory:
+    def _with_status(self, update: Update, named: Sequence[LandmarkName]) -> WorkingMemory:
         """Stores the status of the first place named, or of the goal."""
         status, place = STATUSES[update.status], next(iter(named), self.goal)
         if status is None or place is None:
@@ -351,12 +348,12 @@ class Memory:
             memory = replace(memory, ruled_out=(*memory.ruled_out, self.navigator.goal))
         return memory
 
-    def _noting(self, place: LandmarkName, status: GoalStatus) -> Memory:
+    def _noting(self, place: LandmarkName, status: GoalStatus) -> WorkingMemory:
         statuses = (*(pair for pair in self.statuses if pair[0] is not place), (place, status))
         update = Mental(action=MentalAction.STATUS_UPDATE, landmark=place, status=status)
         return replace(self, statuses=statuses)._sending(update)
 
-    def _with_goal(self, event: int, view: CoWizardView, named: Sequence[LandmarkName]) -> Memory:
+    def _with_goal(self, event: int, view: CoWizardView, named: Sequence[LandmarkName]) -> WorkingMemory:
         """Carries out an event of the goal."""
         if event == GoalEvent.KEEP:
             return self
@@ -376,7 +373,7 @@ class Memory:
             return self
         return replace(memory, goal=named[which], former=self.goal)._noting(named[which], GoalStatus.UNKNOWN)
 
-    def _aiming(self, mark: SeenLandmark, view: CoWizardView) -> Memory:
+    def _aiming(self, mark: SeenLandmark, view: CoWizardView) -> WorkingMemory:
         memory = replace(
             self,
             goal=mark.name,
@@ -388,13 +385,13 @@ class Memory:
         memory = memory._sending(Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,)))
         return memory._noting(mark.name, GoalStatus.ONGOING)
 
-    def acted(self, physical: PhysicalAction | None, view: CoWizardView) -> Memory:
+    def acted(self, physical: PhysicalAction | None, view: CoWizardView) -> WorkingMemory:
         """Notes the own physical action."""
         if physical is None:
             return self
         return replace(self, physical=physical, physical_at=view.time, junction_of_action=view.junction)
 
-    def spoken(self, remark: Remark, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> Memory:
+    def spoken(self, remark: Remark, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> WorkingMemory:
         """Notes an own remark: what it is about, and whether it asks."""
         last = remark if asks or remark.act.slots else self.last
         said = (*(pair for pair in self.said_at if pair[0] != topic), (topic, view.time))
@@ -415,8 +412,3 @@ def initial_values(speed: int) -> tuple[int, ...]:
 def speed_index(speed: float) -> int:
     """Returns the index of the nearest speed in `SPEEDS`."""
     return min(max(round((speed - SPEEDS[0]) / 5.0), 0), len(SPEEDS) - 1)
-
-
-def seconds_since(now: float, then: float) -> float:
-    """Returns the time since a moment [s], at most `AWAY`."""
-    return min(max(now - then, 0.0), AWAY) if math.isfinite(then) else AWAY

@@ -9,13 +9,21 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.roles.co_wizard.features import COMMAND_SIZE, PLACE_SIZE, STATE_SIZE
-from dorothie_gym.baselines.roles.co_wizard.hearing import KEPT, UTTERANCE_SIZE, WORD_BUCKETS
 from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, STATUSES, VARIABLES, GoalEvent
-from dorothie_gym.baselines.roles.learned_role.layers import hidden_layers
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.roles.learned_role.network import (
+    REMARK_WIDTH,
+    WIDTH,
+    WORD_WIDTH,
+    RoleNetwork,
+    following_remark,
+    hidden_layers,
+    without_missing,
+)
 
 SIZES: Final = tuple(VARIABLES.values())
-WORD_WIDTH, WIDTH, OPTION_WIDTH, REMARK_WIDTH = 24, 256, 96, 48
-"""Widths of the word embedding, of the hidden layers, of the layer that scores options, and of an embedded remark."""
+OPTION_WIDTH: Final = 96
+"""Width of the layer that scores options."""
 
 DROPOUT: Final = 0.3
 """Share of the hidden units that are left out in training (Srivastava et al., JMLR 2014).
@@ -25,7 +33,7 @@ In the sessions of another training, a fit of 20 passes had a loss of 0.42 nats 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class CoWizardLayout:
     """Lengths of the inputs and outputs.
 
     Attributes:
@@ -41,7 +49,7 @@ class Layout:
     remarks: int
 
     @classmethod
-    def of(cls, remarks: int) -> Layout:
+    def of(cls, remarks: int) -> CoWizardLayout:
         """Returns the layout of this version for a vocabulary of some size."""
         return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, place=PLACE_SIZE, command=COMMAND_SIZE, remarks=remarks)
 
@@ -56,14 +64,13 @@ class Heard:
     status: Tensor
 
 
-class CoWizardNetwork(nn.Module):
+class CoWizardNetwork(RoleNetwork):
     """Scores the next memory, commands and remarks."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: CoWizardLayout) -> None:
         super().__init__()
         self.layout = layout
         hot = sum(SIZES)
-        self.words = nn.EmbeddingBag(WORD_BUCKETS, WORD_WIDTH, mode="mean", padding_idx=0)
         self.listening = hidden_layers(layout.state + WORD_WIDTH, WIDTH, DROPOUT)
         self.values = nn.Linear(WIDTH, hot)
         self.kept = nn.Parameter(torch.full((hot,), 2.0))
@@ -78,9 +85,7 @@ class CoWizardNetwork(nn.Module):
         self.command = _Scorer(layout.command)
         self.first = nn.Linear(WIDTH, layout.remarks)
         self.remarks = nn.Embedding(layout.remarks, REMARK_WIDTH)
-        self.second = nn.Sequential(
-            nn.Linear(WIDTH + REMARK_WIDTH, WIDTH // 2), nn.ReLU(), nn.Linear(WIDTH // 2, layout.remarks)
-        )
+        self.second = following_remark(layout.remarks)
 
     def listen(self, state: Tensor, words: Tensor, places: Tensor, count: Tensor, before: Tensor) -> Heard:
         """Returns the logits of the next memory.
@@ -92,7 +97,7 @@ class CoWizardNetwork(nn.Module):
             count: number of places (b,).
             before: values of the memory (b, v).
         """
-        hidden = self.listening(torch.cat([state, self.words(words)], dim=1))
+        hidden = self.hidden(self.listening, state, words)
         hot = torch.zeros(len(before), sum(SIZES)).scatter_(1, before + self.starts, 1.0)
         values = torch.split(self.values(hidden) + self.kept * hot, list(SIZES), dim=1)
         goal = torch.cat([self.goal(hidden), self.place(hidden, places, count)], dim=1)
@@ -100,12 +105,13 @@ class CoWizardNetwork(nn.Module):
 
     def act(self, state: Tensor, words: Tensor, commands: Tensor, count: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Returns the logits of the commands (b, k) and of the first remark (b, r), and the hidden layer for `then`."""
-        hidden = self.acting(torch.cat([state, self.words(words)], dim=1))
+        hidden = self.hidden(self.acting, state, words)
         return self.command(hidden, commands, count), self.first(hidden), hidden
 
     def then(self, hidden: Tensor, first: Tensor) -> Tensor:
         """Returns the logits of the second remark (b, r) behind a first one (b,)."""
-        return self.second(torch.cat([hidden, self.remarks(first)], dim=1))  # type: ignore[no-any-return]
+        scores: Tensor = self.second(torch.cat([hidden, self.remarks(first)], dim=1))
+        return scores
 
 
 class _Scorer(nn.Module):
@@ -118,8 +124,6 @@ class _Scorer(nn.Module):
         self.last = nn.Linear(OPTION_WIDTH, 1)
 
     def forward(self, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
-        """Returns the score of each option (b, k), minus infinity for those that are only filled in."""
+        """Returns the score of each option (b, k), almost minus infinity for those that are only filled in."""
         both = torch.relu(self.hidden(hidden)[:, None, :] + self.option(options))
-        scores = self.last(both).squeeze(2)
-        missing = torch.arange(options.shape[1])[None, :] >= count[:, None]
-        return scores.masked_fill(missing, -1e9)  # type: ignore[no-any-return]
+        return without_missing(self.last(both).squeeze(2), count)

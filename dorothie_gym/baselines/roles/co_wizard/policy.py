@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from dorothie_gym.baselines.roles.co_wizard.answers import is_sayable
 from dorothie_gym.baselines.roles.co_wizard.decision import (
-    Attention,
-    Inputs,
-    Scene,
+    CoWizardPercept,
     acting_inputs,
     finished,
     listening_inputs,
     perceive,
     remember,
 )
-from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, Memory, Update
+from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, Update, WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.network import SIZES, CoWizardNetwork
-from dorothie_gym.baselines.roles.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
-from dorothie_gym.baselines.roles.learned_role.drawing import drawn
+from dorothie_gym.baselines.roles.co_wizard.remarks import sources
+from dorothie_gym.baselines.roles.learned_role.decision import Attention, Inputs
+from dorothie_gym.baselines.roles.learned_role.policy import LearnedPolicy, drawn, shares_of
+from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources, filled, sources_of, topic_of
 from dorothie_gym.dialogue.realization_context import WordingContext
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.maps.town import Town
@@ -32,7 +32,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
-from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction
 from dorothie_gym.session.spaces.limits import SpaceLimits
@@ -64,7 +64,7 @@ class LearnedState:
     """
 
     seed: int
-    attention: Attention
+    attention: Attention[WorkingMemory]
     voice: SpeechState
     count: int = 0
 
@@ -74,7 +74,7 @@ class Turn:
     """Decision of the player.
 
     Attributes:
-        scene: what was perceived.
+        percept: what was perceived.
         memory: memory after listening.
         action: the action.
         remarks: what was decided to say.
@@ -83,8 +83,8 @@ class Turn:
         state: state after the decision.
     """
 
-    scene: Scene
-    memory: Memory
+    percept: CoWizardPercept
+    memory: WorkingMemory
     action: CoWizardAction
     remarks: tuple[Remark, ...]
     queued: bool
@@ -92,7 +92,7 @@ class Turn:
     state: LearnedState
 
 
-class LearnedCoWizard(Policy[LearnedState]):
+class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
     """Co-Wizard whose memory, goal, commands and remarks are decided by a network.
 
     Memory and commands are the likeliest ones; remarks are drawn. Names, numbers and words of a remark are filled in
@@ -109,15 +109,15 @@ class LearnedCoWizard(Policy[LearnedState]):
             vocabulary: forms of remarks; the first one stands for silence.
             limits: sizes of the spaces.
         """
-        super().__init__(Role.CO_WIZARD, limits)
-        self._network, self._vocabulary = network.eval(), tuple(vocabulary)
-        self._needs = [frozenset() if not form else sources_of(form) for form in self._vocabulary]
+        super().__init__(Role.CO_WIZARD, network, vocabulary, limits, sources_of)
 
     def initial_state(self, seed: int, town: Town) -> LearnedState:
         """Returns the state before the first observation."""
         style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
         return LearnedState(
-            seed=seed, attention=Attention.begin(town), voice=SpeechState(role=Role.CO_WIZARD, style=style)
+            seed=seed,
+            attention=Attention(memory=WorkingMemory(town=town)),
+            voice=SpeechState(role=Role.CO_WIZARD, style=style),
         )
 
     def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
@@ -135,30 +135,30 @@ class LearnedCoWizard(Policy[LearnedState]):
         """
         rng = np.random.default_rng((state.seed, state.count))
         voice = state.voice
-        scene = perceive(observation, state.attention, None if voice.last is None else voice.last.act.move)
-        view, queued = scene.view, not voice.idle
-        if scene.latest is not None:
-            late = scene.memory.clock.interval / 2.0
-            voice = voice.heard_other(view.time, scene.latest.heard.acts, rng, late).cleared()
+        percept = perceive(observation, state.attention, None if voice.last is None else voice.last.act.move)
+        view, queued = percept.view, not voice.idle
+        if percept.latest is not None:
+            late = percept.memory.clock.interval / 2.0
+            voice = voice.heard_other(view.time, percept.latest.heard.acts, rng, late).cleared()
         silent = silent or not voice.idle
         with torch.inference_mode():
-            memory = remember(scene, self._listen(scene, listening_inputs(scene, queued=queued)))
-            inputs, commands = acting_inputs(scene, memory, queued=queued)
-            command, remarks = self._act(scene, memory, inputs, rng, silent=silent)
+            memory = remember(percept, self._listen(percept, listening_inputs(percept, queued=queued)))
+            inputs, commands = acting_inputs(percept, memory, queued=queued)
+            command, remarks = self._act(percept, memory, inputs, rng, silent=silent)
         physical = commands[command]
         voice = voice.plan(*remarks)
         speech, voice = voice.speak(
             view.time,
             view.speaking,
             rng,
-            _scene(view, memory),
+            _wording_context(view, memory),
             interval=memory.clock.interval,
             other_speaking=view.other_speaking,
         )
-        mental, attention = finished(scene, memory, physical, remarks)
+        mental, attention = finished(percept, memory, physical, remarks)
         action = CoWizardAction(speech=speech, physical=physical, mental=mental)
         return Turn(
-            scene=scene,
+            percept=percept,
             memory=memory,
             action=action,
             remarks=remarks,
@@ -167,15 +167,15 @@ class LearnedCoWizard(Policy[LearnedState]):
             state=replace(state, attention=attention, voice=voice, count=state.count + 1),
         )
 
-    def _listen(self, scene: Scene, inputs: Inputs) -> Update:
+    def _listen(self, percept: CoWizardPercept, inputs: Inputs) -> Update:
         """Returns the likeliest update of the memory."""
-        state, words, places, count = _tensors(inputs)
-        before = torch.tensor([scene.memory.values])
+        state, words, places, count = inputs.tensors()
+        before = torch.tensor([percept.memory.values])
         heard = self._network.listen(state, words, places, count, before)
         goal = int(heard.goal[0].argmax())
         starts, logits = np.cumsum((0, *SIZES[:-1])), torch.cat(heard.values, dim=1)[0].numpy()
-        if not scene.heard:
-            logits[starts + scene.memory.values] += KEPT_BONUS
+        if not percept.heard:
+            logits[starts + percept.memory.values] += KEPT_BONUS
         if goal >= len(GoalEvent):
             goal = len(GoalEvent) + inputs.rows[goal - len(GoalEvent)]
         return Update(
@@ -186,63 +186,57 @@ class LearnedCoWizard(Policy[LearnedState]):
         )
 
     def _act(
-        self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
+        self,
+        percept: CoWizardPercept,
+        memory: WorkingMemory,
+        inputs: Inputs,
+        rng: np.random.Generator,
+        *,
+        silent: bool,
     ) -> tuple[int, tuple[Remark, ...]]:
         """Returns the index of the likeliest command, and the remarks that are drawn."""
-        scores, first, hidden = self._network.act(*_tensors(inputs))
+        scores, first, hidden = self._network.act(*inputs.tensors())
         command = int(scores[0].argmax())
         if silent:
             return command, ()
-        shares = torch.softmax(first[0].double() / TEMPERATURE, dim=0).numpy()
+        shares = shares_of(first, TEMPERATURE)
         if rng.random() < shares[0]:
             return command, ()
-        available = sources(memory, scene.view, scene.utterances)
-        possible = np.array([bool(needs <= available.keys()) for needs in self._needs])
+        available = sources(memory, percept.view, percept.utterances)
+        possible = self._fillable(available)
         possible[0] = False
         shares *= possible
-        chosen, remark = self._draw(shares, scene, memory, available, rng)
+        chosen, remark = self._draw(shares, percept, memory, available, rng)
         if remark is None:
             return command, ()
         possible[0] = True
-        then = self._network.then(hidden, torch.tensor([chosen]))[0]
-        shares = torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * possible
-        _, more = self._draw(shares, scene, memory, available, rng, joined=True)
+        shares = shares_of(self._network.then(hidden, torch.tensor([chosen])), TEMPERATURE) * possible
+        _, more = self._draw(shares, percept, memory, available, rng, joined=True)
         return command, (remark,) if more is None else (remark, more)
 
     def _draw(
         self,
         shares: NDArray[np.float64],
-        scene: Scene,
-        memory: Memory,
+        percept: CoWizardPercept,
+        memory: WorkingMemory,
         available: Sources,
         rng: np.random.Generator,
         *,
         joined: bool = False,
     ) -> tuple[int, Remark | None]:
         """Returns the number of a form and its remark, drawn among those that are sayable; None for silence."""
-        latest, answer = scene.utterances[0] if scene.utterances else None, available.get("answer")
+        latest, answer = percept.utterances[0] if percept.utterances else None, available.get("answer")
         answer = answer if isinstance(answer, Remark) else None
         for _ in range(MAX_DRAWS):
             chosen = drawn(shares, rng)
             remark = filled(self._vocabulary[chosen], available, joined=joined) if chosen else None
-            if remark is None or is_sayable(remark, topic_of(remark), memory, scene.view, latest, answer):
+            if remark is None or is_sayable(remark, topic_of(remark), memory, percept.view, latest, answer):
                 return chosen, remark
             shares[chosen] = 0.0
         return 0, None
 
 
-def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Returns inputs as a batch of one, rounded as in training."""
-    state, options = (array.astype(np.float16).astype(np.float32) for array in (inputs.state, inputs.options))
-    return (
-        torch.from_numpy(state)[None],
-        torch.from_numpy(inputs.words)[None],
-        torch.from_numpy(options)[None],
-        torch.tensor([len(inputs.rows)]),
-    )
-
-
-def _scene(view: CoWizardView, memory: Memory) -> WordingContext:
+def _wording_context(view: CoWizardView, memory: WorkingMemory) -> WordingContext:
     """Returns what the words may refer to."""
     near = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, memory.town, view.lane)

@@ -1,51 +1,34 @@
 """Remarks of the learned Co-Wizard: those of the corpus without their names, and where it takes the names from.
 
-A remark is an act with the propositions that it states or asks and the particulars of its words. In a form (`form_of`),
-each name of a place or street and each number is replaced by its source: the goal, a place just named, the street of an
-exit, the time that the route takes. The network chooses a form, and thereby act, content and sources; `filled` puts in
-what the sources are at this moment. The grammar words the act, as for the scripted roles.
+Forms are explained in `learned_role.remark_forms`. What the rules answer, and what is said again, is taken as a whole.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
 from dorothie_gym.baselines.roles.co_wizard.answers import answer_to, is_answer, said_again
-from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.roles.co_wizard.memory import Memory
-from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
+from dorothie_gym.baselines.roles.learned_role import remark_forms
+from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.proposition_truth import seconds_to_goal
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
-from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of, first_new_street
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.view_range import sight, suitable_speed
-from dorothie_gym.support.input_files import parse_json
 
-_ENUMS: Final = {
-    kind.__name__: kind
-    for kind in (
-        ActionValue, StreetName, LandmarkName, GoalStatus, ObjectClass, Direction, PropKind, Sensor, WeatherParameter
-    )
-}  # fmt: skip
 _WHOLES: Final = ("answer", "again")
 """Sources of whole remarks: the answer to what was just asked, and the last remark said again."""
 
-_OPEN: Final = ("QUERIED", "UNKNOWN")
-_WORDING: Final = ("topic", "direction", "faster", "lights", "speed", "distance", "dropped", "ordinal")
 
-Sources = Mapping[str, object]
-"""Names and numbers that a remark can contain at this moment, by source."""
-
-
-def sources(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance]) -> dict[str, object]:
+def sources(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utterance]) -> dict[str, object]:
     """Returns the names and numbers that can be said now, by source; the preferred ones first."""
     town, latest = memory.town, utterances[0] if utterances else None
     wholes = {"answer": answer_to(latest, memory, view), "again": said_again(latest, memory)}
@@ -83,113 +66,22 @@ def sources(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance])
 
 
 def form_of(remark: Remark, available: Sources) -> str | None:
-    """Returns the form of a remark; None if it has a name or number without a source, or free words."""
+    """Returns the form of a remark, a whole one where it is said by rules; None if something in it has no source."""
     answer, again = (available.get(name) for name in _WHOLES)
     if isinstance(again, Remark) and (remark.act, remark.meaning) == (again.act, again.meaning):
         return _whole_form("again")
     if isinstance(answer, Remark) and is_answer(remark, answer):
         return _whole_form("answer")
-    try:
-        wording = {
-            name: _coded(value, available) for name in _WORDING if (value := getattr(remark.wording, name)) is not None
-        }
-        content = remark.wording.content
-        slots = sorted(_coded(value, available) for value in remark.act.slots)
-        page = {
-            "move": remark.act.move.label,
-            "slots": slots,
-            "meaning": [_form(said, available) for said in remark.meaning],
-            "content": None if content is None else _form(content, available),
-            "wording": wording,
-        }
-    except LookupError:
-        return None
-    return json.dumps(page, separators=(",", ":"), sort_keys=True)
+    return remark_forms.form_of(remark, available)
 
 
 def _whole_form(source: str) -> str:
     return json.dumps({"whole": ["from", source]}, separators=(",", ":"))
 
 
-def _form(said: Proposition, available: Sources) -> list[Any]:
-    return [
-        str(said.predicate),
-        int(said.negated),
-        [[name, _coded(value, available)] for name, value in said.arguments],
-    ]
-
-
-def _coded(value: object, available: Sources) -> Any:
-    """Returns a value as JSON: constants by their names, names and numbers by their sources."""
-    if isinstance(value, Proposition):
-        return _form(value, available)
-    if isinstance(value, bool):
-        return ["bool", int(value)]
-    named = isinstance(value, LandmarkName | StreetName) and value.name not in _OPEN
-    if named or isinstance(value, int | float):
-        exact = [name for name, known in available.items() if type(known) is type(value) and known == value]
-        return ["from", exact[0] if exact else _nearest(value, available)]
-    if type(value).__name__ in _ENUMS:
-        return [type(value).__name__, value.name]  # type: ignore[attr-defined]
-    if isinstance(value, str) and " " not in value:
-        return ["text", value]
-    raise LookupError(value)
-
-
-def _nearest(value: object, available: Sources) -> str:
-    """Returns the source of a number that is almost the same; raises `LookupError` if there is none."""
-    if isinstance(value, LandmarkName | StreetName) or not isinstance(value, int | float):
-        raise LookupError(value)
-    near = [(abs(known - value), name) for name, known in available.items() if isinstance(known, int | float)]
-    if not near or min(near)[0] > 2.0:
-        raise LookupError(value)
-    return min(near)[1]
-
-
-def filled(form: str, available: Sources, *, joined: bool = False) -> Remark | None:
-    """Returns the remark of a form with the present names and numbers; None if a source is missing."""
-    page = json.loads(form)
-    try:
-        if "whole" in page:
-            whole = _decoded(page["whole"], available)
-            return replace(whole, text="", joined=joined) if isinstance(whole, Remark) else None
-        slots = [_decoded(code, available) for code in page["slots"]]
-        wording = {name: _decoded(code, available) for name, code in page["wording"].items()}
-        content = None if page["content"] is None else _filled(page["content"], available)
-        move = next(move for move in DialogueMove if move.label == page["move"])
-        return Remark(
-            act=DialogueAct.of(move, *slots),
-            wording=Wording(**wording, content=content),
-            meaning=tuple(_filled(said, available) for said in page["meaning"]),
-            joined=joined,
-        )
-    except LookupError:
-        return None
-
-
-def _filled(form: Sequence[Any], available: Sources) -> Proposition:
-    predicate, negated, arguments = form
-    return Proposition(
-        Predicate(predicate), tuple((name, _decoded(code, available)) for name, code in arguments), bool(negated)
-    )
-
-
-def _decoded(code: Sequence[Any], available: Sources) -> Any:
-    kind, value = code[0], code[1]
-    if len(code) == 3:
-        return _filled(code, available)
-    if kind == "from":
-        return available[value]
-    if kind == "bool":
-        return bool(value)
-    return value if kind == "text" else _ENUMS[kind][value]
-
-
 def check_form(form: str) -> None:
     """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
-    if not isinstance(parse_json(form, "form"), dict):
-        raise ValueError(form[:80])
-    filled(form, {name: _example(name) for name in sources_of(form)})
+    remark_forms.check_form(form, remark_forms.sources_of(form), remark_forms.filled, _example)
 
 
 def _example(source: str) -> object:
@@ -200,26 +92,3 @@ def _example(source: str) -> object:
         return LandmarkName.KFC
     numbers = ("seconds", "said_speed", "suitable", "slow", "sight", "since")
     return 30 if source in numbers else StreetName.BEAL
-
-
-def sources_of(form: str) -> frozenset[str]:
-    """Returns the names of the sources that a form needs."""
-    found: set[str] = set()
-
-    def search(page: object) -> None:
-        if isinstance(page, list):
-            if len(page) == 2 and page[0] == "from":
-                found.add(str(page[1]))
-            for item in page:
-                search(item)
-        elif isinstance(page, dict):
-            for item in page.values():
-                search(item)
-
-    search(json.loads(form))
-    return frozenset(found)
-
-
-def topic_of(remark: Remark) -> str:
-    """Returns what a remark is about: its predicate or, without content, its move."""
-    return str(remark.meaning[0].predicate) if remark.meaning else remark.act.move.label

@@ -19,6 +19,7 @@ from dorothie_gym.baselines.roles.co_wizard.memory import (
     Update,
     speed_index,
 )
+from dorothie_gym.baselines.roles.learned_role.practice import new_remarks
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.town import Town
@@ -110,12 +111,12 @@ class Teacher:
         update = _update(former, state, view, named, streets)
         self._former, self._intentions, self._commands = former, state.intentions, state.commands
         self._dialogue = state.dialogue
-        heard = _new(former.speech.queue, state.speech.queue)
+        heard = new_remarks(former.speech.queue, state.speech.queue)
         physical = drive(state, view)
         waiting = state.speech.queue
         action = respond(decision, physical)
         after = (*state.speech.said[-1:], *state.speech.queue) if action.speech is not None else state.speech.queue
-        own = () if waiting else _new((), after)
+        own = () if waiting else new_remarks((), after)
         self._state, self._physical = state, physical
         return Lesson(
             update=update,
@@ -165,12 +166,6 @@ def _asking(dialogue: DialogueState, remark: Remark, view: CoWizardView) -> Dial
     if isinstance(direction, Direction):
         proposed = Directive(direction=direction, junction=view.choice.junction)
     return dialogue.after_asking_way(view.choice.lane, view.time).with_proposal(proposed)
-
-
-def _new(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...]:
-    """Returns the remarks that were not there before, whatever their words."""
-    known = [(one.act, one.meaning) for one in before]
-    return tuple(one for one in after if (one.act, one.meaning) not in known)
 
 
 def _update(

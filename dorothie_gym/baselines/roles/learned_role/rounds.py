@@ -70,7 +70,7 @@ class RoundSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stage:
+class FinishedFit:
     """A fit: the name of its model's folder, its number of examples, and the mean loss of its last pass [nats]."""
 
     name: str
@@ -135,7 +135,7 @@ class Learner(Protocol):
         """Returns the function that plays a session with the model in a folder, and writes its lessons."""
         ...
 
-    def fit(self, plan: FitPlan, on_stage: OnStage) -> Stage:
+    def fit(self, plan: FitPlan, on_stage: OnStage) -> FinishedFit:
         """Fits a network, and saves the model."""
         ...
 
@@ -148,7 +148,7 @@ def train_in_rounds(
     workers: int,
     on_stage: OnStage,
     lessons: Path | None = None,
-) -> tuple[Stage, ...]:
+) -> tuple[FinishedFit, ...]:
     """Trains a model; a started training is resumed.
 
     Args:
@@ -166,7 +166,7 @@ def train_in_rounds(
         SessionError: the corpus cannot be read or replayed, or the folder holds something else.
         ProcessError: a session failed in another process.
     """
-    done: list[Stage] = []
+    done: list[FinishedFit] = []
     entries = Corpus.load(settings.corpus).filter(fold="train").entries
     if not entries:
         raise SessionError(f"{settings.corpus}: there is no session in the fold 'train' to learn from")

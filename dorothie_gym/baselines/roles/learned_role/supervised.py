@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
-from dorothie_gym.baselines.roles.learned_role.batches import UNKNOWN
+from dorothie_gym.baselines.roles.learned_role.examples import UNKNOWN
 
 BATCH_SIZE: Final = 256
 RATE, LAST_RATE = 1e-3, 5e-5

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Self
 
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.roles.learned_role.batches import IDLE_SHARE, UNKNOWN, TensorBatch, reals, whole
-from dorothie_gym.baselines.roles.participant.decision import Inputs, Scene
-from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, Choice, Memory
+from dorothie_gym.baselines.roles.learned_role.decision import Inputs
+from dorothie_gym.baselines.roles.learned_role.examples import (
+    IDLE_SHARE,
+    UNKNOWN,
+    ExampleBatch,
+    form_numbers,
+    reals,
+    weights_of,
+    whole,
+    word_tensor,
+)
+from dorothie_gym.baselines.roles.participant.decision import ParticipantPercept
+from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, SessionMemory, TargetChoice
 from dorothie_gym.baselines.roles.participant.remarks import STOP_FORM, form_of, is_stop
 from dorothie_gym.policies.speech import Remark
 
@@ -43,30 +53,30 @@ class Example:
 
 
 def make_example(
-    scene: Scene,
+    percept: ParticipantPercept,
     choosing: Inputs,
     speaking: Inputs,
-    choice: Choice,
+    choice: TargetChoice,
     remarks: Sequence[str | None],
     rng: np.random.Generator,
 ) -> Example | None:
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        scene: what was perceived.
+        percept: what was perceived.
         choosing: inputs of the first step.
         speaking: inputs of the second step.
         choice: the teacher's choice.
         remarks: forms of its remarks.
         rng: draws which idle decisions are kept.
     """
-    guides = scene.memory.records.guidance.guiding
-    idle = not (scene.heard or remarks or choice.target != KEEP_TARGET or choice.guiding is not guides)
+    guides = percept.memory.records.guidance.guiding
+    idle = not (percept.heard or remarks or choice.target != KEEP_TARGET or choice.guiding is not guides)
     if idle and rng.random() >= IDLE_SHARE:
         return None
     target = 0
     if choice.target != KEEP_TARGET:
-        target = 1 + choosing.numbers.index(choice.target) if choice.target in choosing.numbers else UNKNOWN
+        target = 1 + choosing.rows.index(choice.target) if choice.target in choosing.rows else UNKNOWN
     padded = (*remarks, *[""] * MOST_REMARKS)[:MOST_REMARKS]
     return Example(
         choosing=choosing,
@@ -80,12 +90,15 @@ def make_example(
 
 
 def forms_of_remarks(
-    remarks: Sequence[Remark], memory: Memory, scene: Scene, available: Mapping[str, object]
+    remarks: Sequence[Remark],
+    memory: SessionMemory,
+    percept: ParticipantPercept,
+    available: Mapping[str, object],
 ) -> list[str | None]:
     """Returns the forms of remarks; None for those that are not learnt, and for all behind them."""
     found: list[str | None] = []
     for one in remarks[:MOST_REMARKS]:
-        form = STOP_FORM if is_stop(one, memory, scene.view) else form_of(one, available)
+        form = STOP_FORM if is_stop(one, memory, percept.view) else form_of(one, available)
         found.append(form)
         if form is None:
             return [*found, *[None] * MOST_REMARKS]
@@ -93,7 +106,7 @@ def forms_of_remarks(
 
 
 @dataclass(frozen=True, eq=False)
-class Batch(TensorBatch):
+class ParticipantExamples(ExampleBatch[Example]):
     """Examples as tensors; the first axis of each is that of the examples."""
 
     REMARKS: ClassVar[tuple[str, ...]] = ("remarks",)
@@ -109,25 +122,18 @@ class Batch(TensorBatch):
     remarks: torch.Tensor
     weight: torch.Tensor
 
-
-def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
-    """Returns examples as tensors.
-
-    Args:
-        found: the examples, at least one.
-        forms: forms of remarks that are numbered; others are not learnt. The first one, "", stands for silence.
-    """
-    numbers = {form: k for k, form in enumerate(forms)}
-    remarks = [[UNKNOWN if form is None else numbers.get(form, UNKNOWN) for form in one.remarks] for one in found]
-    return Batch(
-        choosing=reals([one.choosing.state for one in found]),
-        words=torch.from_numpy(np.stack([one.choosing.words for one in found]).astype(np.int16)),
-        errands=reals([one.choosing.errands for one in found]),
-        errand_count=whole([len(one.choosing.numbers) for one in found]),
-        guides=whole([int(one.guides) for one in found]),
-        target=whole([one.target for one in found]),
-        guiding=whole([int(one.guiding) for one in found]),
-        speaking=reals([one.speaking.state for one in found]),
-        remarks=whole(remarks),
-        weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
-    )
+    @classmethod
+    def of(cls, found: Sequence[Example], forms: Sequence[str]) -> Self:
+        """Returns examples as tensors, see `ExampleBatch`."""
+        return cls(
+            choosing=reals([one.choosing.state for one in found]),
+            words=word_tensor([one.choosing.words for one in found]),
+            errands=reals([one.choosing.options for one in found]),
+            errand_count=whole([len(one.choosing.rows) for one in found]),
+            guides=whole([int(one.guides) for one in found]),
+            target=whole([one.target for one in found]),
+            guiding=whole([int(one.guiding) for one in found]),
+            speaking=reals([one.speaking.state for one in found]),
+            remarks=form_numbers([one.remarks for one in found], forms),
+            weight=weights_of([one.weight for one in found]),
+        )

@@ -6,8 +6,17 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.roles.participant.memory import Event, Memory
+from dorothie_gym.baselines.roles.learned_role.encoding import (
+    AWAY,
+    TOPICS,
+    age_scales,
+    distance_scales,
+    one_hot,
+    seconds_since,
+    time_scales,
+)
+from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+from dorothie_gym.baselines.roles.participant.memory import NotedEvent, SessionMemory
 from dorothie_gym.baselines.roles.participant.records import next_step
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
@@ -27,16 +36,12 @@ from dorothie_gym.policies.route_progress import light_ahead, next_choice
 from dorothie_gym.policies.turn_lanes import turn_lanes
 from dorothie_gym.policies.view_range import camera_fault, sight, suitable_speed
 
-AWAY: Final = 300.0
-"""Time that stands for "never" or "long ago" [s]."""
-
 MAX_ERRANDS: Final = 12
 """Number of subgoals among which the target is chosen."""
 
 STEPS: Final = ("turn", "lane", "round", "on")
 _DIRECTIONS: Final = tuple(Direction)
 _OBJECTS: Final = tuple(ObjectClass)
-_TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
 _WAITS: Final = (1.6, 4.0, 6.0, 9.0, 10.0, 40.0)
 """Standstills after which the scripted participant says something [s]."""
 
@@ -52,7 +57,7 @@ _ACTIONS: Final = (
 )
 
 
-def state_vector(memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
+def state_vector(memory: SessionMemory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
     """Returns the state of car, road, route, tasks and talk.
 
     Args:
@@ -70,27 +75,12 @@ def state_vector(memory: Memory, view: ParticipantView, utterances: Sequence[Utt
     ]
 
 
-def _one_hot(index: int, size: int) -> list[float]:
-    return [float(k == index) for k in range(size)]
-
-
-def _time(seconds: float) -> list[float]:
-    """Returns a time [s] on several scales."""
-    seconds = min(max(seconds, 0.0), AWAY)
-    return [float(seconds <= 0.01), math.exp(-seconds / 1.0), math.exp(-seconds / 4.0), math.exp(-seconds / 15.0)]
-
-
-def _since(now: float, then: float) -> float:
-    return min(max(now - then, 0.0), AWAY) if math.isfinite(then) else AWAY
-
-
 def _distance(metres: float) -> list[float]:
     """Returns a distance [m] on several scales."""
-    metres = min(max(metres, -50.0), 1000.0)
-    return [math.tanh(metres / scale) for scale in (1.0, 5.0, 25.0, 100.0, 400.0)]
+    return distance_scales(metres, (1.0, 5.0, 25.0, 100.0, 400.0))
 
 
-def _car(memory: Memory, view: ParticipantView) -> list[float]:
+def _car(memory: SessionMemory, view: ParticipantView) -> list[float]:
     records, now = memory.records, view.time
     motion = records.motion
     stands = motion.standstill(now)
@@ -101,7 +91,8 @@ def _car(memory: Memory, view: ParticipantView) -> list[float]:
     return [
         min(now, 60.0) / 60.0, float(now < 2.0), view.speed / 15.0,
         min(max(view.speed - motion.speed, -3.0), 3.0) / 3.0,
-        float(view.standing), float(view.turning), *_time(stands if view.standing else AWAY), min(stands, 60.0) / 60.0,
+        float(view.standing), float(view.turning), *time_scales(stands if view.standing else AWAY),
+        min(stands, 60.0) / 60.0,
         *(float(stands > wait) for wait in _WAITS), *(float(silent > wait) for wait in _WAITS),
         float(now < motion.excused_until), float(light is not None), float(light is LightColour.RED),
         float(light is LightColour.GREEN), float(bool(view.raw["lights"])), float(is_dark(view.raw)),
@@ -112,7 +103,7 @@ def _car(memory: Memory, view: ParticipantView) -> list[float]:
     ]  # fmt: skip
 
 
-def _route(memory: Memory, view: ParticipantView) -> list[float]:
+def _route(memory: SessionMemory, view: ParticipantView) -> list[float]:
     records, now = memory.records, view.time
     progress, guidance, step = records.route.progress, records.guidance, next_step(records, view)
     if progress is None or step is None:
@@ -125,13 +116,13 @@ def _route(memory: Memory, view: ParticipantView) -> list[float]:
     announced = key == step.key
     waited = now - max(guidance.step_at, records.conversation.heard_at)
     found = [
-        1.0, float(guidance.guiding), *_distance(left), *_one_hot(STEPS.index(step.key[0]), len(STEPS)),
-        *_one_hot(-1 if step.direction is None else _DIRECTIONS.index(step.direction), len(_DIRECTIONS)),
+        1.0, float(guidance.guiding), *_distance(left), *one_hot(STEPS.index(step.key[0]), len(STEPS)),
+        *one_hot(-1 if step.direction is None else _DIRECTIONS.index(step.direction), len(_DIRECTIONS)),
         *_distance(step.distance), float(step.distance < config.turn_distance),
         float(step.distance < config.turn_late_distance), min(step.distance / max(view.speed, 1.0), 30.0) / 10.0,
         float(lane in turn_lanes(records.town)), float(lane == view.lane),
-        float(announced), float(key is not None), *_one_hot(-1 if key is None else STEPS.index(key[0]), len(STEPS)),
-        min(guidance.repeats, 3) / 3.0, *_time(_since(now, guidance.step_at)),
+        float(announced), float(key is not None), *one_hot(-1 if key is None else STEPS.index(key[0]), len(STEPS)),
+        min(guidance.repeats, 3) / 3.0, *age_scales(now, guidance.step_at),
         float(waited > config.repeat_after), float(now - guidance.step_at < config.switch_time),
         float(progress.turns_round_on(view.lane)), float(run_up is not None),
         *_distance(run_up[0] if run_up is not None else AWAY), (run_up[1] if run_up is not None else 0) / 2.0,
@@ -152,7 +143,7 @@ ROUTE_SIZE: Final = 65
 """Length of the part of the state about the route."""
 
 
-def _stop(memory: Memory, view: ParticipantView) -> list[float]:
+def _stop(memory: SessionMemory, view: ParticipantView) -> list[float]:
     records, now = memory.records, view.time
     progress = records.route.progress
     if progress is None or not is_last_stretch(records, view):
@@ -172,8 +163,8 @@ def _stop(memory: Memory, view: ParticipantView) -> list[float]:
         *_distance(left), float(abs(left) <= config.arrived_within), float(left < config.stop_distance),
         float(left < 45.0), float(left > config.slow_distance), float(slow), float(view.speed > config.slow_speed),
         float(left > 3.5 * speed + 20.0), float(left > 3.0 * speed + 12.0), float(guidance.approach_announced),
-        float(guidance.slowed_early), float(guidance.points_out), *_time(_since(now, guidance.stopped_at)),
-        float(now - guidance.stopped_at > 5.0), *_time(_since(now, guidance.nudged_at)),
+        float(guidance.slowed_early), float(guidance.points_out), *age_scales(now, guidance.stopped_at),
+        float(now - guidance.stopped_at > 5.0), *age_scales(now, guidance.nudged_at),
         float(now - guidance.nudged_at < config.nudge_time), min(guidance.nudges, 4) / 4.0,
         float(waited > config.ready_time), float(waited > 6.0), float(left < 5.0), float(left > 18.0),
         float(goal is not None and is_on_right(records.town, goal.lane, goal.x, goal.y)),
@@ -184,21 +175,21 @@ STOP_SIZE: Final = 49
 """Length of the part of the state about the stop at the target."""
 
 
-def _tasks(memory: Memory, view: ParticipantView) -> list[float]:
+def _tasks(memory: SessionMemory, view: ParticipantView) -> list[float]:
     records, now = memory.records, view.time
     task = records.task
     ages: list[float] = []
-    for kind in Event:
+    for kind in NotedEvent:
         happened = memory.event(kind)
-        ages += _time(AWAY if happened is None else now - happened[0])
+        ages += time_scales(AWAY if happened is None else now - happened[0])
     open_goals = [goal for goal in view.subgoals if goal.open]
     goal = task.goal
     purpose = purpose_of_target(records, view)
     silence = now - max(task.announced_at, records.speech.last_end)
     unheard = records.conversation.heard_at < task.announced_at
-    finished = memory.event(Event.DONE)
+    finished = memory.event(NotedEvent.DONE)
     return [
-        *ages, float(task.target is not None), float(task.announced), *_time(_since(now, task.announced_at)),
+        *ages, float(task.target is not None), float(task.announced), *age_scales(now, task.announced_at),
         float(task.described), float(task.target in task.put_off), min(len(open_goals), 5) / 5.0,
         float(any(other.index != task.target for other in open_goals)), float(bool(open_goals)),
         float(goal is not None and view.unique(goal)), float(goal is not None and goal.street is StreetName.UNKNOWN),
@@ -211,17 +202,17 @@ def _tasks(memory: Memory, view: ParticipantView) -> list[float]:
     ]  # fmt: skip
 
 
-def _own_talk(memory: Memory, view: ParticipantView) -> list[float]:
+def _own_talk(memory: SessionMemory, view: ParticipantView) -> list[float]:
     speech, now = memory.records.speech, view.time
     said = dict(memory.said_at)
     last = speech.last
-    moves = _one_hot(-1 if last is None else _MOVES.index(last.act.move), len(_MOVES))
+    moves = one_hot(-1 if last is None else _MOVES.index(last.act.move), len(_MOVES))
     actions = [float(last is not None and action in last.act.slots) for action in _ACTIONS]
     return [
-        *(math.exp(-_since(now, said.get(topic, -AWAY)) / 10.0) for topic in _TOPICS),
-        *(float(topic in said) for topic in _TOPICS), *moves, *actions,
-        *_time(_since(now, speech.last_end)), *_time(_since(now, memory.records.conversation.heard_at)),
-        *_time(_since(now, memory.records.conversation.asked_at)),
+        *(math.exp(-seconds_since(now, said.get(topic, -AWAY)) / 10.0) for topic in TOPICS),
+        *(float(topic in said) for topic in TOPICS), *moves, *actions,
+        *age_scales(now, speech.last_end), *age_scales(now, memory.records.conversation.heard_at),
+        *age_scales(now, memory.records.conversation.asked_at),
         float(now - memory.records.conversation.lights_at < 25.0), float(view.speaking > 0.0), view.speaking / 5.0,
         float(view.other_speaking), float(not speech.idle), len(speech.queue) / 3.0, float(now < speech.quiet_until),
     ]  # fmt: skip
@@ -234,7 +225,7 @@ STATE_SIZE: Final = 415
 # --- What the car asks or says ----------------------------------------------------------------------------------------
 
 
-def _question(memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
+def _question(memory: SessionMemory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
     goal = memory.records.task.goal
     if latest is None:
@@ -272,13 +263,13 @@ def _name_of(view: ParticipantView, subgoal: SeenSubgoal) -> LandmarkName | None
     return None if landmark is None else landmark.name
 
 
-def _said_other_side(memory: Memory, direction: Direction) -> bool:
+def _said_other_side(memory: SessionMemory, direction: Direction) -> bool:
     """Returns whether the last direction that the participant said is another one."""
     said = [item.wording.direction for item in memory.records.speech.said if item.wording.direction is not None]
     return bool(said) and said[-1] is not direction
 
 
-def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bool | None:
+def answer_to(memory: SessionMemory, view: ParticipantView, utterance: Utterance) -> bool | None:
     """Returns whether the answer to a question is yes; None if it is no such question, or nothing tells."""
     asked, direction = utterance.asked, utterance.heard.words.direction
     if asked is None:
@@ -299,14 +290,14 @@ def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bo
 
 
 def errand_vectors(
-    memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]
+    memory: SessionMemory, view: ParticipantView, utterances: Sequence[Utterance]
 ) -> tuple[list[list[float]], tuple[int, ...]]:
     """Returns a vector for each subgoal that may be reached now, and their numbers."""
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
     found = [one for one in view.subgoals if one.open and one.allowed and view.landmark(one.landmark) is not None]
     found = found[:MAX_ERRANDS]
     lengths = [_way_to(memory, view, one) for one in found]
-    added = memory.event(Event.ADDED)
+    added = memory.event(NotedEvent.ADDED)
     vectors = []
     for one, length in zip(found, lengths, strict=True):
         name = _name_of(view, one)
@@ -329,7 +320,7 @@ ERRAND_SIZE: Final = 12
 """Length of the vector of an errand."""
 
 
-def _way_to(memory: Memory, view: ParticipantView, subgoal: SeenSubgoal) -> float:
+def _way_to(memory: SessionMemory, view: ParticipantView, subgoal: SeenSubgoal) -> float:
     """Returns the length of the route to a subgoal [m]; infinite where there is none."""
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:

@@ -3,45 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
-import torch
-
-from dorothie_gym.baselines.roles.learned_role.model_files import RoleModelPage, load_model, save_model
-from dorothie_gym.baselines.roles.participant.network import Layout, ParticipantNetwork
+from dorothie_gym.baselines.roles.learned_role.files import ModelFiles, RoleModelPage
+from dorothie_gym.baselines.roles.participant.network import ParticipantLayout, ParticipantNetwork
 from dorothie_gym.baselines.roles.participant.remarks import check_form
-
-KIND: Final = "participant"
-"""Kind of the model in `model.json`; `policy_loader` selects the loader by it."""
-
-MODEL_FORMAT: Final = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelPage(RoleModelPage):
+class ParticipantModelPage(RoleModelPage):
     """Content of `model.json`.
 
     Attributes:
         layout: lengths of inputs and outputs.
     """
 
-    layout: Layout
+    layout: ParticipantLayout
 
 
-def save_network(network: ParticipantNetwork, page: ModelPage, folder: Path) -> None:
-    """Writes a model into a folder, with weights in half precision; an older one stays whole until it is replaced."""
-    save_model(network, page, folder, torch.float16)
-
-
-def load_network(folder: Path) -> tuple[ParticipantNetwork, ModelPage]:
-    """Reads a model from its folder, or from `model.json` in it.
-
-    Raises:
-        ModelFileError: a file is missing, damaged, or of another version.
-    """
-    return load_model(folder, ModelPage, KIND, MODEL_FORMAT, make=_network, check_form=check_form)
-
-
-def _network(page: ModelPage) -> ParticipantNetwork | None:
-    return ParticipantNetwork(page.layout) if page.layout == Layout.of(len(page.vocabulary)) else None
+FILES: Final = ModelFiles(
+    kind="participant",
+    version=1,
+    page=ParticipantModelPage,
+    layout=ParticipantLayout.of,
+    make=ParticipantNetwork,
+    check_form=check_form,
+)

@@ -7,11 +7,11 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from dorothie_gym.baselines.roles.learned_role.supervised import changed_weights, entropy, weighted_mean
-from dorothie_gym.baselines.roles.participant.examples import Batch
+from dorothie_gym.baselines.roles.participant.examples import ParticipantExamples
 from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
 
 
-def loss_of(network: ParticipantNetwork, batch: Batch) -> Tensor:
+def loss_of(network: ParticipantNetwork, batch: ParticipantExamples) -> Tensor:
     """Returns the sum of the mean losses of all outputs [nats]."""
     weight, words, guides = batch.weight, batch.words.long(), batch.guides.float()
     target, guiding = network.choose(

@@ -13,7 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.baselines.roles.participant.records import note_remark, topic_of
+from dorothie_gym.baselines.roles.learned_role.remark_forms import topic_of
+from dorothie_gym.baselines.roles.participant.records import note_remark
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
@@ -41,13 +42,13 @@ AVERAGE: Final = ParticipantStyle(
 """Style of the learned participant's records, and of the teacher in practice: few choices are left to chance."""
 
 KEEP_TARGET: Final = -1
-"""Choice of the target: no change."""
+"""TargetChoice of the target: no change."""
 
 LONGEST_WAIT: Final = 12.0
 """Time after which a remark that could not be said is dropped [s]."""
 
 
-class Event(enum.IntEnum):
+class NotedEvent(enum.IntEnum):
     """What has happened to the tasks, on the way, or in the talk; the memory keeps when, and which place."""
 
     DONE = 0
@@ -70,7 +71,7 @@ class Event(enum.IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
+class TargetChoice:
     """Output of the network for the memory.
 
     Attributes:
@@ -83,7 +84,7 @@ class Choice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Memory:
+class SessionMemory:
     """Working memory.
 
     Attributes:
@@ -94,27 +95,29 @@ class Memory:
     """
 
     records: ParticipantState
-    events: tuple[tuple[Event, float, LandmarkName | None], ...] = ()
+    events: tuple[tuple[NotedEvent, float, LandmarkName | None], ...] = ()
     said_at: tuple[tuple[str, float], ...] = ()
     message: str = ""
 
     @classmethod
-    def begin(cls, town: Town, seed: int, voice: SpeechState) -> Memory:
-        """Returns the memory before the first decision."""
+    def begin(cls, town: Town, seed: int) -> SessionMemory:
+        """Returns the memory before the first decision, with the voice of an average speaker."""
+        style = draw_style(Role.PARTICIPANT, np.random.default_rng((seed, 0)))
+        voice = SpeechState(role=Role.PARTICIPANT, style=style)
         return cls(
             records=ParticipantState(seed=seed, town=town, style=AVERAGE, config=ParticipantConfig(), speech=voice)
         )
 
-    def event(self, kind: Event) -> tuple[float, LandmarkName | None] | None:
+    def event(self, kind: NotedEvent) -> tuple[float, LandmarkName | None] | None:
         """Returns time and place of the latest event of a kind; None if there was none."""
         return next(((at, place) for event, at, place in self.events if event is kind), None)
 
-    def happened(self, kind: Event, now: float, place: LandmarkName | None = None) -> Memory:
+    def happened(self, kind: NotedEvent, now: float, place: LandmarkName | None = None) -> SessionMemory:
         """Records an event."""
         events = tuple(one for one in self.events if one[0] is not kind)
         return replace(self, events=(*events, (kind, now, place)))
 
-    def looking(self, view: ParticipantView) -> tuple[Memory, ParticipantView]:
+    def looking(self, view: ParticipantView) -> tuple[SessionMemory, ParticipantView]:
         """Brings tasks, motion and route up to date with an observation; returns the view as it is understood."""
         records, _ = self.records.next_decision()
         records.clock = records.clock.ticked(view.time)
@@ -125,13 +128,13 @@ class Memory:
         excuse_at_light(records, view)
         memory = replace(self, records=records)
         if records.motion.standing_since != moved_at:
-            memory = memory.happened(Event.RED_LIGHT, view.time)
+            memory = memory.happened(NotedEvent.RED_LIGHT, view.time)
         text = str(view.raw["message"]).strip()
         if text and text != self.message:
-            memory = replace(memory, message=text).happened(Event.MESSAGE, view.time)
+            memory = replace(memory, message=text).happened(NotedEvent.MESSAGE, view.time)
         return memory._noting_tasks(view)._following(view), view
 
-    def hearing(self, heard: HeardUtterance, view: ParticipantView, rng: np.random.Generator) -> Memory:
+    def hearing(self, heard: HeardUtterance, view: ParticipantView, rng: np.random.Generator) -> SessionMemory:
         """Takes in an utterance of the car: it may be answered, and what it says is not said again."""
         records = self._copied()
         records.conversation = records.conversation.after_hearing(view.time)
@@ -145,7 +148,7 @@ class Memory:
             memory = memory._noting_blocked(view, near=True)
         return memory
 
-    def chosen(self, choice: Choice, view: ParticipantView, rng: np.random.Generator) -> Memory:
+    def chosen(self, choice: TargetChoice, view: ParticipantView, rng: np.random.Generator) -> SessionMemory:
         """Stores a choice of the network, and prepares the words for the stop at the target."""
         records = self._copied()
         if choice.target != KEEP_TARGET and choice.target != records.task.target:
@@ -159,7 +162,7 @@ class Memory:
             prepare_stop(records, view, progress.left(view.station), rng)
         return replace(self, records=records)
 
-    def decided(self, remarks: Sequence[Remark], view: ParticipantView, rng: np.random.Generator) -> Memory:
+    def decided(self, remarks: Sequence[Remark], view: ParticipantView, rng: np.random.Generator) -> SessionMemory:
         """Notes what is going to be said, and queues it; urgent remarks replace what waits to be said."""
         records, memory = self._copied(), self
         voice = records.speech
@@ -177,7 +180,7 @@ class Memory:
         records.speech = voice
         return replace(memory, records=records)
 
-    def spoken(self, speech: SpeechState, view: ParticipantView) -> Memory:
+    def spoken(self, speech: SpeechState, view: ParticipantView) -> SessionMemory:
         """Stores the voice after a decision, and the speed of the car for the next one."""
         records = self._copied()
         records.speech, records.motion = speech, records.motion.with_speed(view.speed)
@@ -186,7 +189,7 @@ class Memory:
     def _copied(self) -> ParticipantState:
         return replace(self.records)
 
-    def _noting_tasks(self, view: ParticipantView) -> Memory:
+    def _noting_tasks(self, view: ParticipantView) -> SessionMemory:
         """Notes which tasks are done, new, dropped or changed; a target that is no longer open is given up."""
         memory, records, now = self, self._copied(), view.time
         before = records.task.subgoals
@@ -195,22 +198,22 @@ class Memory:
             place, former = _name(view, new), _name(view, old)
             moved = new.open and old.open and new.landmark != old.landmark
             if new.reached and not old.reached:
-                memory = memory.happened(Event.DONE, now, place)
+                memory = memory.happened(NotedEvent.DONE, now, place)
                 records.task = records.task.closed(new.index).after_finishing(place, now)
             elif new.open and not old.live:
-                memory = memory.happened(Event.ADDED, now, place)
+                memory = memory.happened(NotedEvent.ADDED, now, place)
             elif old.open and not new.live:
-                memory = memory.happened(Event.DROPPED, now, former)
+                memory = memory.happened(NotedEvent.DROPPED, now, former)
                 records.task = records.task.closed(new.index)
             elif moved:
-                memory = memory.happened(Event.MOVED, now, place).happened(Event.FORMER, now, former)
+                memory = memory.happened(NotedEvent.MOVED, now, place).happened(NotedEvent.FORMER, now, former)
             if new.index == records.task.target and (moved or not (new.open and new.allowed)):
                 records.forget_target()
                 next_at = now + records.config.next_task_delay if new.reached else now
                 records.task = records.task.with_next_task(same_breath=False, next_at=next_at)
         return replace(memory, records=records)
 
-    def _following(self, view: ParticipantView) -> Memory:
+    def _following(self, view: ParticipantView) -> SessionMemory:
         """Follows the route; plans another one where the car has left it, or where it did not help twice."""
         memory = self._noting_blocked(view, near=False)
         records = memory._copied()
@@ -219,30 +222,30 @@ class Memory:
         after, now = records.guidance, view.time
         if route.progress is not None and records.route.progress is not None:
             if records.route.progress.route is not route.progress.route:
-                memory = memory.happened(Event.STRAYED, now)
+                memory = memory.happened(NotedEvent.STRAYED, now)
             if records.route.misses > route.misses:
-                memory = memory.happened(Event.MISSED, now)
+                memory = memory.happened(NotedEvent.MISSED, now)
             if after.passes > guidance.passes:
-                memory = memory.happened(Event.PASSED, now)
+                memory = memory.happened(NotedEvent.PASSED, now)
             wrong = _is_wrong_turn(guidance.step, route.progress, records.route.progress, view, records.config)
             if wrong and guiding:
-                memory = memory.happened(Event.WRONG_TURN, now)
+                memory = memory.happened(NotedEvent.WRONG_TURN, now)
         astray = records.route.progress is not None and records.route.progress.astray > 0
         if records.route.progress is not None and records.task.announced and not view.turning and not astray:
             _silently(records, lambda: stop_circling(records, view))
         costs = [None if one is None else one.manoeuvre_cost for one in (route.progress, records.route.progress)]
         if None not in costs and (costs[0] != costs[1] or records.route.avoided != route.avoided):
-            memory = memory.happened(Event.REROUTED, now)
+            memory = memory.happened(NotedEvent.REROUTED, now)
         records.set_guiding(guiding)
         return replace(memory, records=records)
 
-    def _noting_blocked(self, view: ParticipantView, *, near: bool) -> Memory:
+    def _noting_blocked(self, view: ParticipantView, *, near: bool) -> SessionMemory:
         """Notes what blocks the route, and plans around it."""
         records = self._copied()
         known = records.route.blocked
         _silently(records, lambda: note_blocked(records, view, near=near))
         memory = replace(self, records=records)
-        return memory.happened(Event.BLOCKED, view.time) if records.route.blocked != known else memory
+        return memory.happened(NotedEvent.BLOCKED, view.time) if records.route.blocked != known else memory
 
 
 def _silently(records: ParticipantState, bookkeeping: Callable[[], None]) -> None:
@@ -275,9 +278,3 @@ def _aim_at(records: ParticipantState, view: ParticipantView, subgoal: SeenSubgo
     blocked, cost = records.route.blocked, records.config.manoeuvre_cost
     progress = RouteProgress.plan(records.town, view.place, landmark.place, blocked, cost)
     records.route = records.route.with_progress(progress)
-
-
-def voice_of(seed: int) -> SpeechState:
-    """Returns the voice of an average speaker, whose wording follows from a seed."""
-    style = draw_style(Role.PARTICIPANT, np.random.default_rng((seed, 0)))
-    return SpeechState(role=Role.PARTICIPANT, style=style)

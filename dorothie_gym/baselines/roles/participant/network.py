@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.roles.co_wizard.hearing import KEPT, UTTERANCE_SIZE, WORD_BUCKETS
-from dorothie_gym.baselines.roles.learned_role.layers import hidden_layers, option_scorer, option_scores
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.roles.learned_role.network import (
+    REMARK_WIDTH,
+    WIDTH,
+    WORD_WIDTH,
+    RoleNetwork,
+    following_remark,
+    hidden_layers,
+    option_scorer,
+    option_scores,
+)
 from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, STATE_SIZE
 
-WORD_WIDTH, WIDTH, OPTION_WIDTH, REMARK_WIDTH = 24, 256, 64, 48
-"""Widths of the word embedding, of the hidden layers, of the layer that scores errands, and of an embedded remark."""
+ERRAND_WIDTH: Final = 64
+"""Width of the layer that scores errands."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class ParticipantLayout:
     """Lengths of the inputs and outputs.
 
     Attributes:
@@ -30,29 +40,26 @@ class Layout:
     remarks: int
 
     @classmethod
-    def of(cls, remarks: int) -> Layout:
+    def of(cls, remarks: int) -> ParticipantLayout:
         """Returns the layout of this version for a vocabulary of some size."""
         return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, errand=ERRAND_SIZE, remarks=remarks)
 
 
-class ParticipantNetwork(nn.Module):
+class ParticipantNetwork(RoleNetwork):
     """Chooses the target, whether to guide, and the remarks."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: ParticipantLayout) -> None:
         super().__init__()
         self.layout = layout
-        self.words = nn.EmbeddingBag(WORD_BUCKETS, WORD_WIDTH, mode="mean", padding_idx=0)
         self.choosing = hidden_layers(layout.state + WORD_WIDTH, WIDTH)
         self.keep = nn.Linear(WIDTH, 1)
-        self.errand = option_scorer(WIDTH + layout.errand, OPTION_WIDTH)
+        self.errand = option_scorer(WIDTH + layout.errand, ERRAND_WIDTH)
         self.guiding = nn.Linear(WIDTH, 1)
         self.kept = nn.Parameter(torch.tensor(2.0))
         self.speaking = hidden_layers(layout.state + WORD_WIDTH, WIDTH)
         self.first = nn.Linear(WIDTH, layout.remarks)
         self.remarks = nn.Embedding(layout.remarks, REMARK_WIDTH)
-        self.next = nn.Sequential(
-            nn.Linear(WIDTH + REMARK_WIDTH, WIDTH // 2), nn.ReLU(), nn.Linear(WIDTH // 2, layout.remarks)
-        )
+        self.next = following_remark(layout.remarks)
 
     def choose(
         self, state: Tensor, words: Tensor, errands: Tensor, count: Tensor, guides: Tensor
@@ -66,16 +73,17 @@ class ParticipantNetwork(nn.Module):
             count: number of errands (b,).
             guides: whether the car is guided so far, 0 or 1 (b,).
         """
-        hidden = self.choosing(torch.cat([state, self.words(words)], dim=1))
+        hidden = self.hidden(self.choosing, state, words)
         scores = option_scores(self.errand, hidden, errands, count)
         guiding = self.guiding(hidden).squeeze(1) + self.kept * (2.0 * guides - 1.0)
         return torch.cat([self.keep(hidden), scores], dim=1), guiding
 
     def speak(self, state: Tensor, words: Tensor) -> tuple[Tensor, Tensor]:
         """Returns the logits of the first remark (b, r), and the hidden layer for `then`."""
-        hidden = self.speaking(torch.cat([state, self.words(words)], dim=1))
+        hidden = self.hidden(self.speaking, state, words)
         return self.first(hidden), hidden
 
     def then(self, hidden: Tensor, before: Tensor) -> Tensor:
         """Returns the logits of the remark (b, r) behind another one (b,)."""
-        return self.next(torch.cat([hidden, self.remarks(before)], dim=1))  # type: ignore[no-any-return]
+        scores: Tensor = self.next(torch.cat([hidden, self.remarks(before)], dim=1))
+        return scores

@@ -29,11 +29,6 @@ _NAMES_GOAL: Final = (DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.
 _STEPS: Final = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH, ActionValue.LANE_FOLLOW)
 
 
-def topic_of(remark: Remark) -> str:
-    """Returns what a remark is about: its predicate or, without content, its move."""
-    return str(remark.meaning[0].predicate) if remark.meaning else remark.act.move.label
-
-
 def note_remark(records: ParticipantState, view: ParticipantView, remark: Remark) -> None:
     """Enters an own remark into records: what is announced, described, asked for, or mentioned by it."""
     act, now, goal = remark.act, view.time, records.task.goal

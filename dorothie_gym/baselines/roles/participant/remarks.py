@@ -11,9 +11,10 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from dorothie_gym.baselines.roles.co_wizard import remarks as forms
-from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.roles.participant.memory import Event, Memory
+from dorothie_gym.baselines.roles.learned_role import remark_forms
+from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+from dorothie_gym.baselines.roles.learned_role.remark_forms import TEXT_MARK
+from dorothie_gym.baselines.roles.participant.memory import NotedEvent, SessionMemory
 from dorothie_gym.baselines.roles.participant.records import next_step
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
@@ -31,25 +32,21 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import sight, suitable_speed
-from dorothie_gym.support.input_files import parse_json
 from dorothie_gym.tasks.landmark_designs import features_of
 
 TEXTS: Final = ("person", "item", "purpose", "reason", "feature")
 """Arguments of propositions that are free texts."""
 
-_MARK: Final = "@"
-"""First character of the source of a text within a form."""
-
 _SHORT, _SPOKEN = 1.0, 8.0
 """Distances by which spoken distances are shortened, when they are short and otherwise [m]."""
 
 
-def sources(memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]) -> dict[str, object]:
+def sources(memory: SessionMemory, view: ParticipantView, utterances: Sequence[Utterance]) -> dict[str, object]:
     """Returns the names, numbers and texts that can be said now, by source; the preferred ones first."""
     records, latest = memory.records, utterances[0] if utterances else None
     goal, town = records.task.goal, records.town
     found: dict[str, object] = {} if goal is None else {"goal": goal.name, "goal_street": goal.street}
-    for kind in (Event.DONE, Event.ADDED, Event.DROPPED, Event.MOVED, Event.FORMER):
+    for kind in (NotedEvent.DONE, NotedEvent.ADDED, NotedEvent.DROPPED, NotedEvent.MOVED, NotedEvent.FORMER):
         happened = memory.event(kind)
         if happened is not None and view.time - happened[0] < 1.0:
             found[kind.name.lower()] = happened[1]
@@ -93,7 +90,7 @@ def _pointers(step: RouteStep | None, latest: Utterance | None) -> dict[str, obj
     return {**found, "said_turn": latest.heard.words.direction}
 
 
-def _numbers(memory: Memory, view: ParticipantView, step: RouteStep | None) -> dict[str, object]:
+def _numbers(memory: SessionMemory, view: ParticipantView, step: RouteStep | None) -> dict[str, object]:
     """Returns distances and speeds; whole numbers are of contents, others of their words."""
     records, progress = memory.records, memory.records.route.progress
     found: dict[str, object] = {}
@@ -112,7 +109,7 @@ def _numbers(memory: Memory, view: ParticipantView, step: RouteStep | None) -> d
     return found
 
 
-def _texts(memory: Memory, view: ParticipantView) -> dict[str, object]:
+def _texts(memory: SessionMemory, view: ParticipantView) -> dict[str, object]:
     goal, purpose = memory.records.task.goal, purpose_of_target(memory.records, view)
     found: dict[str, object] = {}
     if purpose is not None:
@@ -136,8 +133,8 @@ def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
     """Returns the form of a remark; None if it has a name, number or text without a source."""
     if any(said.predicate is Predicate.NEAR and said.get("object") is not None for said in remark.meaning):
         return None  # which sign stands there is not observed
-    texts = {value: name for name, value in available.items() if name.startswith(_MARK)}
-    plain = {name: value for name, value in available.items() if not name.startswith(_MARK)}
+    texts = {value: name for name, value in available.items() if name.startswith(TEXT_MARK)}
+    plain = {name: value for name, value in available.items() if not name.startswith(TEXT_MARK)}
     try:
         content = remark.wording.content
         coded = replace(
@@ -147,7 +144,7 @@ def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
         )
     except LookupError:
         return None
-    form = forms.form_of(coded, plain)
+    form = remark_forms.form_of(coded, plain)
     if form is None:
         return None
     names = next((names for moves, names in _POINTERS if remark.act.move in moves), ())
@@ -188,7 +185,7 @@ def _reworded(wording: Wording, content: Proposition | None) -> Wording:
 
 def filled(form: str, available: Mapping[str, object], *, joined: bool = False) -> Remark | None:
     """Returns the remark of a form with the present names, numbers and texts; None if a source is missing."""
-    found = forms.filled(form, available, joined=joined)
+    found = remark_forms.filled(form, available, joined=joined)
     if found is None:
         return None
     try:
@@ -206,25 +203,14 @@ def filled(form: str, available: Mapping[str, object], *, joined: bool = False) 
 def _decoded(said: Proposition, available: Mapping[str, object]) -> Proposition:
     arguments: list[tuple[str, Any]] = []
     for name, value in said.arguments:
-        text = isinstance(value, str) and name in TEXTS and value.startswith(_MARK)
+        text = isinstance(value, str) and name in TEXTS and value.startswith(TEXT_MARK)
         arguments.append((name, available[str(value)] if text else value))
     return Proposition(said.predicate, tuple(arguments), said.negated)
 
 
 def sources_of(form: str) -> frozenset[str]:
     """Returns the names of the sources that a form needs."""
-    if form == STOP_FORM:
-        return frozenset()
-    texts: set[str] = set()
-
-    def search(page: object) -> None:
-        if isinstance(page, list) and len(page) == 2 and page[0] == "text" and str(page[1]).startswith(_MARK):
-            texts.add(str(page[1]))
-        for item in page if isinstance(page, list) else page.values() if isinstance(page, dict) else ():
-            search(item)
-
-    search(json.loads(form))
-    return forms.sources_of(form) | texts
+    return frozenset() if form == STOP_FORM else remark_forms.sources_of(form)
 
 
 def is_yes(form: str) -> bool:
@@ -241,20 +227,6 @@ def _move_of(form: str) -> str | None:
     return None if form in ("", STOP_FORM) else str(json.loads(form)["move"])
 
 
-def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
-    if form == STOP_FORM:
-        return
-    if not isinstance(parse_json(form, "form"), dict):
-        raise ValueError(form[:80])
-    try:
-        found = filled(form, {name: _example(name) for name in sources_of(form)})
-    except StopIteration:  # there is no such move
-        found = None
-    if found is None:
-        raise ValueError(form[:80])
-
-
 _PLACES: Final = (
     "goal", "done", "added", "dropped", "moved", "former", "place0", "place1", "later0", "later1", "near", "beside",
 )  # fmt: skip
@@ -268,9 +240,15 @@ _VALUES: Final[Mapping[str, object]] = {
 _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_street", "cross")
 
 
+def check_form(form: str) -> None:
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    if form != STOP_FORM:
+        remark_forms.check_form(form, sources_of(form), filled, _example)
+
+
 def _example(source: str) -> object:
     """Returns what a source can be."""
-    if source.startswith(_MARK):
+    if source.startswith(TEXT_MARK):
         return "text"
     if source in _VALUES:
         return _VALUES[source]
@@ -282,10 +260,10 @@ def _example(source: str) -> object:
 # --- Stop at the target -----------------------------------------------------------------------------------------------
 
 STOP_FORM: Final = "stop"
-"""Form of the remark that stops the car at the target, whose words are chosen ahead (`Memory.chosen`)."""
+"""Form of the remark that stops the car at the target, whose words are chosen ahead (`SessionMemory.chosen`)."""
 
 
-def is_stop(remark: Remark, memory: Memory, view: ParticipantView) -> bool:
+def is_stop(remark: Remark, memory: SessionMemory, view: ParticipantView) -> bool:
     """Returns whether a remark stops the car at the target: an instruction, or the statement that this is the place."""
     if not is_last_stretch(memory.records, view) or view.standing:
         return False
@@ -293,7 +271,7 @@ def is_stop(remark: Remark, memory: Memory, view: ParticipantView) -> bool:
     return stops or remark.wording.topic == "here"
 
 
-def stop_remark(memory: Memory) -> Remark | None:
+def stop_remark(memory: SessionMemory) -> Remark | None:
     """Returns the remark that stops the car, in the words chosen before; None if none are chosen."""
     guidance, goal = memory.records.guidance, memory.records.task.goal
     if not guidance.stop_text:

@@ -6,10 +6,10 @@ goes on from the player's course, not from its own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, Choice, Memory
+from dorothie_gym.baselines.roles.learned_role.practice import new_remarks
+from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, SessionMemory, TargetChoice
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
@@ -37,10 +37,10 @@ class Lesson:
     remarks: tuple[Remark, ...]
     action: ActionDict
 
-    def choice(self, memory: Memory) -> Choice:
+    def choice(self, memory: SessionMemory) -> TargetChoice:
         """Returns the choice by which a memory gets the teacher's target."""
         same = self.target is None or self.target == memory.records.task.target
-        return Choice(target=KEEP_TARGET if same or self.target is None else self.target, guiding=self.guiding)
+        return TargetChoice(target=KEEP_TARGET if same or self.target is None else self.target, guiding=self.guiding)
 
 
 class Teacher:
@@ -69,11 +69,11 @@ class Teacher:
         return Lesson(
             target=state.task.target,
             guiding=state.guidance.guiding,
-            remarks=_new(former.speech.queue, after),
+            remarks=new_remarks(former.speech.queue, after),
             action=action,
         )
 
-    def settle(self, memory: Memory, *, spoke: bool) -> None:
+    def settle(self, memory: SessionMemory, *, spoke: bool) -> None:
         """Puts into the state what the player has chosen and said instead.
 
         Args:
@@ -89,9 +89,3 @@ class Teacher:
             state.task, state.route = records.task, records.route
             state.guidance = records.guidance.with_guiding(state.guidance.guiding)
         self.state = state
-
-
-def _new(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...]:
-    """Returns the remarks that were not there before, whatever their words."""
-    known = [(one.act, one.meaning) for one in before]
-    return tuple(one for one in after if (one.act, one.meaning) not in known)

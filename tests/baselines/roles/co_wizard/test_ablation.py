@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 from benchmarks.co_wizard_ablation import make
-from dorothie_gym.baselines.roles.co_wizard.demonstrations import observed
-from dorothie_gym.baselines.roles.co_wizard.memory import Memory
+from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.policy import Turn
+from dorothie_gym.baselines.roles.learned_role.practice import observed
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy, pretrained_folder
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
@@ -39,13 +39,13 @@ def turns(row: str, engine: SessionEngine) -> Iterator[Turn]:
         inputs, actions = policy_inputs(engine, others), {}
         for role, policy in others.items():
             actions[str(role)], states[role] = policy.step(inputs[role], states[role])
-        turn = player.play(observed(engine), state)
+        turn = player.play(observed(engine, Role.CO_WIZARD), state)
         state = turn.state
         engine.step({**actions, str(Role.CO_WIZARD): turn.action.encode(engine.limits)})
         yield turn
 
 
-def memories(row: str, engine: SessionEngine) -> list[Memory]:
+def memories(row: str, engine: SessionEngine) -> list[WorkingMemory]:
     return [turn.memory for turn in turns(row, engine)]
 
 

@@ -1,9 +1,10 @@
 import pytest
 
 from dorothie_gym.baselines.roles.co_wizard.answers import SAID_AGAIN_AFTER, answer_to, is_sayable, said_again
-from dorothie_gym.baselines.roles.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.roles.co_wizard.memory import VARIABLES, Memory, Update
-from dorothie_gym.baselines.roles.co_wizard.remarks import filled, form_of, sources
+from dorothie_gym.baselines.roles.co_wizard.memory import VARIABLES, Update, WorkingMemory
+from dorothie_gym.baselines.roles.co_wizard.remarks import form_of, sources
+from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+from dorothie_gym.baselines.roles.learned_role.remark_forms import filled
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
@@ -33,7 +34,7 @@ def scene():
         "action_mask": engine.mask(Role.CO_WIZARD),
     }
     view = CoWizardView.read(observation, engine.town)
-    return view, Memory(town=engine.town)
+    return view, WorkingMemory(town=engine.town)
 
 
 def heard(view, text, move, *values):

@@ -1,6 +1,7 @@
 import pytest
 
-from dorothie_gym.baselines.roles.co_wizard.remarks import check_form, filled, form_of, sources_of, topic_of
+from dorothie_gym.baselines.roles.co_wizard.remarks import check_form, form_of
+from dorothie_gym.baselines.roles.learned_role.remark_forms import filled, sources_of, topic_of
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName

@@ -5,10 +5,11 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
+from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining
 from dorothie_gym.baselines.roles.co_wizard.features import STATE_SIZE
-from dorothie_gym.baselines.roles.co_wizard.files import load_network
-from dorothie_gym.baselines.roles.co_wizard.hearing import KEPT, UTTERANCE_SIZE
-from dorothie_gym.baselines.roles.co_wizard.training import CoWizardTraining, train_co_wizard
+from dorothie_gym.baselines.roles.co_wizard.files import FILES
+from dorothie_gym.baselines.roles.co_wizard.training import train_co_wizard
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
 from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS
 from dorothie_gym.errors import ModelFileError, SessionError
 from dorothie_gym.evaluation.rollout import generate_corpus
@@ -77,7 +78,7 @@ def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_pa
 def test_weights_are_stored_in_half_precision(trained):
     stored = load_file(trained / "model.safetensors")
     assert {value.dtype for value in stored.values()} == {torch.float16}
-    network, _ = load_network(trained)
+    network, _ = FILES.load(trained)
     assert {name: value.half().numpy().tobytes() for name, value in network.state_dict().items()} == weights(trained)
     assert {value.dtype for value in network.state_dict().values()} == {torch.float32}
 
@@ -141,11 +142,11 @@ def test_model_of_another_version_is_refused(trained, tmp_path, change, message)
     (tmp_path / "model.json").write_text(json.dumps({**page, **change}))
     (tmp_path / "model.safetensors").write_bytes((trained / "model.safetensors").read_bytes())
     with pytest.raises(ModelFileError, match=message):
-        load_network(tmp_path)
+        FILES.load(tmp_path)
 
 
 def test_cut_weights_are_refused(trained, tmp_path):
     (tmp_path / "model.json").write_text((trained / "model.json").read_text())
     (tmp_path / "model.safetensors").write_bytes((trained / "model.safetensors").read_bytes()[:-100])
     with pytest.raises(ModelFileError, match="cannot be read"):
-        load_network(tmp_path)
+        FILES.load(tmp_path)

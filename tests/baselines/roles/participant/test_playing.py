@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 import torch
 
-from dorothie_gym.baselines.roles.co_wizard.hearing import KEPT, UTTERANCE_SIZE, Utterance
-from dorothie_gym.baselines.roles.participant.decision import Attention, choosing_inputs, perceive
+from dorothie_gym.baselines.roles.learned_role.decision import Attention
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE, Utterance
+from dorothie_gym.baselines.roles.participant.decision import choosing_inputs, perceive
 from dorothie_gym.baselines.roles.participant.demonstrations import Pupil
 from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, STATE_SIZE, answer_to
-from dorothie_gym.baselines.roles.participant.memory import AVERAGE, Choice, Event
-from dorothie_gym.baselines.roles.participant.network import Layout, ParticipantNetwork
+from dorothie_gym.baselines.roles.participant.memory import AVERAGE, NotedEvent, SessionMemory, TargetChoice
+from dorothie_gym.baselines.roles.participant.network import ParticipantLayout, ParticipantNetwork
 from dorothie_gym.baselines.roles.participant.policy import LearnedParticipant
 from dorothie_gym.baselines.roles.participant.remarks import STOP_FORM, form_of
 from dorothie_gym.baselines.roles.participant.teacher import Teacher
@@ -41,7 +42,7 @@ def vocabulary():
 def player(limits):
     torch.manual_seed(1)
     words = vocabulary()
-    return LearnedParticipant(ParticipantNetwork(Layout.of(len(words))), words, limits)
+    return LearnedParticipant(ParticipantNetwork(ParticipantLayout.of(len(words))), words, limits)
 
 
 class Recorded(dict):
@@ -125,9 +126,9 @@ def test_state_and_errands_have_the_lengths_that_the_network_takes():
     engine = SessionEngine("midtown", config=EnvConfig(max_seconds=60.0))
     engine.reset(seed=3)
     observation = engine.observations.of([GUIDE])[str(GUIDE)]
-    inputs = choosing_inputs(perceive(observation, Attention.begin(engine.town, 3)))
+    inputs = choosing_inputs(perceive(observation, Attention(memory=SessionMemory.begin(engine.town, 3))))
     assert inputs.state.shape == (STATE_SIZE + KEPT * UTTERANCE_SIZE,)
-    assert inputs.errands.shape[1] == ERRAND_SIZE and inputs.numbers
+    assert inputs.options.shape[1] == ERRAND_SIZE and inputs.rows
     assert np.isfinite(inputs.state).all()
 
 
@@ -143,11 +144,11 @@ def test_memory_beside_the_teacher_has_its_target_and_notes_what_is_done():
         inputs, actions = policy_inputs(engine, others), {}
         for role, one in others.items():
             actions[str(role)], states[role] = one.step(inputs[role], states[role])
-        scene, memory, lesson = pupil.decide(engine.observations.of([GUIDE])[str(GUIDE)], examples.append)
+        percept, memory, lesson = pupil.decide(engine.observations.of([GUIDE])[str(GUIDE)], examples.append)
         assert memory.records.task.target == lesson.target
-        pupil.follow(scene, memory, lesson)
+        pupil.follow(percept, memory, lesson)
         actions[str(GUIDE)] = lesson.action
-        reached = scene.memory.event(Event.DONE) is not None
+        reached = percept.memory.event(NotedEvent.DONE) is not None
         engine.step(actions)
     assert reached
     assert any(one.target > 0 for one in examples)
@@ -158,11 +159,13 @@ def test_memory_beside_the_teacher_has_its_target_and_notes_what_is_done():
 def test_answer_follows_from_what_the_participant_knows(text, yes):
     engine = SessionEngine("brookside", config=EnvConfig(max_seconds=60.0))
     engine.reset(seed=5)
-    scene = perceive(engine.observations.of([GUIDE])[str(GUIDE)], Attention.begin(engine.town, 5))
-    first = next(one.index for one in scene.view.subgoals if one.open and one.allowed)
-    memory = scene.memory.chosen(Choice(target=first), scene.view, scene.rng)
+    percept = perceive(
+        engine.observations.of([GUIDE])[str(GUIDE)], Attention(memory=SessionMemory.begin(engine.town, 5))
+    )
+    first = next(one.index for one in percept.view.subgoals if one.open and one.allowed)
+    memory = percept.memory.chosen(TargetChoice(target=first), percept.view, percept.rng)
     name = load_lexicon().forms(memory.records.task.goal.name, "say")[0]
     words = text.format(goal=name)
     acts = tuple(span.act for span in guess_spans(words))
-    asked = Utterance(time=scene.view.time, heard=HeardUtterance(acts=acts, words=understand(words)))
-    assert answer_to(memory, scene.view, asked) is yes
+    asked = Utterance(time=percept.view.time, heard=HeardUtterance(acts=acts, words=understand(words)))
+    assert answer_to(memory, percept.view, asked) is yes

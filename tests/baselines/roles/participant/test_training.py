@@ -5,7 +5,7 @@ import torch
 from safetensors.torch import load_file
 
 from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS, RoundSettings
-from dorothie_gym.baselines.roles.participant.files import load_network
+from dorothie_gym.baselines.roles.participant.files import FILES
 from dorothie_gym.baselines.roles.participant.training import train_participant
 from dorothie_gym.errors import ModelFileError, SessionError
 from dorothie_gym.evaluation.rollout import generate_corpus
@@ -63,7 +63,7 @@ def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_pa
 def test_weights_are_stored_in_half_precision(trained):
     stored = load_file(trained / "model.safetensors")
     assert {value.dtype for value in stored.values()} == {torch.float16}
-    network, _ = load_network(trained)
+    network, _ = FILES.load(trained)
     assert {name: value.half().numpy().tobytes() for name, value in network.state_dict().items()} == weights(trained)
 
 
@@ -109,4 +109,4 @@ def test_model_of_another_version_is_refused(trained, tmp_path, change, message)
     (tmp_path / "model.json").write_text(json.dumps({**page, **change}))
     (tmp_path / "model.safetensors").write_bytes((trained / "model.safetensors").read_bytes())
     with pytest.raises(ModelFileError, match=message):
-        load_network(tmp_path)
+        FILES.load(tmp_path)

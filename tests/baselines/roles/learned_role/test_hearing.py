@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dorothie_gym.baselines.roles.co_wizard.hearing import (
+from dorothie_gym.baselines.roles.learned_role.hearing import (
     MAX_WORDS,
     UTTERANCE_SIZE,
     Utterance,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Generic, Self, TypeVar
 
 import numpy as np
 import torch
@@ -25,10 +26,11 @@ IDLE_SHARE: Final = 0.25
 """Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
 
 _FORMS: Final = "forms"
+Example = TypeVar("Example")
 
 
 @dataclass(frozen=True, eq=False)
-class TensorBatch:
+class ExampleBatch(ABC, Generic[Example]):
     """Examples as tensors; the first axis of each is that of the examples.
 
     Attributes:
@@ -45,6 +47,16 @@ class TensorBatch:
     def rows(self, index: torch.Tensor) -> Self:
         """Returns some examples."""
         return type(self)(**{one.name: getattr(self, one.name)[index] for one in fields(self)})
+
+    @classmethod
+    @abstractmethod
+    def of(cls, found: Sequence[Example], forms: Sequence[str]) -> Self:
+        """Returns examples as tensors.
+
+        Args:
+            found: the examples, at least one.
+            forms: forms of remarks that are numbered; others are not learnt. The first one, "", stands for silence.
+        """
 
     @classmethod
     def joined(cls, batches: Sequence[Self]) -> Self:
@@ -115,6 +127,22 @@ def reals(vectors: Sequence[NDArray[np.float32]]) -> torch.Tensor:
 def whole(numbers: Sequence[object]) -> torch.Tensor:
     """Returns integers, or rows of them, as a tensor of 16 bits."""
     return torch.tensor(numbers, dtype=torch.int16)
+
+
+def form_numbers(remarks: Sequence[Sequence[str | None]], forms: Sequence[str]) -> torch.Tensor:
+    """Returns the numbers of the forms of remarks (n, k); `UNKNOWN` for those that are not learnt."""
+    numbers = {form: k for k, form in enumerate(forms)}
+    return whole([[UNKNOWN if form is None else numbers.get(form, UNKNOWN) for form in row] for row in remarks])
+
+
+def weights_of(weights: Sequence[float]) -> torch.Tensor:
+    """Returns the weights of examples (n,)."""
+    return torch.tensor(weights, dtype=torch.float32)
+
+
+def word_tensor(rows: Sequence[NDArray[np.int64]]) -> torch.Tensor:
+    """Returns the rows of words (n, w)."""
+    return torch.from_numpy(np.stack(rows).astype(np.int16))
 
 
 def forms_in(remarks: Iterable[str | None]) -> tuple[str, ...]:
