@@ -51,13 +51,7 @@ class RandomCommands(LearnedCoWizard):
     """Commands that are drawn evenly among those that the action mask allows, "none" among them."""
 
     def _act(
-        self,
-        percept: CoWizardPercept,
-        memory: WorkingMemory,
-        inputs: Inputs,
-        rng: np.random.Generator,
-        *,
-        silent: bool,
+        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
         _, remarks = super()._act(percept, memory, inputs, rng, silent=silent)
         return int(rng.integers(len(inputs.rows))), remarks
@@ -67,13 +61,7 @@ class RuledCommands(LearnedCoWizard):
     """Commands by a rule over the memory that the network has written."""
 
     def _act(
-        self,
-        percept: CoWizardPercept,
-        memory: WorkingMemory,
-        inputs: Inputs,
-        rng: np.random.Generator,
-        *,
-        silent: bool,
+        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
         _, remarks = super()._act(percept, memory, inputs, rng, silent=silent)
         return ruled_command(memory, percept.view), remarks

@@ -1,16 +1,16 @@
-"""What a Co-Wizard believes, and why it does what it does: the protocol that scripted and learned Co-Wizards fill.
+"""What a Co-Wizard believes, and why it does what it does: the record that scripted and learned Co-Wizards fill.
 
 `co_wizard.proposition_truth` judges propositions and reasons over it, and `co_wizard.answers` words what follows. The
-state of the scripted Co-Wizard and the memory of the learned one differ in how their fields come about, which is by
-rules or by a network, and in what the learned one does not keep: whether a place that is not on its map was described
-to it, for what a stop was decided on that is over, and the reason for which it was told to stop.
+state of the scripted Co-Wizard and the memory of the learned one differ in how their fields come about, by rules or by
+a network, and in what the learned one does not keep: whether a place that is not on its map was described to it, for
+what a stop was decided on, and for what reason it was told to stop.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.maps.routing import Place
@@ -51,104 +51,54 @@ class Standstill:
         return self if reason is None or reason == self.reason else replace(self, reason=reason, reason_since=now)
 
 
-class CoWizardKnowledge(Protocol):
-    """What a Co-Wizard believes and intends; it is only read."""
+@dataclass(frozen=True, kw_only=True)
+class CoWizardKnowledge:
+    """What a Co-Wizard believes and intends.
 
-    @property
-    def town(self) -> Town:
-        """The map."""
-        ...
+    Fields with a default are what only the scripted one keeps.
 
-    @property
-    def config(self) -> CoWizardConfig:
-        """Thresholds of the judgements."""
-        ...
+    Attributes:
+        town: the map.
+        config: thresholds of the judgements.
+        goal: name of the destination; None without one.
+        goal_is_on_map: whether the place of the goal is taken from the map; otherwise it is a guess, or unknown.
+        goal_is_findable: whether the place of the goal is taken from the map or was described.
+        progress: route to the goal and the progress on it; None without a place to go to.
+        ruled_out: places of houses and people that were visited, or that were not the ones meant.
+        halted: whether the car is to stand.
+        arrived: whether the car has stopped at its goal and waits for the next task.
+        sent_on: whether the car has only stopped where it was told to drive to, which may be the goal.
+        pausing: whether the car stops before the junction ahead until the way is known.
+        directed: whether a turn that the participant asked for is ahead.
+        to_turn_round: whether a U-turn that the participant asked for has not begun yet.
+        asks_for_detour: whether a question about a way round an obstacle is open.
+        blocked_at: time at which an obstacle across the road was last found [s].
+        told_to_stop_at: time of the last instruction to stop [s].
+        stop_reason: why the car stopped on that instruction.
+        told_to_turn_round_at: time of the last instruction to turn round [s].
+        standstill: present or last standstill.
+        rests_for: for what the car stops by a decision.
+        rests_until: end of that stop [s].
+    """
 
-    @property
-    def goal(self) -> LandmarkName | None:
-        """Name of the destination; None without one."""
-        ...
-
-    @property
-    def goal_is_on_map(self) -> bool:
-        """Whether the place of the goal is taken from the map; otherwise it is a guess, or unknown."""
-        ...
-
-    @property
-    def goal_is_findable(self) -> bool:
-        """Whether the place of the goal is taken from the map or was described."""
-        ...
-
-    @property
-    def progress(self) -> RouteProgress | None:
-        """Route to the goal and the progress on it; None without a place to go to."""
-        ...
-
-    @property
-    def ruled_out(self) -> tuple[Place, ...]:
-        """Places of houses and people that were visited, or that were not the ones meant."""
-        ...
-
-    @property
-    def is_halted(self) -> bool:
-        """Whether the car is to stand."""
-        ...
-
-    @property
-    def has_arrived(self) -> bool:
-        """Whether the car has stopped at its goal and waits for the next task."""
-        ...
-
-    @property
-    def is_sent_on(self) -> bool:
-        """Whether the car has only stopped where it was told to drive to, which may be the goal."""
-        ...
-
-    @property
-    def is_pausing(self) -> bool:
-        """Whether the car stops before the junction ahead until the way is known."""
-        ...
-
-    @property
-    def is_directed(self) -> bool:
-        """Whether a turn that the participant asked for is ahead."""
-        ...
-
-    @property
-    def is_to_turn_round(self) -> bool:
-        """Whether a U-turn that the participant asked for has not begun yet."""
-        ...
-
-    @property
-    def asks_for_detour(self) -> bool:
-        """Whether a question about a way round an obstacle is open."""
-        ...
-
-    @property
-    def blocked_at(self) -> float:
-        """Time at which an obstacle across the road was last found [s]."""
-        ...
-
-    @property
-    def told_to_stop_at(self) -> float:
-        """Time of the last instruction to stop [s]."""
-        ...
-
-    @property
-    def stop_reason(self) -> Proposition:
-        """Why the car stopped on that instruction."""
-        ...
-
-    @property
-    def told_to_turn_round_at(self) -> float:
-        """Time of the last instruction to turn round [s]."""
-        ...
-
-    @property
-    def standstill(self) -> Standstill:
-        """Present or last standstill."""
-        ...
-
-    def rests_for(self, now: float) -> ObjectClass:
-        """Returns for what the car stops at `now` [s] by a decision; UNLABELED for nothing."""
-        ...
+    town: Town
+    config: CoWizardConfig
+    goal: LandmarkName | None
+    goal_is_on_map: bool
+    goal_is_findable: bool = True
+    progress: RouteProgress | None
+    ruled_out: tuple[Place, ...]
+    halted: bool
+    arrived: bool
+    sent_on: bool = False
+    pausing: bool
+    directed: bool
+    to_turn_round: bool
+    asks_for_detour: bool
+    blocked_at: float
+    told_to_stop_at: float
+    stop_reason: Proposition = TOLD_TO_STOP
+    told_to_turn_round_at: float
+    standstill: Standstill
+    rests_for: ObjectClass = ObjectClass.UNLABELED
+    rests_until: float = -math.inf

@@ -63,7 +63,7 @@ def answer_yes_no(
     else:
         if asked.predicate is Predicate.KNOWS:  # "it isn't on my map" need not be said twice
             state.speech = state.speech.without_statements(frozenset({Predicate.KNOWS}))
-        state.say_first(judged(state, view, asked), *_more(state, view, asked, rng))
+        state.say_first(judged(state.knowledge, view, asked), *_more(state, view, asked, rng))
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
@@ -95,7 +95,7 @@ def judged(
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
     """Answers a question about the head lights, which also asks for them to be switched on."""
     state.intentions = state.intentions.with_lights(True)
-    state.say(judged(state, view, Proposition.of(Predicate.LIGHTS_ON)))
+    state.say(judged(state.knowledge, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:
         on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
         state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=True))
@@ -103,7 +103,7 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
-    unseen = asked.predicate is Predicate.SEES and not believes(state, view, asked)
+    unseen = asked.predicate is Predicate.SEES and not believes(state.knowledge, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(view, rng)
     if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
@@ -130,11 +130,11 @@ def answer_open(
     """Answers an open question."""
     asked, actions, landmarks = words.asked, act.values(Slot.ACTION), act.values(Slot.LANDMARK)
     if asked is not None and asked.predicate is Predicate.ARRIVES_IN:
-        state.say(arrival(state, view))
+        state.say(arrival(state.knowledge, view))
     elif ActionValue.STOP in actions:
         _explain_standing(state, view)
     elif ActionValue.U_TURN in actions:
-        state.say(why_turning_round(state, view))
+        state.say(why_turning_round(state.knowledge, view))
     elif ObjectClass.QUERIED in act.values(Slot.OBJECT):
         _name_objects(state, view)
     elif ActionValue.QUERIED in actions:
@@ -165,9 +165,9 @@ def arrival(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
 
 def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
     """Answers why the car stands, or has just stood."""
-    answer = why_standing(state, view)
-    if _is_held_up(state, view):
-        reason = _present_reason(state, view)
+    answer = why_standing(state.knowledge, view)
+    if _is_held_up(state.knowledge, view):
+        reason = _present_reason(state.knowledge, view)
         if reason is None and not state.intentions.arrived:
             state.intentions = state.intentions.resumed()
         elif reason is not None and reason.predicate is not Predicate.GOAL:

@@ -429,7 +429,7 @@ def _check(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     checked = _checked(state, act, words)
-    held = believes(state, view, checked)
+    held = believes(state.knowledge, view, checked)
     elided = act_builders.arguments_of(checked)
     if held is None:
         state.say(intend(Function.UNCERTAIN_ANSWER, checked, elided=elided))

@@ -229,7 +229,7 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     state.dialogue = state.dialogue.after_explaining_hazard(view.time)
     if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):
         return  # most hazards, red lights above all, are obvious to the participant
-    reason = reason_to_stand(state, view)
+    reason = reason_to_stand(state.knowledge, view)
     if reason is None:
         return
     stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)

@@ -125,7 +125,7 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
     """
     state, view, rng = decision
     if view.standing:
-        state.standstill = state.standstill.with_reason(reason_to_stand(state, view), view.time)
+        state.standstill = state.standstill.with_reason(reason_to_stand(state.knowledge, view), view.time)
     announce_action(state, view, physical, rng)
     take_initiative(state, view, rng)
     scene = None if state.speech.idle else scene_of(state, view)

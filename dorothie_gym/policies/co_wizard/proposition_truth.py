@@ -55,7 +55,7 @@ def distance_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> float | No
 
 def seconds_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> int | None:
     """Returns the expected time until the car stops at the goal [s]; None if its place is unknown or the car halts."""
-    if known.progress is None or not known.goal_is_on_map or known.is_halted:
+    if known.progress is None or not known.goal_is_on_map or known.halted:
         return None
     seconds = travel_time(known.town, known.progress, view.station, view.time, view.speed)
     return round(seconds) if math.isfinite(seconds) else None
@@ -164,7 +164,7 @@ _JUDGEMENTS: Final[dict[Predicate, Judgement]] = {
         view.hazard is ObjectClass.UNLABELED and sees_far(view) and is_localised(view, known.config.lost_variance)
     ),
     Predicate.DOES: _does,
-    Predicate.ARRIVED: lambda known, view, said: known.has_arrived and view.standing and _about_goal(known, said),
+    Predicate.ARRIVED: lambda known, view, said: known.arrived and view.standing and _about_goal(known, said),
     Predicate.STANDS: lambda known, view, said: view.standing,
     Predicate.LOCALISED: lambda known, view, said: is_localised(view, known.config.lost_variance),
     Predicate.VISIBILITY: lambda known, view, said: sees_far(view),
@@ -185,10 +185,11 @@ _JUDGEMENTS: Final[dict[Predicate, Judgement]] = {
 def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
     """Returns why the car stands now; None if that cannot be told."""
     goal, since = known.goal, view.time if known.standstill.since is None else known.standstill.since
-    hazard = view.hazard if view.motion is Motion.HAZARD else known.rests_for(view.time)
-    if known.has_arrived and known.is_sent_on and not known.goal_is_on_map:
+    resting = view.time < known.rests_until
+    hazard = view.hazard if view.motion is Motion.HAZARD else known.rests_for if resting else ObjectClass.UNLABELED
+    if known.arrived and known.sent_on and not known.goal_is_on_map:
         return Proposition.of(Predicate.TOLD, action=ActionValue.LANE_FOLLOW)
-    if known.has_arrived and goal is not None:
+    if known.arrived and goal is not None:
         return Proposition.of(Predicate.ARRIVED, place=goal)
     if known.asks_for_detour:
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
@@ -196,12 +197,12 @@ def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition
         return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(known.town, view) else None
     if hazard is not ObjectClass.UNLABELED:
         return Proposition.of(Predicate.HINDERS, object=hazard)
-    if known.is_halted and since - known.told_to_stop_at < OBEYED_WITHIN:
+    if known.halted and since - known.told_to_stop_at < OBEYED_WITHIN:
         return known.stop_reason
-    if goal is None and not known.is_directed:
+    if goal is None and not known.directed:
         return Proposition.of(Predicate.GOAL, negated=True)
     guided = goal is not None and not known.goal_is_on_map and known.progress is None
-    if view.motion is Motion.WAITING or known.is_pausing or (guided and not known.is_directed):
+    if view.motion is Motion.WAITING or known.pausing or (guided and not known.directed):
         return Proposition.of(Predicate.HAS_ROUTE, negated=True)
     return None
 
@@ -209,7 +210,7 @@ def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition
 def reason_to_turn_round(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
     """Returns why the car turns round now; None if that cannot be told."""
     told = view.time - known.told_to_turn_round_at < known.config.wish_time + OBEYED_WITHIN
-    if known.is_to_turn_round or told:
+    if known.to_turn_round or told:
         return Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)
     if view.time - known.blocked_at < DETOUR_TIME:
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)

@@ -10,16 +10,15 @@ import math
 from dataclasses import dataclass, field
 
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.beliefs import BeliefState
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.intentions import Directive, Intentions, Wish
-from dorothie_gym.policies.knowledge import TOLD_TO_STOP, Standstill
+from dorothie_gym.policies.knowledge import TOLD_TO_STOP, CoWizardKnowledge, Standstill
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.route_progress import RouteProgress, RouteState
+from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import SpeakingState
 
 
@@ -246,88 +245,30 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
         self.route = self.route.with_progress(None)
         self.intentions = self.intentions.without_goal()
 
-    # --- what it knows, see `CoWizardKnowledge` -----------------------------------------------------------------------
-
     @property
-    def goal(self) -> LandmarkName | None:
-        """Name of the destination; None without one."""
-        return self.beliefs.goal
-
-    @property
-    def goal_is_on_map(self) -> bool:
-        """Whether the place of the goal is taken from the map."""
-        return self.beliefs.exact
-
-    @property
-    def goal_is_findable(self) -> bool:
-        """Whether the place of the goal is taken from the map or was described."""
-        return self.beliefs.exact or self.beliefs.described
-
-    @property
-    def progress(self) -> RouteProgress | None:
-        """Route to the goal and the progress on it."""
-        return self.route.progress
-
-    @property
-    def ruled_out(self) -> tuple[Place, ...]:
-        """Places that were visited or not meant."""
-        return self.beliefs.ruled_out
-
-    @property
-    def is_halted(self) -> bool:
-        """Whether the car is to stand."""
-        return self.intentions.halted
-
-    @property
-    def has_arrived(self) -> bool:
-        """Whether the car has stopped at its goal."""
-        return self.intentions.arrived
-
-    @property
-    def is_sent_on(self) -> bool:
-        """Whether the car has only stopped where it was told to drive to."""
-        return self.intentions.sent_on
-
-    @property
-    def is_pausing(self) -> bool:
-        """Whether the car stops until the way is known."""
-        return self.intentions.pausing
-
-    @property
-    def is_directed(self) -> bool:
-        """Whether a turn that the participant asked for is ahead."""
-        return self.intentions.directive is not None
-
-    @property
-    def is_to_turn_round(self) -> bool:
-        """Whether a U-turn that the participant asked for has not begun yet."""
-        return self.intentions.wish is Wish.U_TURN
-
-    @property
-    def asks_for_detour(self) -> bool:
-        """Whether a question about a detour is open."""
-        return self.dialogue.detour_asked_at is not None
-
-    @property
-    def blocked_at(self) -> float:
-        """Time at which an obstacle was last found [s]."""
-        return self.dialogue.blocked_at
-
-    @property
-    def told_to_stop_at(self) -> float:
-        """Time of the last instruction to stop [s]."""
-        return self.dialogue.stop_instructed_at
-
-    @property
-    def stop_reason(self) -> Proposition:
-        """Why the car stopped on that instruction."""
-        return self.dialogue.stop_reason
-
-    @property
-    def told_to_turn_round_at(self) -> float:
-        """Time of the last instruction to turn round [s]."""
-        return self.dialogue.u_turn_instructed_at
-
-    def rests_for(self, now: float) -> ObjectClass:
-        """Returns for what the car stops at `now` [s] by a decision."""
-        return self.commands.rest_for if now < self.commands.rest_until else ObjectClass.UNLABELED
+    def knowledge(self) -> CoWizardKnowledge:
+        """What is believed and intended."""
+        beliefs, intentions, dialogue = self.beliefs, self.intentions, self.dialogue
+        return CoWizardKnowledge(
+            town=self.town,
+            config=self.config,
+            goal=beliefs.goal,
+            goal_is_on_map=beliefs.exact,
+            goal_is_findable=beliefs.exact or beliefs.described,
+            progress=self.route.progress,
+            ruled_out=beliefs.ruled_out,
+            halted=intentions.halted,
+            arrived=intentions.arrived,
+            sent_on=intentions.sent_on,
+            pausing=intentions.pausing,
+            directed=intentions.directive is not None,
+            to_turn_round=intentions.wish is Wish.U_TURN,
+            asks_for_detour=dialogue.detour_asked_at is not None,
+            blocked_at=dialogue.blocked_at,
+            told_to_stop_at=dialogue.stop_instructed_at,
+            stop_reason=dialogue.stop_reason,
+            told_to_turn_round_at=dialogue.u_turn_instructed_at,
+            standstill=self.standstill,
+            rests_for=self.commands.rest_for,
+            rests_until=self.commands.rest_until,
+        )

@@ -65,7 +65,7 @@ def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizard
         return None
     checks = utterance.asks is DialogueMove.CHECK
     yes = CommunicativeFunction.CONFIRM if checks else CommunicativeFunction.AFFIRMATIVE_ANSWER
-    return judged(memory, view, asked, yes)
+    return judged(memory.knowledge, view, asked, yes)
 
 
 def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None:
@@ -80,13 +80,13 @@ def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None
 def _open_answer(utterance: Utterance, memory: WorkingMemory, view: CoWizardView) -> Remark | None:
     """Returns the answer to why the car stands or turns round, or when it arrives; None to other questions."""
     if utterance.asks_why is ActionValue.STOP:
-        return why_standing(memory, view)
+        return why_standing(memory.knowledge, view)
     if utterance.asks_why is ActionValue.U_TURN:
-        return why_turning_round(memory, view)
+        return why_turning_round(memory.knowledge, view)
     asked = utterance.heard.words.asked
     if asked is None or asked.predicate is not Predicate.ARRIVES_IN:
         return None
-    return arrival(memory, view)
+    return arrival(memory.knowledge, view)
 
 
 def is_answer(remark: Remark, answer: Remark) -> bool:
@@ -156,7 +156,7 @@ def _is_denied(memory: WorkingMemory, view: CoWizardView, said: Proposition) -> 
     if said.predicate is Predicate.BECAUSE:
         cause = said.get("cause")
         return said.get("at") is None and isinstance(cause, Proposition) and _is_denied(memory, view, cause)
-    return believes(memory, view, said) is False
+    return believes(memory.knowledge, view, said) is False
 
 
 def _is_about(answer: Proposition, utterance: Utterance) -> bool:

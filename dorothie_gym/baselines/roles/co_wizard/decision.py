@@ -19,18 +19,8 @@ from dorothie_gym.baselines.roles.co_wizard.features import (
     state_vector,
 )
 from dorothie_gym.baselines.roles.co_wizard.memory import Update, WorkingMemory
-from dorothie_gym.baselines.roles.learned_role.decision import (
-    Attention,
-    Inputs,
-    Percept,
-    just_heard,
-    kept_utterances,
-)
-from dorothie_gym.baselines.roles.learned_role.hearing import (
-    KEPT,
-    UTTERANCE_SIZE,
-    word_rows,
-)
+from dorothie_gym.baselines.roles.learned_role.decision import Attention, Inputs, Percept, just_heard, kept_utterances
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE, word_rows
 from dorothie_gym.baselines.roles.learned_role.remark_forms import topic_of
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role

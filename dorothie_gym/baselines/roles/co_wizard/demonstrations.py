@@ -110,11 +110,7 @@ class Pupil:
         return percept, memory, lesson
 
     def did(
-        self,
-        percept: CoWizardPercept,
-        memory: WorkingMemory,
-        physical: Physical | None,
-        remarks: Sequence[Remark],
+        self, percept: CoWizardPercept, memory: WorkingMemory, physical: Physical | None, remarks: Sequence[Remark]
     ) -> None:
         """Notes the command that was given, and what was decided to say."""
         self.attention = finished(percept, memory, physical, remarks)[1]

@@ -6,12 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from dorothie_gym.baselines.roles.co_wizard.memory import (
-    ORDERS,
-    STATUSES,
-    VARIABLES,
-    WorkingMemory,
-)
+from dorothie_gym.baselines.roles.co_wizard.memory import CONFIG, ORDERS, STATUSES, VARIABLES, WorkingMemory
 from dorothie_gym.baselines.roles.learned_role.encoding import (
     AWAY,
     TOPICS,
@@ -31,13 +26,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.observation_parser import SeenLandmark, is_dark
-from dorothie_gym.policies.route_progress import (
-    Choice,
-    direction_of,
-    find_exit,
-    stopping_distance,
-    streets_named,
-)
+from dorothie_gym.policies.route_progress import Choice, direction_of, find_exit, stopping_distance, streets_named
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.session.spaces.actions import Physical
@@ -61,12 +50,7 @@ MAX_COMMANDS: Final = 20
 
 
 def state_vector(
-    memory: WorkingMemory,
-    view: CoWizardView,
-    step: RouteStep | None,
-    utterances: Sequence[Utterance],
-    *,
-    queued: bool,
+    memory: WorkingMemory, view: CoWizardView, step: RouteStep | None, utterances: Sequence[Utterance], *, queued: bool
 ) -> list[float]:
     """Returns the state of road, memory and talk.
 
@@ -93,7 +77,7 @@ def _distance(metres: float) -> list[float]:
 def car_vector(memory: WorkingMemory, view: CoWizardView) -> list[float]:
     """Returns the state of the car; it does not change within a decision."""
     standing = None if memory.standstill.since is None else view.time - memory.standstill.since
-    variances = memory.config.gps_variance, memory.config.lost_variance
+    variances = CONFIG.gps_variance, CONFIG.lost_variance
     fault, limit = camera_fault(view.raw), limit_of(view.raw)
     hazard = HAZARDS.index(view.hazard) if view.hazard in HAZARDS else -1 if view.hazard is ObjectClass.UNLABELED else 5
     return [
@@ -179,7 +163,7 @@ def _stop_at(memory: WorkingMemory, view: CoWizardView, distance: float | None) 
 def _remembered(memory: WorkingMemory, view: CoWizardView) -> list[float]:
     hot = [value for name, size in VARIABLES.items() for value in one_hot(memory.value(name), size)]
     ages = [value for at in memory.changed_at for value in age_scales(view.time, at)]
-    left = distance_to_goal(memory, view)
+    left = distance_to_goal(memory.knowledge, view)
     fault = float(any(status is GoalStatus.COMPLETE for _, status in memory.statuses))
     return [
         *hot, *ages, float(memory.goal is not None), float(memory.goal_mark >= 0), float(memory.goal in SHARED_NAMES),
@@ -196,7 +180,7 @@ def _talk(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Uttera
     ages = [math.exp(-seconds_since(view.time, said[topic]) / 10.0) if topic in said else 0.0 for topic in TOPICS]
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
     asked = None if latest is None else latest.asked
-    found = None if asked is None else believes(memory, view, asked)
+    found = None if asked is None else believes(memory.knowledge, view, asked)
     places = () if latest is None else latest.places
     on_map = [any(mark.name is name for mark in view.landmarks) for name in places]
     return [

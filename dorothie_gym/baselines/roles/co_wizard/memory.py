@@ -14,22 +14,21 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.baselines.roles.learned_role.encoding import AWAY
-from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
-from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
 from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
-from dorothie_gym.policies.knowledge import TOLD_TO_STOP, Standstill
+from dorothie_gym.policies.knowledge import CoWizardKnowledge, Standstill
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import Navigator
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import DecisionClock, replace
-from dorothie_gym.policies.route_progress import RouteProgress, default_lane_distance, default_lane_place
+from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
@@ -54,6 +53,9 @@ into the street that was named; `skip`: junctions to pass before it; `nudging`: 
 again; `resting`: it stops for good before a hazard; `lights`: nothing was said, on, off; `proposed`: a way that was
 proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower` likewise.
 """
+
+CONFIG: Final = CoWizardConfig()
+"""Thresholds of the judgements."""
 
 U_TURN: Final = 1
 """Value of `manoeuvre` for a U-turn that was asked for."""
@@ -168,78 +170,27 @@ class WorkingMemory:
     last: Remark | None = None
     clock: DecisionClock = DecisionClock()
 
-    # --- what it knows, see `CoWizardKnowledge` -----------------------------------------------------------------------
-
     @property
-    def config(self) -> CoWizardConfig:
-        """Thresholds of the judgements: those of the scripted Co-Wizard."""
-        return _CONFIG
-
-    @property
-    def goal_is_on_map(self) -> bool:
-        """Whether the place of the goal is taken from the map."""
-        return self.goal_mark >= 0
-
-    @property
-    def goal_is_findable(self) -> bool:
-        """Whether a goal that is shown on the map could be found; what was described is not kept."""
-        return True
-
-    @property
-    def progress(self) -> RouteProgress | None:
-        """Route to the goal and the progress on it."""
-        return self.navigator.route.progress
-
-    @property
-    def is_halted(self) -> bool:
-        """Whether the car is to stand."""
-        return bool(self.value("halted"))
-
-    @property
-    def has_arrived(self) -> bool:
-        """Whether the car has stopped at its goal."""
-        return bool(self.value("arrived"))
-
-    @property
-    def is_sent_on(self) -> bool:
-        """Whether the car has only stopped where it was told to drive to: that is not kept."""
-        return False
-
-    @property
-    def is_pausing(self) -> bool:
-        """Whether the car stops until the way is known."""
-        return bool(self.value("pausing"))
-
-    @property
-    def is_directed(self) -> bool:
-        """Whether a turn that the participant asked for is ahead."""
-        return bool(self.value("order"))
-
-    @property
-    def is_to_turn_round(self) -> bool:
-        """Whether a U-turn that the participant asked for has not begun yet."""
-        return self.value("manoeuvre") == U_TURN
-
-    @property
-    def asks_for_detour(self) -> bool:
-        """Whether a question about a detour is open."""
-        return bool(self.value("detour"))
-
-    @property
-    def blocked_at(self) -> float:
-        """Time at which an obstacle was last found [s]."""
-        return self.navigator.blocked_at
-
-    @property
-    def stop_reason(self) -> Proposition:
-        """Why the car stopped on an instruction; what else was said then is not kept."""
-        return TOLD_TO_STOP
-
-    def rests_for(self, now: float) -> ObjectClass:
-        """Returns for what the car stops by a decision: that is not kept."""
-        return ObjectClass.UNLABELED
-
-    # --- what it remembers --------------------------------------------------------------------------------------------
+    def knowledge(self) -> CoWizardKnowledge:
+        """What is believed and intended, judged by the thresholds of the scripted Co-Wizard."""
+        return CoWizardKnowledge(
+            town=self.town,
+            config=CONFIG,
+            goal=self.goal,
+            goal_is_on_map=self.goal_mark >= 0,
+            progress=self.navigator.route.progress,
+            ruled_out=self.ruled_out,
+            halted=bool(self.value("halted")),
+            arrived=bool(self.value("arrived")),
+            pausing=bool(self.value("pausing")),
+            directed=bool(self.value("order")),
+            to_turn_round=self.value("manoeuvre") == U_TURN,
+            asks_for_detour=bool(self.value("detour")),
+            blocked_at=self.navigator.blocked_at,
+            told_to_stop_at=self.told_to_stop_at,
+            told_to_turn_round_at=self.told_to_turn_round_at,
+            standstill=self.standstill,
+        )
 
     def distance_to(self, place: Place | None, view: CoWizardView) -> float | None:
         """Returns the distance to a place along the default lanes [m]; None if it is not near on them, or no place."""
@@ -260,7 +211,7 @@ class WorkingMemory:
         standstill = memory.standstill.observed(view.time, standing=view.standing)
         memory = replace(memory, standstill=standstill)
         if view.standing:
-            reason = reason_to_stand(memory, view)
+            reason = reason_to_stand(memory.knowledge, view)
             memory = replace(memory, standstill=standstill.with_reason(reason, view.time))
         return memory._carrying_on(view)
 
@@ -400,7 +351,6 @@ class WorkingMemory:
         return replace(self, said_at=said, spoke_at=view.time, asked_at=asked, asked_lane=lane, last=last)
 
 
-_CONFIG: Final = CoWizardConfig()
 _INDEX: Final[Mapping[str, int]] = MappingProxyType({name: k for k, name in enumerate(VARIABLES)})
 
 

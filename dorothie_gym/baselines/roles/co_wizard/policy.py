@@ -186,13 +186,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         )
 
     def _act(
-        self,
-        percept: CoWizardPercept,
-        memory: WorkingMemory,
-        inputs: Inputs,
-        rng: np.random.Generator,
-        *,
-        silent: bool,
+        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
         """Returns the index of the likeliest command, and the remarks that are drawn."""
         scores, first, hidden = self._network.act(*inputs.tensors())

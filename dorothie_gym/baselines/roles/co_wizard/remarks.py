@@ -52,7 +52,7 @@ def sources(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utte
         turns = [one for one in crossings if one.direction in (Direction.LEFT, Direction.RIGHT)]
         found |= {f"turn{k}": street_of(view.raw, town, one.exit.lane) for k, one in enumerate(turns[:2])}
         found["new_street"] = first_new_street(view.raw, town, view.lane, progress)
-        found["seconds"] = seconds_to_goal(memory, view)
+        found["seconds"] = seconds_to_goal(memory.knowledge, view)
     for way in () if view.choice is None else view.choice.exits:
         found.setdefault(f"to_{direction_of(way)}", street_of(view.raw, town, way.lane))
     near = nearest_landmark(view.raw, view.landmarks, *view.position)

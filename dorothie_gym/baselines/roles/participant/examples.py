@@ -90,10 +90,7 @@ def make_example(
 
 
 def forms_of_remarks(
-    remarks: Sequence[Remark],
-    memory: SessionMemory,
-    percept: ParticipantPercept,
-    available: Mapping[str, object],
+    remarks: Sequence[Remark], memory: SessionMemory, percept: ParticipantPercept, available: Mapping[str, object]
 ) -> list[str | None]:
     """Returns the forms of remarks; None for those that are not learnt, and for all behind them."""
     found: list[str | None] = []

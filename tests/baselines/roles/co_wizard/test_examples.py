@@ -2,12 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from dorothie_gym.baselines.roles.co_wizard.decision import (
-    CoWizardPercept,
-    blank_inputs,
-    listening_inputs,
-    perceive,
-)
+from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept, blank_inputs, listening_inputs, perceive
 from dorothie_gym.baselines.roles.co_wizard.examples import correcting_example
 from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, Update, WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.teacher import Lesson

@@ -16,7 +16,7 @@ from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.proposition_truth import believes, reason_to_stand, seconds_to_goal
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.knowledge import CoWizardKnowledge, Standstill
+from dorothie_gym.policies.knowledge import Standstill
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace as with_changes
 from dorothie_gym.session.session_engine import SessionEngine
@@ -98,13 +98,13 @@ def test_scripted_and_learned_hold_the_same_for_true(seen: tuple[CoWizardView, T
     state, memory = both(seen, {"on the map": place, "elsewhere": NOWHERE, "none": None}[goal])
     found = set()
     for said in propositions(view, town, place):
-        held = believes(memory, view, said)
-        assert held is believes(state, view, said), said
-        assert judged(memory, view, said) == judged(state, view, said)
+        held = believes(memory.knowledge, view, said)
+        assert held is believes(state.knowledge, view, said), said
+        assert judged(memory.knowledge, view, said) == judged(state.knowledge, view, said)
         found.add(held)
     assert found == {True, False, None}
-    assert seconds_to_goal(memory, view) == seconds_to_goal(state, view)
-    assert (seconds_to_goal(memory, view) is not None) is (goal == "on the map")
+    assert seconds_to_goal(memory.knowledge, view) == seconds_to_goal(state.knowledge, view)
+    assert (seconds_to_goal(memory.knowledge, view) is not None) is (goal == "on the map")
 
 
 def halted(state: CoWizardState, memory: WorkingMemory) -> tuple[CoWizardState, WorkingMemory]:
@@ -156,13 +156,13 @@ def test_scripted_and_learned_give_the_same_reasons(seen, change, reason, hazard
     view, _ = seen
     stands = with_changes(view, speed=0.0, motion=Motion.HAZARD if hazard else Motion.STOPPED, hazard=hazard)
     state, memory = change(*both(seen, known_place(view)))
-    assert reason_to_stand(memory, stands) == reason_to_stand(state, stands)
-    assert why_standing(memory, stands) == why_standing(state, stands)
-    assert why_turning_round(memory, stands) == why_turning_round(state, stands)
-    found = reason_to_stand(memory, stands)
+    assert reason_to_stand(memory.knowledge, stands) == reason_to_stand(state.knowledge, stands)
+    assert why_standing(memory.knowledge, stands) == why_standing(state.knowledge, stands)
+    assert why_turning_round(memory.knowledge, stands) == why_turning_round(state.knowledge, stands)
+    found = reason_to_stand(memory.knowledge, stands)
     if hazard is ObjectClass.UNLABELED:
         assert (None if found is None else found.predicate) is reason
-    told = why_turning_round(memory, stands).meaning[0].get("cause")
+    told = why_turning_round(memory.knowledge, stands).meaning[0].get("cause")
     assert isinstance(told, Proposition)
     expected = {turning_round: Predicate.TOLD, before_obstacle: Predicate.BLOCKED}.get(change, Predicate.BEHIND)
     assert told.predicate is expected
@@ -174,19 +174,15 @@ def test_only_the_scripted_one_keeps_what_was_described_and_what_it_rests_for(se
     state, memory = both(seen, place)
     state.beliefs, memory = state.beliefs.without_place(), replace(memory, goal_mark=-1)
     knows = Proposition.of(Predicate.KNOWS, place=place)
-    held: list[bool | None] = [believes(one, view, knows) for one in _known(state, memory)]
+    held: list[bool | None] = [believes(one.knowledge, view, knows) for one in (state, memory)]
     assert held == [False, True]
     state.beliefs = state.beliefs.with_description()
-    assert believes(state, view, knows) is True
+    assert believes(state.knowledge, view, knows) is True
     stands = with_changes(view, speed=0.0, motion=Motion.STOPPED)
     state.commands = state.commands.resting(40.0, ObjectClass.VEHICLES)
     hinders = Proposition.of(Predicate.HINDERS, object=ObjectClass.VEHICLES)
-    reasons = [reason_to_stand(one, stands) for one in _known(state, with_values(memory, resting=1))]
+    reasons = [reason_to_stand(one.knowledge, stands) for one in (state, with_values(memory, resting=1))]
     assert reasons[0] == hinders and reasons[1] != hinders
-
-
-def _known(*found: CoWizardKnowledge) -> tuple[CoWizardKnowledge, ...]:
-    return found
 
 
 def test_standstill_keeps_its_reason_until_the_car_has_driven() -> None:
