@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
-from dorothie_gym.baselines.co_wizard.features import ordered_exit
-from dorothie_gym.baselines.co_wizard.files import load_network
-from dorothie_gym.baselines.co_wizard.memory import FRESH, SPEEDS, Memory, Update
-from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
-from dorothie_gym.baselines.co_wizard.remarks import Sources, filled
-from dorothie_gym.baselines.imitation.drawing import drawn
+from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept
+from dorothie_gym.baselines.roles.co_wizard.features import ordered_exit
+from dorothie_gym.baselines.roles.co_wizard.files import FILES
+from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, SPEEDS, Update, WorkingMemory
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
+from dorothie_gym.baselines.roles.learned_role.decision import Inputs
+from dorothie_gym.baselines.roles.learned_role.policy import drawn
+from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources, filled
 from dorothie_gym.cli.output import reporting_errors, session_progress
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.maps import Town
@@ -50,9 +51,9 @@ class RandomCommands(LearnedCoWizard):
     """Commands that are drawn evenly among those that the action mask allows, "none" among them."""
 
     def _act(
-        self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
+        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
-        _, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
+        _, remarks = super()._act(percept, memory, inputs, rng, silent=silent)
         return int(rng.integers(len(inputs.rows))), remarks
 
 
@@ -60,14 +61,14 @@ class RuledCommands(LearnedCoWizard):
     """Commands by a rule over the memory that the network has written."""
 
     def _act(
-        self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
+        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
-        _, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
-        return ruled_command(memory, scene.view), remarks
+        _, remarks = super()._act(percept, memory, inputs, rng, silent=silent)
+        return ruled_command(memory, percept.view), remarks
 
 
-def ruled_command(memory: Memory, view: CoWizardView) -> int:
-    """Returns the index of the first allowed command among: stop, requested action, route, driving on, speed, lights.
+def ruled_command(memory: WorkingMemory, view: CoWizardView) -> int:
+    """Returns the index of the first allowed command among: stop, what was asked for, the route, go on, speed, lights.
 
     Args:
         memory: working memory after listening.
@@ -101,8 +102,8 @@ def ruled_command(memory: Memory, view: CoWizardView) -> int:
 class FrozenListening(LearnedCoWizard):
     """Nothing that is heard changes the memory: it keeps its initial values, and no goal is set."""
 
-    def _listen(self, scene: Scene, inputs: Inputs) -> Update:
-        return Update(values=scene.memory.values, fresh=(False,) * len(FRESH))
+    def _listen(self, percept: CoWizardPercept, inputs: Inputs) -> Update:
+        return Update(values=percept.memory.values, fresh=(False,) * len(FRESH))
 
 
 class WithoutRoute(LearnedCoWizard):
@@ -136,9 +137,15 @@ class WithoutRules(LearnedCoWizard):
     """No rule restricts the remarks: the first remark that is drawn is said."""
 
     def _draw(
-        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
-        *, joined: bool = False,
-    ) -> tuple[int, Remark | None]:  # fmt: skip
+        self,
+        shares: NDArray[np.float64],
+        percept: CoWizardPercept,
+        memory: WorkingMemory,
+        available: Sources,
+        rng: np.random.Generator,
+        *,
+        joined: bool = False,
+    ) -> tuple[int, Remark | None]:
         chosen = drawn(shares, rng)
         remark = filled(self._vocabulary[chosen], available, joined=joined) if chosen else None
         return (0, None) if remark is None else (chosen, remark)
@@ -148,15 +155,21 @@ class RandomRemarks(LearnedCoWizard):
     """The network decides when to speak; the remark is drawn uniformly from those that the rules allow."""
 
     def _draw(
-        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
-        *, joined: bool = False,
-    ) -> tuple[int, Remark | None]:  # fmt: skip
+        self,
+        shares: NDArray[np.float64],
+        percept: CoWizardPercept,
+        memory: WorkingMemory,
+        available: Sources,
+        rng: np.random.Generator,
+        *,
+        joined: bool = False,
+    ) -> tuple[int, Remark | None]:
         even = np.where(shares > 0.0, 1.0, 0.0)
         even[0] = 0.0
         if even.sum():
             even *= (1.0 - shares[0]) / even.sum()
         even[0] = shares[0]
-        return super()._draw(even, scene, memory, available, rng, joined=joined)
+        return super()._draw(even, percept, memory, available, rng, joined=joined)
 
 
 class Silent(LearnedCoWizard):
@@ -187,10 +200,7 @@ CONFIGS: Final = {"words-alone": EnvConfig(observe_acts=False)}
 
 def make(row: str, path: Path, role: Role, limits: SpaceLimits) -> LearnedCoWizard:
     """Returns the player of a row with the network of a folder."""
-    import torch
-
-    torch.set_num_threads(1)
-    network, page = load_network(path)
+    network, page = FILES.load(path)
     return ROWS[row](network, page.vocabulary, limits)
 
 

@@ -21,11 +21,11 @@ from safetensors import safe_open
 
 from dorothie_gym import __version__
 from dorothie_gym.baselines.checkpoints import KIND, ModelCard
-from dorothie_gym.baselines.co_wizard import files as co_wizard
 from dorothie_gym.baselines.experiment import RESULT_FILE
-from dorothie_gym.baselines.participant import files as participant
 from dorothie_gym.baselines.rl.checkpoint import TENSORS, load_model, save_model
 from dorothie_gym.baselines.rl.run import BEST, PROGRESS
+from dorothie_gym.baselines.roles.co_wizard.files import FILES as CO_WIZARD_FILES
+from dorothie_gym.baselines.roles.participant.files import FILES as PARTICIPANT_FILES
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.evaluation.closed_loop.running import command_of
 from dorothie_gym.ontology import Role
@@ -215,8 +215,8 @@ def _export_role(trained: Path, shipped: Path) -> dict[str, float | None]:
 
 _EXPORTS: Final[Mapping[str, Callable[[Path, Path], dict[str, float | None]]]] = {
     KIND: _export_benchmark_model,
-    co_wizard.KIND: _export_role,
-    participant.KIND: _export_role,
+    CO_WIZARD_FILES.kind: _export_role,
+    PARTICIPANT_FILES.kind: _export_role,
 }
 """Functions that write models into the package, by kind; all others are drivers."""
 

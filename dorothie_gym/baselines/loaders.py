@@ -13,8 +13,8 @@ from dorothie_gym.session.spaces.limits import SpaceLimits
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.benchmark_co_wizard.policy import BenchmarkCoWizard
-    from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
-    from dorothie_gym.baselines.participant.policy import LearnedParticipant
+    from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard
+    from dorothie_gym.baselines.roles.participant.policy import LearnedParticipant
     from dorothie_gym.policies.policy import AnyPolicy
 
 
@@ -66,13 +66,10 @@ def load_co_wizard(path: Path, role: Role, limits: SpaceLimits) -> LearnedCoWiza
     """
     if role is not Role.CO_WIZARD:
         raise ValueError(f"{path}: plays the co_wizard, not the {role}")
-    import torch
+    from dorothie_gym.baselines.roles.co_wizard.files import FILES
+    from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard
 
-    from dorothie_gym.baselines.co_wizard.files import load_network
-    from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
-
-    torch.set_num_threads(1)  # a small network: more threads only wait for each other
-    network, page = load_network(path)
+    network, page = FILES.load(path)
     return LearnedCoWizard(network, page.vocabulary, limits)
 
 
@@ -89,11 +86,8 @@ def load_participant(path: Path, role: Role, limits: SpaceLimits) -> LearnedPart
     """
     if role is not Role.PARTICIPANT:
         raise ValueError(f"{path}: plays the participant, not the {role}")
-    import torch
+    from dorothie_gym.baselines.roles.participant.files import FILES
+    from dorothie_gym.baselines.roles.participant.policy import LearnedParticipant
 
-    from dorothie_gym.baselines.participant.files import load_network
-    from dorothie_gym.baselines.participant.policy import LearnedParticipant
-
-    torch.set_num_threads(1)  # a small network: more threads only wait for each other
-    network, page = load_network(path)
+    network, page = FILES.load(path)
     return LearnedParticipant(network, page.vocabulary, limits)

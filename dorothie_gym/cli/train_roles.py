@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.imitation.rounds import Stage
+    from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit
 
 OnStage = Callable[[str, int, int], None]
 
@@ -56,8 +56,9 @@ class RoleReport:
 
 
 def _train_co_wizard(request: Request) -> RoleReport:
-    from dorothie_gym.baselines.co_wizard.training import CoWizardTraining, train_co_wizard
-    from dorothie_gym.baselines.imitation.rounds import LESSONS
+    from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining
+    from dorothie_gym.baselines.roles.co_wizard.training import train_co_wizard
+    from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS
 
     folder = request.folder("co-wizard")
     settings = CoWizardTraining(corpus=request.corpus, seed=request.seed)
@@ -68,8 +69,8 @@ def _train_co_wizard(request: Request) -> RoleReport:
 
 
 def _train_participant(request: Request) -> RoleReport:
-    from dorothie_gym.baselines.imitation.rounds import LESSONS, RoundSettings
-    from dorothie_gym.baselines.participant.training import train_participant
+    from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS, RoundSettings
+    from dorothie_gym.baselines.roles.participant.training import train_participant
 
     folder = request.folder("participant")
     settings = RoundSettings(corpus=request.corpus, seed=request.seed)
@@ -79,7 +80,7 @@ def _train_participant(request: Request) -> RoleReport:
     return _fits("participant", stages)
 
 
-def _fits(role: str, stages: Sequence[Stage]) -> RoleReport:
+def _fits(role: str, stages: Sequence[FinishedFit]) -> RoleReport:
     return RoleReport(
         role=role,
         lines=tuple(f"{one.name}: {one.examples:,} examples, loss {one.loss:.3f}" for one in stages),

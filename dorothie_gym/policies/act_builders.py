@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, StreetName
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, SlotValue, StreetName
 
 QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that ask for an answer about the drive."""
@@ -54,6 +54,26 @@ def action(
     return Proposition.of(
         Predicate.WILL, action=value, direction=direction, street=named(street), place=place, speed=speed
     )
+
+
+def asked_by_slots(
+    objects: Sequence[SlotValue],
+    actions: Sequence[SlotValue],
+    places: Sequence[SlotValue],
+    streets: Sequence[SlotValue],
+) -> Proposition | None:
+    """Returns what a yes/no question with slot values asks, by the first of each kind; None if that cannot be told."""
+    if ActionValue.LIGHT_CHANGE in actions:
+        return Proposition.of(Predicate.LIGHTS_ON)
+    if objects:
+        return Proposition.of(Predicate.SEES, object=objects[0])
+    if places and streets:
+        return Proposition.of(Predicate.LOCATED, place=places[0], street=streets[0])
+    if places:
+        return Proposition.of(Predicate.KNOWS, place=places[0])
+    if actions:
+        return Proposition.of(Predicate.DOES, action=actions[0])
+    return Proposition.of(Predicate.ON_STREET, street=streets[0]) if streets else None
 
 
 def named(street: StreetName | None) -> StreetName | None:

@@ -18,8 +18,8 @@ import torch
 from torch import nn
 
 from dorothie_gym.baselines import checkpoints
-from dorothie_gym.baselines.co_wizard.files import load_network
 from dorothie_gym.baselines.rl.checkpoint import load_model
+from dorothie_gym.baselines.roles.co_wizard.files import FILES
 from dorothie_gym.baselines.tensor_files import read_header, read_tensors, save_tensors
 from dorothie_gym.errors import DorothieGymError, InputFileError
 
@@ -191,7 +191,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Kind]:
     shipped = Path(str(files("dorothie_gym.policies").joinpath("data", "pretrained")))
     groups = ("policy/more", "policy.optimizer/0/more", "policy.optimizer/99/exp_avg", "variables/more", "more")
     return {
-        "role": Kind(shipped / "co-wizard", "model.safetensors", load_network, ("more", "words.more")),
+        "role": Kind(shipped / "co-wizard", "model.safetensors", FILES.load, ("more", "words.more")),
         "driver": Kind(shipped / "maskable-ppo", "model.safetensors", load_model, groups),
         "benchmark": Kind(folder, "best.safetensors", _restore, ("more", "model.more", "model.0.more")),
         "training": Kind(

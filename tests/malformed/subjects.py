@@ -299,35 +299,27 @@ def _training(folder: Path) -> Training:
 
 
 def _co_wizard_model(folder: Path) -> None:
-    from dorothie_gym.baselines.co_wizard.files import KIND, MODEL_FORMAT, ModelPage, save_network
-    from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork, Layout
+    from dorothie_gym.baselines.roles.co_wizard.files import FILES
 
     form = (
         '{"content":null,"meaning":[["goal",0,[["place",["from","goal"]]]]],"move":"Acknowledge",'
         '"slots":[["from","goal"]],"wording":{"topic":["text","taken"]}}'
     )
     vocabulary = ("", form)
-    layout = Layout.of(len(vocabulary))
-    page = ModelPage(
-        format=MODEL_FORMAT, kind=KIND, layout=layout, vocabulary=vocabulary, steps=3, seconds=1.0, settings={"seed": 0}
-    )
-    save_network(CoWizardNetwork(layout), page, folder / "co-wizard")
+    network = FILES.network(len(vocabulary))
+    FILES.save(network, folder / "co-wizard", vocabulary=vocabulary, steps=3, seconds=1.0, settings={"seed": 0})
 
 
 def _participant_model(folder: Path) -> None:
-    from dorothie_gym.baselines.participant.files import KIND, MODEL_FORMAT, ModelPage, save_network
-    from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
+    from dorothie_gym.baselines.roles.participant.files import FILES
 
     form = (
         '{"content":null,"meaning":[["goal",0,[["place",["from","goal"]]]]],"move":"Instruct",'
         '"slots":[["from","goal"]],"wording":{"topic":["text","goal"]}}'
     )
     vocabulary = ("", "stop", form)
-    layout = Layout.of(len(vocabulary))
-    page = ModelPage(
-        format=MODEL_FORMAT, kind=KIND, layout=layout, vocabulary=vocabulary, steps=3, seconds=1.0, settings={"seed": 0}
-    )
-    save_network(ParticipantNetwork(layout), page, folder / "participant")
+    network = FILES.network(len(vocabulary))
+    FILES.save(network, folder / "participant", vocabulary=vocabulary, steps=3, seconds=1.0, settings={"seed": 0})
 
 
 def _benchmark_model(folder: Path) -> None:

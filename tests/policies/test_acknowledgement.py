@@ -7,7 +7,8 @@ from dorothie_gym.ontology import ActionValue, DialogueMove, Role
 from dorothie_gym.policies import ScriptedCoWizard, ScriptedParticipant
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
+from dorothie_gym.policies.co_wizard.intentions import Intentions
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.policies.speech import SpeechState

@@ -82,7 +82,7 @@ def test_time_to_the_goal_is_that_of_the_route():
     (arrival,) = answer.meaning
     talk = on_the_way()
     view = view_of(talk, **DRIVING)
-    assert arrival.get("seconds") == seconds_to_goal(talk.state, view)
+    assert arrival.get("seconds") == seconds_to_goal(talk.state.knowledge, view)
     assert arrival.get("place") is talk.state.beliefs.goal
     assert reply("How long will it take?", known=False).act.move is UNSURE
 

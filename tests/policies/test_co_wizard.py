@@ -16,7 +16,7 @@ from dorothie_gym.ontology import (
     Slot,
 )
 from dorothie_gym.policies import ScriptedCoWizard
-from dorothie_gym.policies.co_wizard.state import Wish
+from dorothie_gym.policies.co_wizard.intentions import Wish
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces import NO_MOVE, CoWizardAction, ParticipantAction, Speech, noop
 from dorothie_gym.sim.state.codes import Motion

@@ -59,7 +59,7 @@ def test_house_that_is_not_on_the_map_is_not_known_although_another_house_is():
     talk = on_the_way()
     view, house = view_of(talk, **DRIVING), LandmarkName.HOUSE
     talk.state.beliefs = talk.state.beliefs.with_unknown_goal(house)
-    assert believes(talk.state, view, Proposition.of(Predicate.KNOWS, place=house)) is False
+    assert believes(talk.state.knowledge, view, Proposition.of(Predicate.KNOWS, place=house)) is False
 
 
 def test_question_whether_a_place_is_known_replaces_the_remark_that_it_is_not():

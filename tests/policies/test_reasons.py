@@ -47,7 +47,7 @@ def test_stop_for_red_light_is_remembered_as_reason():
     talk = on_the_way()
     red = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT)
     since = view_of(talk).time - 9.0
-    talk.state.commands = replace(talk.state.commands, standing_since=since).with_reason(red, since)
+    talk.state.standstill = replace(talk.state.standstill, since=since).with_reason(red, since)
     stopped = view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1))
     assert answer(talk, stopped, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
 
@@ -55,8 +55,8 @@ def test_stop_for_red_light_is_remembered_as_reason():
 def test_reason_for_a_stop_is_told_in_the_past_when_the_car_drives_again():
     talk = on_the_way()
     red, now = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT), view_of(talk).time
-    stood = replace(talk.state.commands, standing_since=None, stood_until=now - 5.0)
-    talk.state.commands = stood.with_reason(red, now - 12.0)
+    stood = replace(talk.state.standstill, since=None, until=now - 5.0)
+    talk.state.standstill = stood.with_reason(red, now - 12.0)
     driving = view_of(talk, **DRIVING)
     assert answer(talk, driving, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
     reply = talk.state.speech.queue[0]
@@ -71,7 +71,7 @@ def where_it_was_sent(talk: Talk) -> CoWizardView:
     """Lets the car stand where it was told to drive on to, with a goal that is not on its map."""
     talk.state.beliefs = talk.state.beliefs.without_place()
     talk.state.intentions = talk.state.intentions.stopped_at_place(arrived=True, sent_on=True)
-    talk.state.commands = replace(talk.state.commands, standing_since=0.0)
+    talk.state.standstill = replace(talk.state.standstill, since=0.0)
     return view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1))
 
 
@@ -90,7 +90,7 @@ def test_car_that_went_as_far_as_told_does_not_claim_that_it_has_arrived():
 def test_reason_for_an_instructed_stop_is_what_was_said(text: str, predicate: Predicate):
     talk = on_the_way()
     do_stop(talk.state, view_of(talk, **DRIVING), DialogueAct.of(M.INSTRUCT, ActionValue.STOP), understand(text))
-    talk.state.commands = replace(talk.state.commands, standing_since=view_of(talk).time)
+    talk.state.standstill = replace(talk.state.standstill, since=view_of(talk).time)
     answer(talk, view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1)), ActionValue.STOP)
     (because,) = talk.state.speech.queue[0].meaning
     cause = because.get("cause")
@@ -122,8 +122,8 @@ def test_car_crosses_the_junction_before_it_when_it_is_told_to_go_farther_than_t
 def test_stop_long_ago_is_not_explained_by_its_reason():
     talk = on_the_way()
     red, now = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT), view_of(talk).time
-    stood = replace(talk.state.commands, standing_since=None, stood_until=now - 300.0)
-    talk.state.commands = stood.with_reason(red, now - 310.0)
+    stood = replace(talk.state.standstill, since=None, until=now - 300.0)
+    talk.state.standstill = stood.with_reason(red, now - 310.0)
     answer(talk, view_of(talk, **DRIVING), ActionValue.STOP)
     (said,) = talk.state.speech.queue[0].meaning
     assert said == Proposition.of(Predicate.STANDS, action=ActionValue.STOP, negated=True)
@@ -157,7 +157,7 @@ def test_car_rests_at_red_light_until_green(colour):
     begin = int(view_of(talk).time) + 5  # by then the driver has reacted to what it was told
     times = range(begin, begin + 200)
     lane, time = next((lane, time) for time in times for lane in lit if town.light(lane.id, float(time)) is colour)
-    talk.state.commands = replace(talk.state.commands, standing_since=time - 3.0)
+    talk.state.standstill = replace(talk.state.standstill, since=time - 3.0)
     talk.state.route = talk.state.route.with_progress(None)
     talk.state.intentions = talk.state.intentions.directed(None)
     at_light = {

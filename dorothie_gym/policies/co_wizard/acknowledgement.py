@@ -93,7 +93,7 @@ def plan_remark(
     if rng.random() > state.style.rambles:
         return ()
     goal = state.beliefs.goal
-    seconds = seconds_to_goal(state, view) if _drives_as_planned(state, view) else None
+    seconds = seconds_to_goal(state.knowledge, view) if _drives_as_planned(state, view) else None
     elided: tuple[str, ...] = ("place",)
     if seconds is not None and rng.random() < 0.6:
         content = Proposition.of(Predicate.ARRIVES_IN, place=goal, seconds=seconds)
@@ -101,7 +101,7 @@ def plan_remark(
         content = Proposition.of(Predicate.HAS_ROUTE, place=goal)
     elif goal is not None:
         content = Proposition.of(Predicate.KNOWS, place=goal, negated=True)
-        if believes(state, view, content) is not True:
+        if believes(state.knowledge, view, content) is not True:
             return ()
     else:
         content, elided = Proposition.of(Predicate.GOAL, negated=True), ()

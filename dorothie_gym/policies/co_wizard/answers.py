@@ -26,6 +26,7 @@ from dorothie_gym.policies.co_wizard.proposition_truth import (
 )
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.knowledge import CoWizardKnowledge
 from dorothie_gym.policies.notable_conditions import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
@@ -62,52 +63,47 @@ def answer_yes_no(
     else:
         if asked.predicate is Predicate.KNOWS:  # "it isn't on my map" need not be said twice
             state.speech = state.speech.without_statements(frozenset({Predicate.KNOWS}))
-        state.say_first(judged(state, view, asked), *_more(state, view, asked, rng))
+        state.say_first(judged(state.knowledge, view, asked), *_more(state, view, asked, rng))
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
-    """Returns the proposition of a yes/no question; None if that cannot be told."""
-    if words.asked is not None:
-        return words.asked
-    objects, landmarks, actions = act.values(Slot.OBJECT), act.values(Slot.LANDMARK), act.values(Slot.ACTION)
-    streets = act.values(Slot.STREET)
-    if ActionValue.LIGHT_CHANGE in actions:
-        return Proposition.of(Predicate.LIGHTS_ON)
-    if objects:
-        return Proposition.of(Predicate.SEES, object=objects[0])
-    if landmarks and streets:
-        return Proposition.of(Predicate.LOCATED, place=landmarks[0], street=streets[0])
-    if landmarks:
-        return Proposition.of(Predicate.KNOWS, place=landmarks[0])
-    if actions:
-        return Proposition.of(Predicate.DOES, action=actions[0])
-    return Proposition.of(Predicate.ON_STREET, street=streets[0]) if streets else None
+    """Returns what a yes/no question asks; None if that cannot be told."""
+    slots = (act.values(slot) for slot in (Slot.OBJECT, Slot.ACTION, Slot.LANDMARK, Slot.STREET))
+    return words.asked or act_builders.asked_by_slots(*slots)
 
 
-def judged(state: CoWizardState, view: CoWizardView, asked: Proposition) -> Remark:
-    """Returns the answer to whether a proposition is true: yes, no, or that the Co-Wizard does not know."""
+def judged(
+    known: CoWizardKnowledge, view: CoWizardView, asked: Proposition, yes: Function = Function.AFFIRMATIVE_ANSWER
+) -> Remark:
+    """Returns the answer to whether a proposition is true: yes, no, or that this is not known.
+
+    Args:
+        known: what the Co-Wizard believes.
+        view: observation.
+        asked: the proposition; without a place, one about the goal is about the present one.
+        yes: function of a yes.
+    """
     if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
-        asked = Proposition.of(asked.predicate, negated=asked.negated, place=state.beliefs.goal)
-    held = believes(state, view, asked)
+        asked = Proposition.of(asked.predicate, negated=asked.negated, place=known.goal)
+    held = believes(known, view, asked)
     elided = [name for name, _ in asked.arguments]
     if held is None:
         return intend(Function.UNCERTAIN_ANSWER, asked, elided=elided)
-    answer = Function.AFFIRMATIVE_ANSWER if held else Function.NEGATIVE_ANSWER
-    return intend(answer, asked if held else asked.opposite, elided=elided)
+    return intend(yes if held else Function.NEGATIVE_ANSWER, asked if held else asked.opposite, elided=elided)
 
 
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
     """Answers a question about the head lights, which is also a request to switch them on."""
     state.intentions = state.intentions.with_lights(True)
-    state.say(judged(state, view, Proposition.of(Predicate.LIGHTS_ON)))
+    state.say(judged(state.knowledge, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:
         on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
         state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=True))
 
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns an addition to an answer, by chance: why something is not seen, or the time to the goal."""
-    unseen = asked.predicate is Predicate.SEES and not believes(state, view, asked)
+    """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
+    unseen = asked.predicate is Predicate.SEES and not believes(state.knowledge, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(view, rng)
     if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
@@ -134,11 +130,11 @@ def answer_open(
     """Answers an open question."""
     asked, actions, landmarks = words.asked, act.values(Slot.ACTION), act.values(Slot.LANDMARK)
     if asked is not None and asked.predicate is Predicate.ARRIVES_IN:
-        state.say(arrival(state.beliefs.goal, seconds_to_goal(state, view)))
+        state.say(arrival(state.knowledge, view))
     elif ActionValue.STOP in actions:
         _explain_standing(state, view)
     elif ActionValue.U_TURN in actions:
-        _explain(state, Proposition.of(Predicate.DOES, action=ActionValue.U_TURN), reason_to_turn_round(state, view))
+        state.say(why_turning_round(state.knowledge, view))
     elif ObjectClass.QUERIED in act.values(Slot.OBJECT):
         _name_objects(state, view)
     elif ActionValue.QUERIED in actions:
@@ -158,42 +154,57 @@ def answer_open(
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
 
 
-def arrival(place: LandmarkName | None, seconds: int | None) -> Remark:
-    """Returns the answer to when the car will be at its goal, in `seconds` [s]; one without content for None."""
+def arrival(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
+    """Returns the answer to when the car will be at its goal; one without content where that cannot be told."""
+    seconds = seconds_to_goal(known, view)
     if seconds is None:
         return intend(Function.UNCERTAIN_ANSWER)
-    return intend(
-        Function.ANSWER, Proposition.of(Predicate.ARRIVES_IN, place=place, seconds=seconds), elided=("place",)
-    )
+    arrives = Proposition.of(Predicate.ARRIVES_IN, place=known.goal, seconds=seconds)
+    return intend(Function.ANSWER, arrives, elided=("place",))
 
 
 def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
     """Answers why the car stands, or has just stood."""
-    commands, stands = state.commands, Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
-    stood = view.time - commands.stood_until < RECENT_STOP
-    if view.standing or (view.motion is Motion.HAZARD and not stood):
-        reason = reason_to_stand(state, view) or commands.reason
-        if reason is not None and reason.predicate is Predicate.GOAL:
-            state.say(intend(Function.SET_QUESTION, Proposition.of(Predicate.GOAL, place=LandmarkName.QUERIED)))
-            return
+    answer = why_standing(state.knowledge, view)
+    if _is_held_up(state.knowledge, view):
+        reason = _present_reason(state.knowledge, view)
         if reason is None and not state.intentions.arrived:
             state.intentions = state.intentions.resumed()
-        if reason is not None:
+        elif reason is not None and reason.predicate is not Predicate.GOAL:
             state.dialogue = state.dialogue.after_explaining_hazard(view.time)
-        _explain(state, stands, reason)
-    elif stood:
-        since = commands.reason_since if commands.reason is not None else commands.stood_until
-        _explain(state, stands, commands.reason, at=round(since))
-    else:
-        state.say(intend(Function.ANSWER, stands.opposite, elided=("action",)))
+    state.say(answer)
 
 
-def _explain(state: CoWizardState, effect: Proposition, cause: Proposition | None, at: int | None = None) -> None:
-    """Answers why something is so, or was so at a time [s], or that the reason is not known."""
-    state.say(explanation(effect, cause, at))
+def why_standing(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
+    """Returns the answer to why the car stands, or has just stood."""
+    stands, last = Proposition.of(Predicate.STANDS, action=ActionValue.STOP), known.standstill
+    if _is_held_up(known, view):
+        reason = _present_reason(known, view)
+        if reason is not None and reason.predicate is Predicate.GOAL:
+            where = Proposition.of(Predicate.GOAL, place=LandmarkName.QUERIED)
+            return intend(Function.SET_QUESTION, where)
+        return _explanation(stands, reason)
+    if view.time - last.until < RECENT_STOP:
+        return _explanation(stands, last.reason, at=round(last.until if last.reason is None else last.reason_since))
+    return intend(Function.ANSWER, stands.opposite, elided=("action",))
 
 
-def explanation(effect: Proposition, cause: Proposition | None, at: int | None = None) -> Remark:
+def _is_held_up(known: CoWizardKnowledge, view: CoWizardView) -> bool:
+    """Returns whether the car stands, or brakes for something without having stood lately."""
+    return view.standing or (view.motion is Motion.HAZARD and view.time - known.standstill.until >= RECENT_STOP)
+
+
+def _present_reason(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
+    return reason_to_stand(known, view) or known.standstill.reason
+
+
+def why_turning_round(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
+    """Returns the answer to why the car turns round."""
+    turns = Proposition.of(Predicate.DOES, action=ActionValue.U_TURN)
+    return _explanation(turns, reason_to_turn_round(known, view))
+
+
+def _explanation(effect: Proposition, cause: Proposition | None, at: int | None = None) -> Remark:
     """Returns the answer to why something is so, or was so at a time [s]; one without content if there is no cause."""
     if cause is None:
         return intend(Function.UNCERTAIN_ANSWER)

@@ -30,6 +30,7 @@ from dorothie_gym.policies.co_wizard.goals import (
     set_goal,
 )
 from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn
+from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.proposition_truth import believes
 from dorothie_gym.policies.co_wizard.repairs import (
@@ -42,7 +43,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
@@ -428,7 +429,7 @@ def _check(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     checked = _checked(state, act, words)
-    held = believes(state, view, checked)
+    held = believes(state.knowledge, view, checked)
     elided = act_builders.arguments_of(checked)
     if held is None:
         state.say(intend(Function.UNCERTAIN_ANSWER, checked, elided=elided))

@@ -11,7 +11,8 @@ from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
+from dorothie_gym.policies.co_wizard.intentions import Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, slowing_distance, u_turn_start
 from dorothie_gym.policies.route_legs import SAME_WAY
@@ -249,10 +250,10 @@ def _turn(state: CoWizardState, view: CoWizardView) -> Physical | None:
 def rest(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Decides, once for each hazard that holds up the car, whether to stop for good meanwhile."""
     commands, config = state.commands, state.config
-    if view.motion is not Motion.HAZARD or commands.standing_since is None:
+    if view.motion is not Motion.HAZARD or state.standstill.since is None:
         state.commands = commands.with_rest_decided(commands.rest_decided and view.motion is Motion.STOPPED)
         return
-    if commands.rest_decided or view.time - commands.standing_since < config.held_up_after:
+    if commands.rest_decided or view.time - state.standstill.since < config.held_up_after:
         return
     state.commands = commands.with_rest_decided(True)
     if rng.random() < state.style.careful:

@@ -16,8 +16,9 @@ from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
+from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -217,18 +218,18 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     commands, config = state.commands, state.config
     resting = view.time < commands.rest_until
     hazard = commands.rest_for if resting else view.hazard
-    if not (resting or view.motion is Motion.HAZARD) or commands.standing_since is None:
+    if not (resting or view.motion is Motion.HAZARD) or state.standstill.since is None:
         return
-    if hazard is ObjectClass.UNLABELED or view.time - commands.standing_since < config.hazard_delay:
+    if hazard is ObjectClass.UNLABELED or view.time - state.standstill.since < config.hazard_delay:
         return
-    again = state.dialogue.hazard_explained_at >= commands.standing_since
+    again = state.dialogue.hazard_explained_at >= state.standstill.since
     interval = config.hazard_again if again else config.hazard_interval
     if view.time - state.dialogue.hazard_explained_at < interval:
         return
     state.dialogue = state.dialogue.after_explaining_hazard(view.time)
     if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):
         return  # most hazards, red lights above all, are obvious to the participant
-    reason = reason_to_stand(state, view)
+    reason = reason_to_stand(state.knowledge, view)
     if reason is None:
         return
     stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)

@@ -15,8 +15,10 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import approach_stop
-from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP, CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.knowledge import TOLD_TO_STOP
 from dorothie_gym.policies.route_progress import default_lane_place
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.sim.state.codes import Motion

@@ -16,9 +16,10 @@ from dorothie_gym.policies.co_wizard.dialogue_update import listen
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, junction_ahead, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
+from dorothie_gym.policies.co_wizard.intentions import Intentions
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
@@ -124,7 +125,7 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
     """
     state, view, rng = decision
     if view.standing:
-        state.commands = state.commands.with_reason(reason_to_stand(state, view), view.time)
+        state.standstill = state.standstill.with_reason(reason_to_stand(state.knowledge, view), view.time)
     announce_action(state, view, physical, rng)
     take_initiative(state, view, rng)
     scene = None if state.speech.idle else scene_of(state, view)
@@ -136,7 +137,7 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
 
 def _update_route(state: CoWizardState, view: CoWizardView) -> None:
     """Updates standstill, directive and route with the position of the car."""
-    state.commands = state.commands.observed(view.time, standing=view.standing)
+    state.standstill = state.standstill.observed(view.time, standing=view.standing)
     if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
         # the manoeuvre cannot begin before the light is green
         state.intentions = state.intentions.wishing_until(view.time + state.config.red_light_extension)

@@ -1,4 +1,4 @@
-"""Beliefs of the Co-Wizard about propositions, from its own observations, and the reasons for its actions."""
+"""Truth of propositions by what a Co-Wizard knows and observes, and its reasons for what it does."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.knowledge import CoWizardKnowledge
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.travel_time import travel_time
@@ -34,23 +34,30 @@ OBEYED_WITHIN: Final = 15.0
 DETOUR_TIME: Final = 30.0
 """Time for which an obstacle explains a U-turn [s]."""
 
-Belief = Callable[[CoWizardState, CoWizardView, Proposition], bool | None]
-"""Returns whether a proposition without negation is true; None if the Co-Wizard does not know."""
+CROWD: Final = 3
+"""Least number of people or vehicles in a crowd."""
+
+Judgement = Callable[[CoWizardKnowledge, CoWizardView, Proposition], bool | None]
+"""Returns whether a proposition without negation is true; None if that is not known."""
 
 
-def believes(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    """Returns whether the Co-Wizard believes a proposition; None if it does not know."""
-    belief = _BELIEFS.get(said.predicate)
-    held = None if belief is None else belief(state, view, said)
+def believes(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether a proposition is true by what is known and seen; None if nothing tells."""
+    judge = _JUDGEMENTS.get(said.predicate)
+    held = None if judge is None else judge(known, view, said)
     return held if held is None else held is not said.negated
 
 
-def seconds_to_goal(state: CoWizardState, view: CoWizardView) -> int | None:
+def distance_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> float | None:
+    """Returns the way to a goal on the map [m]; None without one, or without a route."""
+    return None if known.progress is None or not known.goal_is_on_map else known.progress.left(view.station)
+
+
+def seconds_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> int | None:
     """Returns the expected time until the car stops at the goal [s]; None if its place is unknown or the car halts."""
-    progress = state.route.progress
-    if progress is None or not state.beliefs.exact or state.intentions.halted:
+    if known.progress is None or not known.goal_is_on_map or known.halted:
         return None
-    seconds = travel_time(state.town, progress, view.station, view.time, view.speed)
+    seconds = travel_time(known.town, known.progress, view.station, view.time, view.speed)
     return round(seconds) if math.isfinite(seconds) else None
 
 
@@ -93,127 +100,120 @@ def is_located(view: CoWizardView, said: Proposition) -> bool | None:
     return any(mark.street is said.get("street") for mark in marks) if marks else None
 
 
-# --- beliefs by predicate ---------------------------------------------------------------------------------------------
+# --- judgements by predicate ------------------------------------------------------------------------------------------
 
 
-def _is_on_street(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    here = street_of(view.raw, state.town, view.lane)
-    if here is StreetName.UNKNOWN or not is_localised(view, state.config.lost_variance):
+def _about_goal(known: CoWizardKnowledge, said: Proposition) -> bool:
+    return said.get("place") in (None, known.goal)
+
+
+def _is_on_street(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    here = street_of(view.raw, known.town, view.lane)
+    if here is StreetName.UNKNOWN or not is_localised(view, known.config.lost_variance):
         return None
     return here is said.get("street")
 
 
-def _is_close(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    progress = state.route.progress
-    if progress is None or not state.beliefs.exact or not _about_goal(state, said):
-        return None
-    return progress.left(view.station) < state.config.close_distance
+def _is_close(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    left = distance_to_goal(known, view)
+    return None if left is None or not _about_goal(known, said) else left < known.config.close_distance
 
 
-def _knows(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    place = said.get("place") or state.beliefs.goal
-    if place is None or (place is state.beliefs.goal and not (state.beliefs.exact or state.beliefs.described)):
+def _knows(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    place = said.get("place") or known.goal
+    if place is None or (place is known.goal and not known.goal_is_findable):
         return False
-    return any(mark.name is place and mark.place not in state.beliefs.ruled_out for mark in view.landmarks)
+    return any(mark.name is place and mark.place not in known.ruled_out for mark in view.landmarks)
 
 
-def _has_route(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    return state.route.progress is not None and bool(state.route.progress.legs) and _about_goal(state, said)
+def _has_route(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    return known.progress is not None and bool(known.progress.legs) and _about_goal(known, said)
 
 
-def _is_right_way(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    progress = state.route.progress
-    if progress is None or not state.beliefs.exact:
-        return None
-    return not progress.astray
+def _is_right_way(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    return None if known.progress is None or not known.goal_is_on_map else not known.progress.astray
 
 
-def _is_red(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    return is_red_ahead(state.town, view)
-
-
-def _is_safe(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    return view.hazard is ObjectClass.UNLABELED and sees_far(view) and is_localised(view, state.config.lost_variance)
-
-
-def _does(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+def _does(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
     action = said.get("action")
     return present_action(view) is action if isinstance(action, ActionValue) else None
 
 
-def _is_arrived(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    return state.intentions.arrived and view.standing and _about_goal(state, said)
-
-
-def _has_failed(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    found = {camera_fault(view.raw), None if is_localised(view, state.config.gps_variance) else Sensor.GPS} - {None}
+def _has_failed(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    found = {camera_fault(view.raw), None if is_localised(view, known.config.gps_variance) else Sensor.GPS} - {None}
     asked = said.get("sensor")
     return bool(found) if asked is None else asked in found
 
 
-def _about_goal(state: CoWizardState, said: Proposition) -> bool:
-    return said.get("place") in (None, state.beliefs.goal)
+def _is_blocked(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether the car has met an obstacle lately, or sees one."""
+    met = view.time - known.blocked_at < DETOUR_TIME
+    return met or view.hazard is ObjectClass.STATIC or any(thing.kind is ObjectClass.STATIC for thing in view.objects)
 
 
-_BELIEFS: Final[dict[Predicate, Belief]] = {
-    Predicate.SEES: lambda state, view, said: sees(view, said),
+_JUDGEMENTS: Final[dict[Predicate, Judgement]] = {
+    Predicate.SEES: lambda known, view, said: sees(view, said),
     Predicate.ON_STREET: _is_on_street,
-    Predicate.LOCATED: lambda state, view, said: is_located(view, said),
+    Predicate.LOCATED: lambda known, view, said: is_located(view, said),
     Predicate.CLOSE: _is_close,
     Predicate.KNOWS: _knows,
     Predicate.HAS_ROUTE: _has_route,
     Predicate.RIGHT_WAY: _is_right_way,
-    Predicate.RED: _is_red,
-    Predicate.SAFE: _is_safe,
+    Predicate.RED: lambda known, view, said: is_red_ahead(known.town, view),
+    Predicate.SAFE: lambda known, view, said: (
+        view.hazard is ObjectClass.UNLABELED and sees_far(view) and is_localised(view, known.config.lost_variance)
+    ),
     Predicate.DOES: _does,
-    Predicate.ARRIVED: _is_arrived,
-    Predicate.STANDS: lambda state, view, said: view.standing,
-    Predicate.LOCALISED: lambda state, view, said: is_localised(view, state.config.lost_variance),
-    Predicate.VISIBILITY: lambda state, view, said: sees_far(view),
+    Predicate.ARRIVED: lambda known, view, said: known.arrived and view.standing and _about_goal(known, said),
+    Predicate.STANDS: lambda known, view, said: view.standing,
+    Predicate.LOCALISED: lambda known, view, said: is_localised(view, known.config.lost_variance),
+    Predicate.VISIBILITY: lambda known, view, said: sees_far(view),
     Predicate.FAILED: _has_failed,
-    Predicate.LIGHTS_ON: lambda state, view, said: view.lights,
-    Predicate.GOAL: lambda state, view, said: state.beliefs.goal is not None and _about_goal(state, said),
-    Predicate.HINDERS: lambda state, view, said: view.motion is Motion.HAZARD and view.hazard is said.get("object"),
+    Predicate.LIGHTS_ON: lambda known, view, said: view.lights,
+    Predicate.GOAL: lambda known, view, said: known.goal is not None and _about_goal(known, said),
+    Predicate.BLOCKED: _is_blocked,
+    Predicate.CROWDED: lambda known, view, said: (
+        sum(thing.kind is said.get("object") for thing in view.objects) >= CROWD
+    ),
+    Predicate.HINDERS: lambda known, view, said: view.motion is Motion.HAZARD and view.hazard is said.get("object"),
 }
 
 
 # --- reasons ----------------------------------------------------------------------------------------------------------
 
 
-def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | None:
-    """Returns why the car stands now, from the Co-Wizard's own actions; None if it does not know."""
-    intentions, commands, goal = state.intentions, state.commands, state.beliefs.goal
-    resting = view.time < commands.rest_until
-    hazard = view.hazard if view.motion is Motion.HAZARD else commands.rest_for if resting else ObjectClass.UNLABELED
-    if intentions.arrived and intentions.sent_on and not state.beliefs.exact:
+def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
+    """Returns why the car stands now; None if that cannot be told."""
+    goal, since = known.goal, view.time if known.standstill.since is None else known.standstill.since
+    resting = view.time < known.rests_until
+    hazard = view.hazard if view.motion is Motion.HAZARD else known.rests_for if resting else ObjectClass.UNLABELED
+    if known.arrived and known.sent_on and not known.goal_is_on_map:
         return Proposition.of(Predicate.TOLD, action=ActionValue.LANE_FOLLOW)
-    if intentions.arrived and goal is not None:
+    if known.arrived and goal is not None:
         return Proposition.of(Predicate.ARRIVED, place=goal)
-    if state.dialogue.detour_asked_at is not None:
+    if known.asks_for_detour:
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
     if hazard is ObjectClass.TRAFFIC_LIGHT:
-        return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(state.town, view) else None
+        return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(known.town, view) else None
     if hazard is not ObjectClass.UNLABELED:
         return Proposition.of(Predicate.HINDERS, object=hazard)
-    since = view.time if commands.standing_since is None else commands.standing_since
-    if intentions.halted and since - state.dialogue.stop_instructed_at < OBEYED_WITHIN:
-        return state.dialogue.stop_reason
-    if goal is None and intentions.directive is None:
+    if known.halted and since - known.told_to_stop_at < OBEYED_WITHIN:
+        return known.stop_reason
+    if goal is None and not known.directed:
         return Proposition.of(Predicate.GOAL, negated=True)
-    guided = goal is not None and not state.beliefs.exact and state.route.progress is None
-    if view.motion is Motion.WAITING or intentions.pausing or (guided and intentions.directive is None):
+    guided = goal is not None and not known.goal_is_on_map and known.progress is None
+    if view.motion is Motion.WAITING or known.pausing or (guided and not known.directed):
         return Proposition.of(Predicate.HAS_ROUTE, negated=True)
     return None
 
 
-def reason_to_turn_round(state: CoWizardState, view: CoWizardView) -> Proposition | None:
-    """Returns why the car turns round now; None if the Co-Wizard does not know."""
-    goal = state.beliefs.goal
-    told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + OBEYED_WITHIN
-    if state.intentions.wish is Wish.U_TURN or told:
+def reason_to_turn_round(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
+    """Returns why the car turns round now; None if that cannot be told."""
+    told = view.time - known.told_to_turn_round_at < known.config.wish_time + OBEYED_WITHIN
+    if known.to_turn_round or told:
         return Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)
-    if view.time - state.dialogue.blocked_at < DETOUR_TIME:
+    if view.time - known.blocked_at < DETOUR_TIME:
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
-    if goal is not None and state.beliefs.exact:
-        return Proposition.of(Predicate.BEHIND, place=goal)
+    if known.goal is not None and known.goal_is_on_map:
+        return Proposition.of(Predicate.BEHIND, place=known.goal)
     return None

@@ -6,50 +6,20 @@ works on a shallow copy of `CoWizardState` and replaces whole groups in it; the 
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass, field
-from typing import Final
 
-from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.dialogue.propositions import Proposition
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.beliefs import BeliefState
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.co_wizard.intentions import Directive, Intentions, Wish
+from dorothie_gym.policies.knowledge import TOLD_TO_STOP, CoWizardKnowledge, Standstill
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import SpeakingState
-
-TOLD_TO_STOP: Final = Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
-"""The usual reason for stopping on an instruction."""
-
-
-class Wish(enum.Enum):
-    """Manoeuvre that the participant asked for and that has not begun yet."""
-
-    U_TURN = "u_turn"
-    SWITCH_LEFT = "switch_left"
-    SWITCH_RIGHT = "switch_right"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Directive:
-    """Turn that the participant asked for.
-
-    Attributes:
-        direction: direction of the turn; None if only a street was named.
-        street: the street named, UNKNOWN if none was.
-        skip: junctions to pass before the turn is taken.
-        junction: the next junction with a choice when the directive was heard, -1 if there was none.
-    """
-
-    direction: Direction | None
-    street: StreetName = StreetName.UNKNOWN
-    skip: int = 0
-    junction: int = -1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,163 +167,10 @@ class DialogueState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Intentions:
-    """Driving goals of the next seconds.
-
-    Attributes:
-        directive: turn asked for.
-        wish: manoeuvre asked for.
-        wish_until: time at which the manoeuvre is given up [s].
-        halted: whether the car has been told to stand.
-        nudge: place a little further on at which the car stops again.
-        creeping: whether the goal is close and its guessed place is carried along ahead of the car.
-        arrived: whether the car has stopped at its goal and waits for the next task.
-        sent_on: whether it has only reached the place that it was guided to, which may be the goal.
-        pausing: whether the car stops before the junction ahead until the way is known.
-        speed: target cruise speed [km/h].
-        slow_until: time at which a temporary speed ends [s].
-        usual: cruise speed on open road [km/h].
-        lights: target state of the head lights; None if nothing was said about them.
-    """
-
-    directive: Directive | None = None
-    wish: Wish | None = None
-    wish_until: float = 0.0
-    halted: bool = False
-    nudge: Place | None = None
-    creeping: bool = False
-    arrived: bool = False
-    sent_on: bool = False
-    pausing: bool = False
-    speed: int
-    slow_until: float = math.inf
-    usual: int
-    lights: bool | None = None
-
-    def resumed(self) -> Intentions:
-        """Ends a halt."""
-        return replace(self, halted=False)
-
-    def started(self) -> Intentions:
-        """Ends a halt and a stay at the goal."""
-        return replace(self, halted=False, arrived=False)
-
-    def halting(self) -> Intentions:
-        """Makes the car stand; keeps other intentions."""
-        return replace(self, halted=True)
-
-    def stopped(self) -> Intentions:
-        """Carries out an instruction to stop: lets the car stand and drops nudge and manoeuvre."""
-        return replace(self, halted=True, nudge=None, wish=None)
-
-    def stopped_at_place(self, *, arrived: bool, sent_on: bool) -> Intentions:
-        """Makes the car stand at a place; `arrived` is true at a goal, `sent_on` at the end of a nudge."""
-        return replace(self, halted=True, nudge=None, arrived=arrived, sent_on=sent_on)
-
-    def blocked(self) -> Intentions:
-        """Drops directive and nudge and makes the car stand before an obstacle."""
-        return replace(self, directive=None, nudge=None, halted=True)
-
-    def turning(self, directive: Directive) -> Intentions:
-        """Carries out an instruction to turn."""
-        return replace(self, directive=directive, wish=None, halted=False, nudge=None, creeping=False, arrived=False)
-
-    def directed(self, directive: Directive | None) -> Intentions:
-        """Sets or drops (None) the directive; keeps other intentions."""
-        return replace(self, directive=directive)
-
-    def turning_round(self, until: float, *, creeping: bool) -> Intentions:
-        """Carries out an instruction to turn round, given up after `until` [s]."""
-        return replace(
-            self, wish=Wish.U_TURN, wish_until=until, creeping=creeping, directive=None, halted=False, nudge=None,
-            arrived=False,
-        )  # fmt: skip
-
-    def switching(self, wish: Wish, until: float) -> Intentions:
-        """Carries out an instruction to switch lanes, given up after `until` [s]."""
-        return replace(self, wish=wish, wish_until=until, halted=False)
-
-    def wishing_until(self, until: float) -> Intentions:
-        """Extends the time for the manoeuvre to `until` at least [s]."""
-        return replace(self, wish_until=max(self.wish_until, until))
-
-    def without_wish(self) -> Intentions:
-        """Drops the manoeuvre."""
-        return replace(self, wish=None)
-
-    def without_nudge(self) -> Intentions:
-        """Drops the nudge."""
-        return replace(self, nudge=None)
-
-    def without_manoeuvres(self) -> Intentions:
-        """Drops directive and manoeuvre."""
-        return replace(self, directive=None, wish=None)
-
-    def nudged(self, place: Place) -> Intentions:
-        """Goes on to a place close ahead, to stop there again."""
-        return replace(self, nudge=place, halted=False)
-
-    def proceeding(self) -> Intentions:
-        """Carries out an instruction to continue along the lane."""
-        return replace(self, halted=False, arrived=False, creeping=False, wish=None)
-
-    def creeping_up(self) -> Intentions:
-        """Comes up slowly to a place close ahead whose exact position is unknown."""
-        return replace(self, creeping=True, halted=False, arrived=False, directive=None)
-
-    def for_new_goal(self) -> Intentions:
-        """Drops the intentions for another goal and ends a halt."""
-        return replace(self, directive=None, wish=None, nudge=None, halted=False, arrived=False, creeping=False)
-
-    def for_unknown_goal(self) -> Intentions:
-        """Ends the approach to the previous goal."""
-        return replace(self, creeping=False, arrived=False)
-
-    def without_goal(self) -> Intentions:
-        """Drops all intentions for the goal; keeps a halt."""
-        return replace(self, directive=None, nudge=None, wish=None, creeping=False, arrived=False)
-
-    def departed(self) -> Intentions:
-        """Ends the stay at the goal; keeps a halt."""
-        return replace(self, arrived=False)
-
-    def with_pause(self, pausing: bool) -> Intentions:
-        """Sets whether to stop before the junction ahead."""
-        return replace(self, pausing=pausing)
-
-    def with_speed(self, speed: int) -> Intentions:
-        """Sets the target cruise speed [km/h]; keeps the usual one."""
-        return replace(self, speed=speed)
-
-    def slow_longer(self, seconds: float) -> Intentions:
-        """Extends a temporary speed, by the time that the car stands [s]."""
-        return replace(self, slow_until=self.slow_until + seconds)
-
-    def with_asked_speed(self, speed: int, open_road: int, until: float) -> Intentions:
-        """Sets the cruise speed that was asked for [km/h].
-
-        Args:
-            speed: asked for [km/h].
-            open_road: lower speeds are temporary [km/h].
-            until: end of a temporary speed [s].
-        """
-        usual = speed if speed >= open_road else self.usual
-        return replace(self, speed=speed, usual=usual, slow_until=until)
-
-    def with_lights(self, on: bool) -> Intentions:
-        """Sets the target state of the head lights."""
-        return replace(self, lights=on)
-
-
-@dataclass(frozen=True, kw_only=True)
 class CommandState:
     """Commands given to the car and their observed effect.
 
     Attributes:
-        standing_since: start of the present standstill [s]; None while the car moves.
-        reason: why the car stands, or stood last, as far as the Co-Wizard knows.
-        reason_since: time since which it has stood for this reason [s].
-        stood_until: end of the last standstill [s].
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
         manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
@@ -364,10 +181,6 @@ class CommandState:
         ready_at: time before which the Co-Wizard has not reacted to an instruction yet, except to stop [s].
     """
 
-    standing_since: float | None = 0.0
-    reason: Proposition | None = None
-    reason_since: float = -math.inf
-    stood_until: float = -math.inf
     turn_sent: tuple[int, int] = (-1, 0)
     turn_sent_at: float = -math.inf
     manoeuvre_sent_at: float = -math.inf
@@ -380,16 +193,6 @@ class CommandState:
     def reacting_until(self, ready_at: float) -> CommandState:
         """Sets the end of the reaction to an instruction [s]."""
         return replace(self, ready_at=ready_at)
-
-    def observed(self, now: float, *, standing: bool) -> CommandState:
-        """Brings the standstill up to date."""
-        if not standing:
-            return self if self.standing_since is None else replace(self, standing_since=None, stood_until=now)
-        return replace(self, standing_since=now, reason=None) if self.standing_since is None else self
-
-    def with_reason(self, reason: Proposition | None, now: float) -> CommandState:
-        """Records why the car stands; a reason that is no longer known is kept."""
-        return self if reason is None or reason == self.reason else replace(self, reason=reason, reason_since=now)
 
     def after_stop(self, now: float) -> CommandState:
         """Records a Stop command."""
@@ -426,6 +229,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
         route: route to the goal.
         intentions: driving goals of the next seconds.
         commands: commands given to the car.
+        standstill: present or last standstill.
     """
 
     dialogue: DialogueState = field(default_factory=DialogueState)
@@ -433,9 +237,38 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
     route: RouteState = field(default_factory=RouteState)
     intentions: Intentions
     commands: CommandState = field(default_factory=CommandState)
+    standstill: Standstill = field(default_factory=Standstill)
 
     def leave_goal(self) -> None:
         """Removes the goal, its route and all that was intended for it."""
         self.beliefs = self.beliefs.without_goal()
         self.route = self.route.with_progress(None)
         self.intentions = self.intentions.without_goal()
+
+    @property
+    def knowledge(self) -> CoWizardKnowledge:
+        """What is believed and intended."""
+        beliefs, intentions, dialogue = self.beliefs, self.intentions, self.dialogue
+        return CoWizardKnowledge(
+            town=self.town,
+            config=self.config,
+            goal=beliefs.goal,
+            goal_is_on_map=beliefs.exact,
+            goal_is_findable=beliefs.exact or beliefs.described,
+            progress=self.route.progress,
+            ruled_out=beliefs.ruled_out,
+            halted=intentions.halted,
+            arrived=intentions.arrived,
+            sent_on=intentions.sent_on,
+            pausing=intentions.pausing,
+            directed=intentions.directive is not None,
+            to_turn_round=intentions.wish is Wish.U_TURN,
+            asks_for_detour=dialogue.detour_asked_at is not None,
+            blocked_at=dialogue.blocked_at,
+            told_to_stop_at=dialogue.stop_instructed_at,
+            stop_reason=dialogue.stop_reason,
+            told_to_turn_round_at=dialogue.u_turn_instructed_at,
+            standstill=self.standstill,
+            rests_for=self.commands.rest_for,
+            rests_until=self.commands.rest_until,
+        )

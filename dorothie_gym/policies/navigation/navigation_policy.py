@@ -18,8 +18,9 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import CRUISE_TOLERANCE, distance_ahead, wanted_exit
+from dorothie_gym.policies.co_wizard.intentions import Wish
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, GuidanceConfig
 from dorothie_gym.policies.navigation.actions import EstimatedActionMask, NavigationAction, physical_of

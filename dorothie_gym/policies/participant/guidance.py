@@ -28,13 +28,14 @@ from dorothie_gym.policies.participant.retrying import (
     stop_circling,
     why_standing,
 )
+from dorothie_gym.policies.participant.route_steps import route_step
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.policies.turn_lanes import leads_beside, next_turn, turn_lanes
+from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
 
 ANNOUNCING_TIME = 1.5
 """Time that the car drives on while a U-turn is being announced [s]."""
@@ -317,34 +318,12 @@ def next_step(
         move: an instruction, an answer to an open question, or a clarification.
         rng: random generator of the decision.
     """
-    progress = state.route.progress
-    if progress is None:
+    step = route_step(state, view)
+    if step is None:
         return None
-    crossing = next_turn(progress, state.town, view.station)
-    manoeuvre = progress.next_manoeuvre(view.station)
-    u_turn = manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN
-    if manoeuvre is not None and u_turn and (crossing is None or manoeuvre[1] < crossing.distance):
-        return ("round", 0, 0), manoeuvre[1], order(move, ActionValue.U_TURN)
-    switch = manoeuvre is not None and (
-        crossing is None or (manoeuvre[1] < crossing.distance and _needs_switch(state, view, crossing))
-    )
-    if crossing is not None and not switch:
-        key = ("turn", crossing.lane, crossing.exit.connector)
-        return key, crossing.distance, _turn_remark(state, view, move, crossing, rng)
-    if manoeuvre is not None:
-        left = manoeuvre[0] is LaneEntry.CHANGE_LEFT
-        wording = Wording(direction=Direction.LEFT if left else Direction.RIGHT)
-        return ("lane", view.lane, int(left)), manoeuvre[1], order(move, ActionValue.LANE_SWITCH, wording)
-    return ("on", view.lane, 0), progress.left(view.station), order(move, ActionValue.LANE_FOLLOW)
-
-
-def _needs_switch(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
-    """Returns whether the lane before a junction has to be asked for; "turn left" includes the way to the turn lane."""
-    progress = state.route.progress
-    assert progress is not None
-    if crossing.lane in turn_lanes(state.town):
-        return crossing.direction is Direction.STRAIGHT
-    return progress.needs_switch(state.town, view.lane, view.station, crossing)
+    if step.junction is not None:
+        return step.key, step.distance, _turn_remark(state, view, move, step.junction, rng)
+    return step.key, step.distance, order(move, step.action, Wording(direction=step.direction))
 
 
 def _turn_remark(

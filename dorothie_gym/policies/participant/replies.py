@@ -28,6 +28,7 @@ from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utter
 from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
 from dorothie_gym.policies.participant.goals import announcement, describe
 from dorothie_gym.policies.participant.guidance import next_step, note_step
+from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import correction, has_missed
 from dorothie_gym.policies.participant.state import ParticipantState
@@ -42,8 +43,6 @@ from dorothie_gym.policies.participant.yes_no_answers import (
     deny_arrival,
     deny_other_place,
     go_first,
-    has_just_finished,
-    is_elsewhere,
     is_just_short,
 )
 from dorothie_gym.policies.policy import replace

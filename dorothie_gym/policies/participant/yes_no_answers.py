@@ -19,22 +19,17 @@ from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_in
 from dorothie_gym.policies.participant.goals import announcement, route_length, story_remark, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
+from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
 
-_FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
-"""Actions that are left to the car."""
-
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
 """Actions that determine the route."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
-
-JUST_DONE = 12.0
-"""Time for which a car that asks whether it has arrived refers to the last errand [s]."""
 
 
 def check(
@@ -87,7 +82,7 @@ def _fits(
     """Returns whether an action named by the car is the next step or the last instruction."""
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     actions = set(act.values(Slot.ACTION))
-    if step is None or actions & _FREE:
+    if step is None or actions & LEFT_TO_THE_CAR:
         return True
     instructed = next((item for item in reversed(state.speech.said) if item.act.values(Slot.ACTION)), None)
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
@@ -178,12 +173,6 @@ def _asks_about_finished(state: ParticipantState, view: ParticipantView, act: Di
     return act.slots == {place}
 
 
-def has_just_finished(state: ParticipantState, view: ParticipantView, landmarks: Collection[object]) -> bool:
-    """Returns whether the errand at one of some landmarks was done a moment ago."""
-    place, at = state.task.finished
-    return place in landmarks and view.time - at <= JUST_DONE
-
-
 def _offered_subgoal(
     state: ParticipantState, view: ParticipantView, landmarks: tuple[SlotValue, ...]
 ) -> SeenSubgoal | None:
@@ -242,13 +231,6 @@ def _answer_proposal(
 
 
 # --- arrivals ---------------------------------------------------------------------------------------------------------
-
-
-def is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car stands far from the target."""
-    progress = state.route.progress
-    far = progress is not None and progress.left(view.station) > state.config.elsewhere_distance
-    return view.standing and far
 
 
 def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:

@@ -1,0 +1,1 @@
+"""Roles of the session whose decisions are learned by imitation: the Co-Wizard and the participant."""

@@ -1,0 +1,234 @@
+"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.baselines.roles.co_wizard.decision import (
+    CoWizardPercept,
+    acting_inputs,
+    blank_inputs,
+    finished,
+    listening_inputs,
+    perceive,
+    remember,
+)
+from dorothie_gym.baselines.roles.co_wizard.examples import Example, correcting_example, make_example
+from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory, initial_values
+from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, Turn
+from dorothie_gym.baselines.roles.co_wizard.remarks import sources
+from dorothie_gym.baselines.roles.co_wizard.teacher import CALM, Lesson, Teacher
+from dorothie_gym.baselines.roles.learned_role.decision import Attention
+from dorothie_gym.baselines.roles.learned_role.practice import TRAINED, observed, play_in_turns
+from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
+from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.participant.policy import ScriptedParticipant
+from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
+from dorothie_gym.policies.speech import Remark
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
+
+CO_WIZARD: Final = Role.CO_WIZARD
+
+SHORTEST_TURN, LONGEST_TURN = 10, 80
+"""Range of the number of decisions for which teacher and player in turns drive."""
+
+PATIENCE: Final = 8
+"""Number of decisions in a row with another command than the teacher's after which the teacher takes over.
+
+A player that is stuck would otherwise fill its turn with examples of one moment.
+"""
+
+OnExample = Callable[[Example], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoWizardTraining(RoundSettings):
+    """Settings of a training.
+
+    Attributes:
+        rounds: number of rounds of practice.
+        sessions: sessions of practice in a round.
+        max_seconds: time limit of a session of practice [s]; shorter ones would lack the last errands.
+        last_epochs: passes of the last fit.
+        talking: share of the time in which the player drives in which it also talks.
+    """
+
+    rounds: int = 8
+    sessions: int = 45
+    max_seconds: float = 600.0
+    last_epochs: int = 16
+    talking: float = 0.5
+
+
+class Pupil:
+    """Attention that is led by the teacher: it remembers what the teacher remembers."""
+
+    def __init__(self, town: Town, limits: SpaceLimits, seed: int, teacher: Teacher) -> None:
+        """Prepares the pupil of a teacher; the seed draws which examples are kept."""
+        memory = replace(WorkingMemory(town=town), values=initial_values(teacher.usual_speed))
+        self.attention: Attention[WorkingMemory] = Attention(memory=memory)
+        self._teacher = teacher
+        self._rng = np.random.default_rng((seed, 1))
+        self.last: DialogueMove | None = None
+
+    def decide(
+        self, observation: ObservationMapping, on_example: OnExample, turn: Turn | None = None
+    ) -> tuple[CoWizardPercept, WorkingMemory, Lesson]:
+        """Lets the teacher decide, and hands on the example; returns percept, memory after listening, and lesson.
+
+        Args:
+            observation: observation of the Co-Wizard, with its action mask.
+            on_example: receives the example.
+            turn: decision of the player where it talks.
+        """
+        percept = perceive(observation, self.attention, self.last)
+        latest = percept.latest
+        places, streets = (latest.places, latest.streets) if latest is not None else ((), ())
+        lesson = self._teacher.decide(observation, places, streets)
+        queued = lesson.queued if turn is None else turn.queued
+        listening = listening_inputs(percept, queued=queued)
+        memory = remember(percept, lesson.update)
+        acting, commands = acting_inputs(percept, memory, queued=queued)
+        available = sources(memory, percept.view, percept.utterances) if lesson.remarks else {}
+        talks = turn is None or not turn.silent
+        example = make_example(percept, listening, acting, commands, lesson, available, self._rng, talks=talks)
+        if example is not None:
+            on_example(example)
+        return percept, memory, lesson
+
+    def did(
+        self, percept: CoWizardPercept, memory: WorkingMemory, physical: Physical | None, remarks: Sequence[Remark]
+    ) -> None:
+        """Notes the command that was given, and what was decided to say."""
+        self.attention = finished(percept, memory, physical, remarks)[1]
+        if remarks:
+            self.last = remarks[-1].act.move
+
+
+def follow(session: Session, town: Town, on_example: OnExample) -> None:
+    """Simulates a recorded session of scripted roles again, and hands on the examples of its Co-Wizard.
+
+    Args:
+        session: recorded session.
+        town: its town.
+        on_example: receives the examples.
+    """
+    engine = begin_replay(session, town)
+    seed = policy_seed(session.header.seed or 0, CO_WIZARD)
+    pupil = Pupil(town, engine.limits, seed, Teacher(town, engine.limits, seed))
+    for actions in recorded_actions(engine, session):
+        percept, memory, lesson = pupil.decide(observed(engine, CO_WIZARD), on_example)
+        pupil.did(percept, memory, lesson.physical, lesson.remarks)
+        engine.step(actions)
+
+
+def practise(
+    network: CoWizardNetwork,
+    vocabulary: Sequence[str],
+    engine: SessionEngine,
+    seed: int,
+    on_example: OnExample,
+    settings: CoWizardTraining,
+) -> None:
+    """Plays a session in which teacher and player take turns; hands on the teacher's decisions as examples.
+
+    Args:
+        network: network of the player.
+        vocabulary: its forms of remarks.
+        engine: engine of the town.
+        seed: seed of the session.
+        on_example: receives the examples.
+        settings: settings of the training.
+    """
+    engine.reset(seed=seed)
+    limits = engine.limits
+    others: dict[Role, AnyPolicy] = {
+        Role.PARTICIPANT: ScriptedParticipant(limits, traits=TRAINED),
+        Role.AD_WIZARD: ScriptedAdWizard(limits),
+    }
+    player = LearnedCoWizard(network, vocabulary, limits)
+    practice = CoWizardPractice(player, engine, policy_seed(seed, CO_WIZARD), on_example, settings)
+    play_in_turns(CO_WIZARD, practice, others, engine, seed)
+
+
+class CoWizardPractice:
+    """Player and teacher in one session, see `Turns`."""
+
+    def __init__(
+        self,
+        player: LearnedCoWizard,
+        engine: SessionEngine,
+        seed: int,
+        on_example: OnExample,
+        settings: CoWizardTraining,
+    ) -> None:
+        """Prepares the session of an engine; the seed is that of the role."""
+        town, limits = engine.town, engine.limits
+        self._player, self._teacher = player, Teacher(town, limits, seed, CALM)
+        self._pupil = Pupil(town, limits, seed, self._teacher)
+        self._state = player.initial_state(seed, town)
+        self._on_example, self._settings = on_example, settings
+        self._leads, self._talks, self._disagreements = False, False, 0
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the player has long commanded otherwise than the teacher."""
+        return self._disagreements >= PATIENCE
+
+    def begin_turn(self, rng: np.random.Generator) -> int:
+        """Draws whose turn it is; gives the player the memory that the teacher has led to, and what was said."""
+        left = int(rng.integers(SHORTEST_TURN, LONGEST_TURN))
+        self._leads = bool(rng.random() < self._settings.share) and not self.is_stuck
+        self._talks = bool(rng.random() < self._settings.talking) and self._leads
+        voice = replace(self._teacher.speech, queue=())
+        self._state = replace(self._state, attention=self._pupil.attention, voice=voice)
+        self._disagreements = 0
+        return left
+
+    def decide(self, observation: ObservationMapping) -> ActionDict:
+        """Takes a decision: the player's where it leads, with the teacher's words unless it talks."""
+        return self._decide(observation, self._talks).encode(self._player.limits)
+
+    def _decide(self, observation: ObservationMapping, talks: bool) -> CoWizardAction:
+        turn = self._player.play(observation, self._state, silent=not talks) if self._leads else None
+        percept, memory, lesson = self._pupil.decide(observation, self._on_example, turn if talks else None)
+        if turn is None:
+            self._pupil.did(percept, memory, lesson.physical, lesson.remarks)
+            return lesson.action
+        self._correct(turn, memory, lesson)
+        self._disagreements = self._disagreements + 1 if turn.action.physical != lesson.physical else 0
+        remarks, speech = (turn.remarks, turn.action.speech) if talks else (lesson.remarks, lesson.action.speech)
+        if talks:
+            self._teacher.talked(turn.state.voice, remarks, lesson, percept.view)
+            self._state = turn.state
+        else:
+            attention = finished(turn.percept, turn.memory, turn.action.physical, remarks)[1]
+            self._state = replace(turn.state, attention=attention, voice=self._teacher.speech)
+        self._teacher.drove(turn.action.physical)
+        self._pupil.did(percept, memory, turn.action.physical, remarks)
+        return replace(turn.action, speech=speech)
+
+    def _correct(self, turn: Turn, memory: WorkingMemory, lesson: Lesson) -> None:
+        """Hands on an example of how the player's memory gets back to the teacher's, if something was just heard.
+
+        Without anything new, the network would learn to change a memory for no reason.
+        """
+        if not turn.percept.heard:
+            return
+        listening = listening_inputs(turn.percept, queued=turn.queued)
+        correction = correcting_example(turn.percept, listening, blank_inputs(), memory, lesson)
+        if correction is not None:
+            self._on_example(correction)

@@ -1,0 +1,134 @@
+"""One decision of a learned role, up to what the network is given: the same in training and in play."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, Utterance, utterance_vector, word_rows
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.observation_parser import heard_utterance
+from dorothie_gym.session.spaces.observations import ObservationMapping
+
+
+class TimedView(Protocol):
+    """Observation that has been read."""
+
+    @property
+    def time(self) -> float:
+        """Time of the session [s]."""
+        ...
+
+
+View = TypeVar("View", bound=TimedView)
+RoleMemory = TypeVar("RoleMemory")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attention(Generic[RoleMemory]):
+    """State of a player between decisions: its memory, and the last utterances of the other speaker, latest first."""
+
+    memory: RoleMemory
+    utterances: tuple[Utterance, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Percept(Generic[View, RoleMemory]):
+    """What is perceived at a decision.
+
+    Attributes:
+        view: observation.
+        memory: memory, brought up to date with it.
+        utterances: last utterances of the other speaker, the latest first.
+        heard: whether one has just ended.
+    """
+
+    view: View
+    memory: RoleMemory
+    utterances: tuple[Utterance, ...]
+    heard: bool
+
+    @property
+    def latest(self) -> Utterance | None:
+        """The utterance that has just ended."""
+        return self.utterances[0] if self.heard else None
+
+    @cached_property
+    def talk(self) -> list[float]:
+        """Last utterances as numbers."""
+        kept = [*self.utterances, *[None] * KEPT][:KEPT]
+        return [number for utterance in kept for number in utterance_vector(utterance, self.view.time)]
+
+    @cached_property
+    def words(self) -> NDArray[np.int64]:
+        """Rows of the words of the utterance that has just ended."""
+        return word_rows("" if self.latest is None else self.latest.heard.words.text)
+
+
+def just_heard(
+    observation: ObservationMapping, speaker: Role, last: DialogueMove | None, now: float
+) -> Utterance | None:
+    """Returns the utterance that has just ended; None if there is none.
+
+    Args:
+        observation: observation of the listener.
+        speaker: the other speaker.
+        last: last move of the listener, as context of what is heard.
+        now: time [s].
+    """
+    heard = heard_utterance(observation, speaker, last)
+    return None if heard is None else Utterance(time=now, heard=heard)
+
+
+def kept_utterances(latest: Utterance | None, before: Sequence[Utterance]) -> tuple[Utterance, ...]:
+    """Returns the utterances that are remembered, the latest first."""
+    return tuple(before) if latest is None else (latest, *before)[:KEPT]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inputs:
+    """Inputs of one of the two steps of a decision.
+
+    Attributes:
+        state: state and utterances (n,).
+        words: rows of the words of the latest utterance.
+        options: vectors of what is chosen among: places, commands or errands (k, m), filled with 0.
+        rows: number of each option: row of the landmark, index of the command, or number of the subgoal.
+    """
+
+    state: NDArray[np.float32]
+    words: NDArray[np.int64]
+    options: NDArray[np.float32]
+    rows: tuple[int, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        state: Sequence[float],
+        words: NDArray[np.int64],
+        vectors: Sequence[Sequence[float]],
+        rows: tuple[int, ...],
+        shape: tuple[int, int],
+    ) -> Inputs:
+        """Returns the inputs with the vectors of the options filled up to a shape (k, m)."""
+        options = np.zeros(shape, dtype=np.float32)
+        if vectors:
+            options[: len(vectors)] = vectors
+        return cls(state=np.asarray(state, dtype=np.float32), words=words, options=options, rows=rows)
+
+    def tensors(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Returns state, words, options and their number as a batch of one, rounded as in training."""
+        state, options = (array.astype(np.float16).astype(np.float32) for array in (self.state, self.options))
+        return (
+            torch.from_numpy(state)[None],
+            torch.from_numpy(self.words)[None],
+            torch.from_numpy(options)[None],
+            torch.tensor([len(self.rows)]),
+        )

@@ -1,0 +1,89 @@
+"""The network of the learned participant: it chooses the errand, then speaks, over one word embedding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.roles.learned_role.network import (
+    REMARK_WIDTH,
+    WIDTH,
+    WORD_WIDTH,
+    RoleNetwork,
+    following_remark,
+    hidden_layers,
+    option_scorer,
+    option_scores,
+)
+from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, STATE_SIZE
+
+ERRAND_WIDTH: Final = 64
+"""Width of the layer that scores errands."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParticipantLayout:
+    """Lengths of the inputs and outputs.
+
+    Attributes:
+        state: length of state and utterances.
+        errand: length of the vector of an errand.
+        remarks: size of the vocabulary of remarks.
+    """
+
+    state: int
+    errand: int
+    remarks: int
+
+    @classmethod
+    def of(cls, remarks: int) -> ParticipantLayout:
+        """Returns the layout of this version for a vocabulary of some size."""
+        return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, errand=ERRAND_SIZE, remarks=remarks)
+
+
+class ParticipantNetwork(RoleNetwork):
+    """Chooses the target, whether to guide, and the remarks."""
+
+    def __init__(self, layout: ParticipantLayout) -> None:
+        super().__init__()
+        self.layout = layout
+        self.choosing = hidden_layers(layout.state + WORD_WIDTH, WIDTH)
+        self.keep = nn.Linear(WIDTH, 1)
+        self.errand = option_scorer(WIDTH + layout.errand, ERRAND_WIDTH)
+        self.guiding = nn.Linear(WIDTH, 1)
+        self.kept = nn.Parameter(torch.tensor(2.0))
+        self.speaking = hidden_layers(layout.state + WORD_WIDTH, WIDTH)
+        self.first = nn.Linear(WIDTH, layout.remarks)
+        self.remarks = nn.Embedding(layout.remarks, REMARK_WIDTH)
+        self.next = following_remark(layout.remarks)
+
+    def choose(
+        self, state: Tensor, words: Tensor, errands: Tensor, count: Tensor, guides: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Returns the logits of keeping the target and of each errand (b, 1 + k), and that of guiding (b,).
+
+        Args:
+            state: (b, n).
+            words: rows of the words of the latest utterance (b, w).
+            errands: vectors of the errands (b, k, e).
+            count: number of errands (b,).
+            guides: whether the car is guided so far, 0 or 1 (b,).
+        """
+        hidden = self.hidden(self.choosing, state, words)
+        scores = option_scores(self.errand, hidden, errands, count)
+        guiding = self.guiding(hidden).squeeze(1) + self.kept * (2.0 * guides - 1.0)
+        return torch.cat([self.keep(hidden), scores], dim=1), guiding
+
+    def speak(self, state: Tensor, words: Tensor) -> tuple[Tensor, Tensor]:
+        """Returns the logits of the first remark (b, r), and the hidden layer for `then`."""
+        hidden = self.hidden(self.speaking, state, words)
+        return self.first(hidden), hidden
+
+    def then(self, hidden: Tensor, before: Tensor) -> Tensor:
+        """Returns the logits of the remark (b, r) behind another one (b,)."""
+        scores: Tensor = self.next(torch.cat([hidden, self.remarks(before)], dim=1))
+        return scores
