@@ -105,7 +105,8 @@ class CoWizardNetwork(nn.Module):
 
     def then(self, hidden: Tensor, first: Tensor) -> Tensor:
         """Returns the logits of the second remark (b, r) behind a first one (b,)."""
-        return self.second(torch.cat([hidden, self.remarks(first)], dim=1))  # type: ignore[no-any-return]
+        scores: Tensor = self.second(torch.cat([hidden, self.remarks(first)], dim=1))
+        return scores
 
 
 class _Scorer(nn.Module):
@@ -120,6 +121,6 @@ class _Scorer(nn.Module):
     def forward(self, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
         """Returns the score of each option (b, k), minus infinity for those that are only filled in."""
         both = torch.relu(self.hidden(hidden)[:, None, :] + self.option(options))
-        scores = self.last(both).squeeze(2)
+        scores: Tensor = self.last(both).squeeze(2)
         missing = torch.arange(options.shape[1])[None, :] >= count[:, None]
-        return scores.masked_fill(missing, -1e9)  # type: ignore[no-any-return]
+        return scores.masked_fill(missing, -1e9)

@@ -37,6 +37,6 @@ def option_scores(scorer: nn.Module, hidden: Tensor, options: Tensor, count: Ten
     """
     number = options.shape[1]
     repeated = hidden[:, None, :].expand(-1, number, -1)
-    scores = scorer(torch.cat([repeated, options], dim=2)).squeeze(2)
+    scores: Tensor = scorer(torch.cat([repeated, options], dim=2)).squeeze(2)
     missing = torch.arange(number)[None, :] >= count[:, None]
-    return scores.masked_fill(missing, -1e9)  # type: ignore[no-any-return]
+    return scores.masked_fill(missing, -1e9)

@@ -78,4 +78,5 @@ class ParticipantNetwork(nn.Module):
 
     def then(self, hidden: Tensor, before: Tensor) -> Tensor:
         """Returns the logits of the remark (b, r) behind another one (b,)."""
-        return self.next(torch.cat([hidden, self.remarks(before)], dim=1))  # type: ignore[no-any-return]
+        scores: Tensor = self.next(torch.cat([hidden, self.remarks(before)], dim=1))
+        return scores

@@ -82,8 +82,7 @@ def next_step(records: ParticipantState, view: ParticipantView) -> RouteStep | N
 
 def _needs_switch(records: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
     """Returns whether the lane before a junction has to be asked for; "turn left" includes the way to a turn lane."""
-    progress = records.route.progress
-    assert progress is not None
+    progress = records.route.to_goal
     if crossing.lane in turn_lanes(records.town):
         return crossing.direction is Direction.STRAIGHT
     return progress.needs_switch(records.town, view.lane, view.station, crossing)
