@@ -18,7 +18,7 @@ from torch.nn import functional as F
 
 from dorothie_gym.archive import Task
 from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint, Point, PointView, history_angle
-from dorothie_gym.baselines.model_io import backpropagate
+from dorothie_gym.baselines.gradients import backpropagate
 from dorothie_gym.baselines.toto.layers import GraphAttention
 from dorothie_gym.evaluation.teacher_forced.features import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES

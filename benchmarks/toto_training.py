@@ -16,7 +16,8 @@ from benchmarks.published_toto import Features, PublishedTOTO, Senses, rebuild, 
 from benchmarks.timing import Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
 from dorothie_gym.archive import Corpus
 from dorothie_gym.archive.prediction_points import Point, task_points
-from dorothie_gym.baselines.model_io import TASKS, Examples, Labels, backpropagate
+from dorothie_gym.baselines.gradients import backpropagate
+from dorothie_gym.baselines.model_io import TASKS, Examples, Labels
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.evaluation.teacher_forced.features import Columns, build, points
 from dorothie_gym.session.recording import Session

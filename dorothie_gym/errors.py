@@ -14,9 +14,11 @@ DorothieGymError
 ├── SessionError         a recorded session or corpus cannot be read or written
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
+├── PolicyStateError     the state of a policy lacks what a part of the policy needs
 ├── PredictionError      predictions cannot be scored
 ├── FeatureStoreError    cached features are damaged
 ├── RolloutError         results of a rollout cannot be read
+├── PictureError         a picture lacks a part that the camera was not set to draw
 ├── StateError           a state of a session cannot be restored here
 ├── SettingsError        settings of a training run are out of range
 ├── ModelFileError       a saved model cannot be read
@@ -136,6 +138,10 @@ class PolicyLoadError(DorothieGymError, ValueError):
     """A policy name or file cannot be resolved; the message gives the reason and the accepted values."""
 
 
+class PolicyStateError(DorothieGymError, RuntimeError):
+    """The state of a policy lacks what a part of the policy needs, such as a route; the message says what."""
+
+
 class PredictionError(DorothieGymError, ValueError):
     """Predictions cannot be scored; the message names the file, the row or point, and the remedy."""
 
@@ -146,6 +152,10 @@ class FeatureStoreError(DorothieGymError, ValueError):
 
 class RolloutError(DorothieGymError, ValueError):
     """A file of rollout results cannot be read; the message names the file and the remedy."""
+
+
+class PictureError(DorothieGymError, ValueError):
+    """A picture lacks a part, because the outputs of its camera leave it out; the message names the part."""
 
 
 class StateError(DorothieGymError, ValueError):

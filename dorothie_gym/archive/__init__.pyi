@@ -36,4 +36,6 @@ from .prediction_points import unpointed_events as unpointed_events
 from .recorded_perception import OBJECT_VALUES as OBJECT_VALUES
 from .recorded_perception import ObjectKind as ObjectKind
 from .recorded_perception import last_perceived as last_perceived
+from .sound import sound_track as sound_track
+from .sound import utterance_audio as utterance_audio
 from .visibility import Task as Task

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from dorothie_gym.archive.prediction_points import PointView, history_angle, nfd_points
 from dorothie_gym.ontology.dialogue_acts import VECTOR_SLOTS
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support.files import replacing
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from dorothie_gym.support.libraries import pa, pq
 
 UTTERANCES_FILE: Final = "utterances.parquet"
 DECISIONS_FILE: Final = "decision_points.parquet"
@@ -33,9 +31,6 @@ def export_tables(sessions: Iterable[tuple[str | None, Session]], folder: Path) 
     Returns:
         Paths of the utterances and of the decision points.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     folder.mkdir(parents=True, exist_ok=True)
     paths = (folder / UTTERANCES_FILE, folder / DECISIONS_FILE)
     schemas = (_utterance_schema(), _decision_schema())
@@ -52,14 +47,10 @@ def export_tables(sessions: Iterable[tuple[str | None, Session]], folder: Path) 
 
 
 def _shared() -> list[tuple[str, pa.DataType]]:
-    import pyarrow as pa
-
     return [("fold", pa.string()), ("session", pa.string()), ("town", pa.string()), ("event", pa.int64())]
 
 
 def _utterance_schema() -> pa.Schema:
-    import pyarrow as pa
-
     texts = pa.list_(pa.string())
     return pa.schema(
         [
@@ -106,8 +97,6 @@ def _utterance_rows(fold: str | None, session: Session) -> Iterator[dict[str, ob
 
 
 def _decision_schema() -> pa.Schema:
-    import pyarrow as pa
-
     return pa.schema(
         [
             *_shared(),

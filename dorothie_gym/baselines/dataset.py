@@ -176,10 +176,15 @@ class Dataset:
             SessionError: the dataset has no corpus that could be read again.
         """
         if sound not in self._sounds:
-            if self._corpus is None:
-                raise SessionError("the dataset has no corpus whose sound could be read")
-            self._sounds[sound] = SoundInputs(Path(self._corpus), sound, self.hubert)
+            self._sounds[sound] = SoundInputs(Path(self._root), sound, self.hubert)
         return self._sounds[sound]
+
+    @property
+    def _root(self) -> Path | str:
+        """Folder of the corpus; raises `SessionError` if there is none."""
+        if self._corpus is None:
+            raise SessionError("the dataset has no corpus whose sound and pictures could be read")
+        return self._corpus
 
     @property
     def detector(self) -> DetectedBoxes:
@@ -200,8 +205,7 @@ class Dataset:
         )
         look = np.where(stop > start, columns.frames.look[np.maximum(stop - 1, 0)], -1)
         found = torch.zeros(len(session), *detector.query_shape, dtype=torch.float16)
-        assert self._corpus is not None
-        entries = {entry.name: entry for entry in Corpus.load(self._corpus).entries}
+        entries = {entry.name: entry for entry in Corpus.load(self._root).entries}
         for number in np.unique(session[look >= 0]).tolist():
             entry = entries[columns.sessions.names[number]]
             played = entry.load()

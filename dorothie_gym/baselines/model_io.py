@@ -122,11 +122,6 @@ def join(parts: Iterable[Labels]) -> Labels:
     return Labels(*(torch.cat([getattr(part, field.name) for part in every]) for field in fields(Labels)))
 
 
-def backpropagate(loss: Tensor) -> None:
-    """Adds the gradients of a loss to the parameters that it depends on."""
-    loss.backward()  # type: ignore[no-untyped-call]  # torch publishes no types for it
-
-
 def tensor(values: np.ndarray) -> Tensor:
     """Returns an array as a tensor of its own; whole numbers as int64, which look-ups take."""
     array = np.ascontiguousarray(values)

@@ -19,7 +19,8 @@ from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION
-from dorothie_gym.baselines.model_io import allowed_angle, backpropagate
+from dorothie_gym.baselines.gradients import backpropagate
+from dorothie_gym.baselines.model_io import allowed_angle
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
 from dorothie_gym.envs.teacher_forced import TeacherForcedEnv

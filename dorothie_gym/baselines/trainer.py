@@ -14,7 +14,8 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines import checkpoints
-from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted, backpropagate
+from dorothie_gym.baselines.gradients import backpropagate
+from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
 

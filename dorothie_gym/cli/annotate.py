@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,9 +12,7 @@ from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
-
-if TYPE_CHECKING:
-    from dorothie_gym.lab.annotation.workplace import SeatKind
+from dorothie_gym.lab import annotation as marking
 
 PORT = 8024
 """Usual port of the annotation tool."""
@@ -48,21 +46,17 @@ def annotate(
     """
     check_libraries("annotate")
     with reporting_errors():
-        from dorothie_gym.lab.annotation.links import keep_links, seats_of
-        from dorothie_gym.lab.annotation.server import AnnotationServer
-        from dorothie_gym.lab.annotation.workplace import Workplace
-
         people = _people(annotator or ([] if adjudicator is not None else ["annotator"]), adjudicator)
         entries = load_corpus(path, maps).entries
-        seats = seats_of(path, people, renew=new_links)
-        workplace = Workplace(entries, seats, maps=maps, pre_annotate=pre_annotation)
+        seats = marking.seats_of(path, people, renew=new_links)
+        workplace = marking.Workplace(entries, seats, maps=maps, pre_annotate=pre_annotation)
         if len(entries) == 1:
             workplace.open(0)  # a session that cannot be annotated is refused here
     compile_first(pictures=True)
     listener = listen(host, port)
     server = address(host, listener.getsockname()[1])
     with reporting_errors():
-        keep_links(path, seats, renew=new_links)
+        marking.keep_links(path, seats, renew=new_links)
     links = {seat.name: f"{server}/annotate#{seat.token}" if seat.token else None for seat in seats}
     if as_json:
         print_json({"address": f"{server}/annotate", "links": links, "sessions": len(entries)})
@@ -72,16 +66,13 @@ def annotate(
         if None in links.values():
             stdout().print("Links given before still work; --new-links replaces them.", soft_wrap=True)
         stdout().print("Marks are saved at once. Ctrl-C ends the server.", soft_wrap=True)
-    serve(AnnotationServer(workplace).app(), listener, host)
+    serve(marking.AnnotationServer(workplace).app(), listener, host)
 
 
-def _people(annotators: Sequence[str], adjudicator: str | None) -> list[tuple[str, SeatKind]]:
-    from dorothie_gym.lab.annotation.log import check_name
-    from dorothie_gym.lab.annotation.workplace import SeatKind
-
-    people = [(check_name(name), SeatKind.ANNOTATOR) for name in annotators]
+def _people(annotators: Sequence[str], adjudicator: str | None) -> list[tuple[str, marking.SeatKind]]:
+    people = [(marking.check_name(name), marking.SeatKind.ANNOTATOR) for name in annotators]
     if adjudicator is not None:
-        people.append((check_name(adjudicator), SeatKind.ADJUDICATOR))
+        people.append((marking.check_name(adjudicator), marking.SeatKind.ADJUDICATOR))
     names = [name.lower() for name, _ in people]
     if len(set(names)) < len(names):
         fail("two people have the same name; give each a name of its own")

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from dorothie_gym import archive
 from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_errors, stdout, wide_stdout
+from dorothie_gym.evaluation import analysis
+from dorothie_gym.lab import annotation as marking
 
 if TYPE_CHECKING:
-    from dorothie_gym.archive.corpus import Corpus, CorpusEntry
     from dorothie_gym.lab.annotation.corpus_agreement import CorpusAgreement
-    from dorothie_gym.lab.annotation.formats import Format
+
 
 _FORMATS = ("native", "sdn", "jsonl", "elan")
 
@@ -23,13 +25,11 @@ CorpusOrSession = Annotated[
 ]
 
 
-def load_corpus(path: Path, maps: Path | None) -> Corpus:
+def load_corpus(path: Path, maps: Path | None) -> archive.Corpus:
     """Returns the sessions of a command; fails if there are none, or no such folder of maps."""
-    from dorothie_gym.archive.corpus import Corpus
-
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
-    return Corpus.load(path, maps=maps)
+    return archive.Corpus.load(path, maps=maps)
 
 
 annotations_app = typer.Typer(
@@ -55,43 +55,36 @@ def export_annotations(
     if to not in _FORMATS:
         fail(f"--to is {to!r}; it must be {' or '.join(_FORMATS)}")
     with reporting_errors():
-        from dorothie_gym.lab.annotation.formats import Format
-        from dorothie_gym.lab.annotation.log import log_path
-
         corpus = load_corpus(path, maps)
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             fail(f"{out}: exists already; choose another name, or remove it first")
         if corpus.root.resolve() in (out.resolve(), *out.resolve().parents):
             fail(f"{out}: lies within {path}; choose a folder outside of it")
-        chosen = [entry for entry in corpus.entries if log_path(entry.path, annotator).is_file()]
+        chosen = [entry for entry in corpus.entries if marking.log_path(entry.path, annotator).is_file()]
         if not chosen:
             fail(f"{path}: {annotator!r} has annotated no session; {_known(corpus)}")
-        written = [_export(corpus, entry, annotator, out, Format(to), maps) for entry in chosen]
+        written = [_export(corpus, entry, annotator, out, marking.Format(to), maps) for entry in chosen]
     if as_json:
         print_json({"annotator": annotator, "to": to, "sessions": len(corpus), "written": written})
     else:
         stdout().print(f"{len(written)} of {len(corpus)} sessions written to {out}.", soft_wrap=True)
 
 
-def _known(corpus: Corpus) -> str:
-    from dorothie_gym.lab.annotation.log import annotators_of
-
-    names = sorted({name for entry in corpus.entries for name in annotators_of(entry.path)})
+def _known(corpus: archive.Corpus) -> str:
+    names = sorted({name for entry in corpus.entries for name in marking.annotators_of(entry.path)})
     return f"annotators are {', '.join(names)}" if names else "nobody has; run dorothie-gym annotate"
 
 
-def _export(corpus: Corpus, entry: CorpusEntry, annotator: str, out: Path, to: Format, maps: Path | None) -> str:
-    from dorothie_gym.lab.annotation.formats import export_annotation
-    from dorothie_gym.lab.annotation.log import read_annotation
-    from dorothie_gym.lab.annotation.source_text import SourceText
-
+def _export(
+    corpus: archive.Corpus, entry: archive.CorpusEntry, annotator: str, out: Path, to: marking.Format, maps: Path | None
+) -> str:
     session = entry.load()
-    annotation = read_annotation(SourceText.of(session), entry.path, annotator)
+    annotation = marking.read_annotation(marking.SourceText.of(session), entry.path, annotator)
     inner = entry.path.relative_to(corpus.root)
     target = out / (inner if inner.parts else Path(session.name))
     target = target.with_name(target.name + to.suffix)
     target.parent.mkdir(parents=True, exist_ok=True)
-    return str(export_annotation(session, annotation, annotator, target, to, maps=maps))
+    return str(marking.export_annotation(session, annotation, annotator, target, to, maps=maps))
 
 
 @annotations_app.command("import")
@@ -110,32 +103,29 @@ def import_annotations(
 ) -> None:
     """Store annotations of other programs, or labels of other copies of sessions, as those of an annotator."""
     with reporting_errors():
-        from dorothie_gym.lab.annotation.formats import import_annotation
-        from dorothie_gym.lab.annotation.log import ADJUDICATED, AnnotationLog, check_name, log_path
-        from dorothie_gym.lab.annotation.marks import Annotation
-        from dorothie_gym.lab.annotation.source_text import SourceText
-
-        name = annotator if annotator == ADJUDICATED else check_name(annotator)
+        name = annotator if annotator == marking.ADJUDICATED else marking.check_name(annotator)
         corpus = load_corpus(path, maps)
         found = _sources(corpus, path, source)
         if not found:
             fail(f"{source}: holds no annotation of a session of {path}")
         read = []
         for entry, file in found:
-            if log_path(entry.path, name).exists():
-                fail(f"{log_path(entry.path, name)}: exists already; choose another name, or remove it first")
+            if marking.log_path(entry.path, name).exists():
+                fail(f"{marking.log_path(entry.path, name)}: exists already; choose another name, or remove it first")
             session = entry.load()
-            read.append((entry, SourceText.of(session), import_annotation(session, file, maps=maps), file))
+            read.append(
+                (entry, marking.SourceText.of(session), marking.import_annotation(session, file, maps=maps), file)
+            )
         for entry, text, annotation, file in read:  # only if all of them could be read
-            log = AnnotationLog(text, entry.path, name)
-            log.mark(annotation.difference(Annotation.empty(text)), f"import {file.name}"[:80])
+            log = marking.AnnotationLog(text, entry.path, name)
+            log.mark(annotation.difference(marking.Annotation.empty(text)), f"import {file.name}"[:80])
     if as_json:
         print_json({"annotator": name, "sessions": [entry.name for entry, _, _, _ in read]})
     else:
         stdout().print(f"Annotations of {len(read)} sessions stored as those of {name}.", soft_wrap=True)
 
 
-def _sources(corpus: Corpus, path: Path, source: Path) -> list[tuple[CorpusEntry, Path]]:
+def _sources(corpus: archive.Corpus, path: Path, source: Path) -> list[tuple[archive.CorpusEntry, Path]]:
     """Returns the file or folder with the annotation of each session that has one."""
     if [entry.path for entry in corpus.entries] == [path]:
         return [(corpus.entries[0], source)]
@@ -164,10 +154,9 @@ def agreement(
 ) -> None:
     """Print the agreement of annotators: spans; Cohen's kappa of moves, slots, and borders of units; alpha."""
     with reporting_errors():
-        from dorothie_gym.evaluation.analysis.span_agreement import has_alpha
         from dorothie_gym.lab.annotation.corpus_agreement import corpus_agreement
 
-        found = corpus_agreement(load_corpus(path, maps).entries, annotator or (), with_alpha=has_alpha())
+        found = corpus_agreement(load_corpus(path, maps).entries, annotator or (), with_alpha=analysis.has_alpha())
     if as_json:
         print_json(found.to_json())
     else:

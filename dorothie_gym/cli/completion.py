@@ -6,40 +6,37 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TypeAlias
 
+from dorothie_gym import maps as town_maps
+from dorothie_gym import policies as players
+from dorothie_gym import tasks
+from dorothie_gym._registration import environment_ids
+from dorothie_gym.ontology.roles import Role
+
 Completion: TypeAlias = Callable[[str], list[str]]
 """Function that returns the completions of the beginning of a word."""
 
 
 def complete_town(incomplete: str) -> list[str]:
     """Returns the shipped towns and the map files that begin with a text."""
-    from dorothie_gym.maps.catalogue import town_names
-
-    return _names(incomplete, town_names()) + list(_paths(incomplete, (".yaml", ".yml", ".xodr")))
+    return _names(incomplete, town_maps.town_names()) + list(_paths(incomplete, (".yaml", ".yml", ".xodr")))
 
 
 def complete_towns(incomplete: str) -> list[str]:
     """Returns the completions of the last name in a list of towns, with the names before it."""
-    from dorothie_gym.maps.catalogue import town_names
-
     before, comma, last = incomplete.rpartition(",")
-    return [before + comma + name for name in _names(last, ("seen", "unseen", "all", *town_names()))]
+    return [before + comma + name for name in _names(last, ("seen", "unseen", "all", *town_maps.town_names()))]
 
 
 def complete_storyboard(incomplete: str) -> list[str]:
     """Returns the shipped storyboards and the JSON files that begin with a text."""
-    from dorothie_gym.tasks.parsing import template_names
-
-    return _names(incomplete, template_names()) + list(_paths(incomplete, (".json",)))
+    return _names(incomplete, tasks.template_names()) + list(_paths(incomplete, (".json",)))
 
 
 def complete_policy(role: str) -> Completion:
     """Returns the completion of the policies of a role, by name or file."""
 
     def complete(incomplete: str) -> list[str]:
-        from dorothie_gym.ontology.roles import Role
-        from dorothie_gym.policies.policy_loader import policy_names
-
-        return _names(incomplete, policy_names(Role(role))) + list(_paths(incomplete))
+        return _names(incomplete, players.policy_names(Role(role))) + list(_paths(incomplete))
 
     return complete
 
@@ -67,8 +64,6 @@ def complete_algorithm(incomplete: str) -> list[str]:
 
 def complete_env(incomplete: str) -> list[str]:
     """Returns the ids of the registered environments that begin with a text."""
-    from dorothie_gym._registration import environment_ids
-
     return _names(incomplete, environment_ids())
 
 

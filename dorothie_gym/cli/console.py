@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from dorothie_gym import tasks
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors, needs
 from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
-
-if TYPE_CHECKING:
-    from dorothie_gym.lab.console.config import ConsoleConfig
-    from dorothie_gym.lab.console.room import Room
+from dorothie_gym.evaluation import rollout as rollouts
+from dorothie_gym.lab import console as seats
 
 TOWN = "brookside"
 """Town if none is given: the smallest one."""
@@ -77,8 +76,6 @@ def console(
     Each link holds a secret and leads to one seat. A second browser at the seat of a role takes it over.
     """
     check_libraries("console")
-    from dorothie_gym.lab.console.server import Console
-
     compile_first(pictures=pictures)
     with reporting_errors():
         config = replace(_config(max_seconds, word_errors, absence, after_absence, while_away, pictures), speech=speech)
@@ -94,63 +91,64 @@ def console(
     else:
         _print_links(links, out)
     with reporting_errors():
-        served = Console([room])
+        served = seats.Console([room])
     serve(served.app(), listener, host)
 
 
 def _config(
     max_seconds: float | None, word_errors: float | None, absence: float, after: str, away: str, pictures: bool
-) -> ConsoleConfig:
-    from dorothie_gym.lab.console.config import AbsenceRules, AfterAbsence, ConsoleConfig, WhileAway
-
-    for name, value, choices in (("--after-absence", after, AfterAbsence), ("--while-away", away, WhileAway)):
+) -> seats.ConsoleConfig:
+    for name, value, choices in (
+        ("--after-absence", after, seats.AfterAbsence),
+        ("--while-away", away, seats.WhileAway),
+    ):
         if value not in list(map(str, choices)):
             fail(f"{name} is {value!r}; it must be {' or '.join(map(str, choices))}")
-    usual = ConsoleConfig()
-    return ConsoleConfig(
+    usual = seats.ConsoleConfig()
+    return seats.ConsoleConfig(
         max_seconds=usual.max_seconds if max_seconds is None else max_seconds,
         word_error_rate=usual.word_error_rate if word_errors is None else word_errors,
         pictures=pictures,
-        absence=AbsenceRules(while_away=WhileAway(away), seconds=absence, then=AfterAbsence(after)),
+        absence=seats.AbsenceRules(while_away=seats.WhileAway(away), seconds=absence, then=seats.AfterAbsence(after)),
     )
 
 
-def _room(town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: ConsoleConfig) -> Room:
-    from dorothie_gym.lab.console.room import Room
-    from dorothie_gym.lab.console.seating import parse_roles
+def _room(
+    town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: seats.ConsoleConfig
+) -> seats.Room:
     from dorothie_gym.lab.town_page import town_page
     from dorothie_gym.session.session_engine import SessionEngine
 
-    plans = parse_roles(roles)
+    plans = seats.parse_roles(roles)
     engine = SessionEngine(town, storyboard, config=config.environment())
-    room = Room(engine, plans, config, seed=seed, folder=out)
+    room = seats.Room(engine, plans, config, seed=seed, folder=out)
     town_page(engine.town)  # the first browser is served at once
     return room
 
 
 def _resumed_room(
-    folder: Path, town: str | None, storyboard: str | None, roles: str, out: Path, config: ConsoleConfig
-) -> Room:
-    from dorothie_gym.evaluation.rollout.replay import ReplaySources, begin_replay
-    from dorothie_gym.lab.console.resuming import Resumed
-    from dorothie_gym.lab.console.room import Room
-    from dorothie_gym.lab.console.seating import parse_roles
+    folder: Path, town: str | None, storyboard: str | None, roles: str, out: Path, config: seats.ConsoleConfig
+) -> seats.Room:
     from dorothie_gym.lab.town_page import town_page
-    from dorothie_gym.tasks.parsing import load_template
 
-    resumed = Resumed.load(folder)
+    resumed = seats.Resumed.load(folder)
     session = resumed.session
-    template = None if storyboard is None else load_template(storyboard)
-    engine = begin_replay(session, ReplaySources(town=town).town_of(session), storyboard=template)
+    template = None if storyboard is None else tasks.load_template(storyboard)
+    engine = rollouts.begin_replay(session, rollouts.ReplaySources(town=town).town_of(session), storyboard=template)
     seed = engine.scenario.seed
-    room = Room(
-        engine, parse_roles(roles or resumed.roles), resumed.config(config), seed=seed, folder=out, resumed=resumed
+    room = seats.Room(
+        engine,
+        seats.parse_roles(roles or resumed.roles),
+        resumed.config(config),
+        seed=seed,
+        folder=out,
+        resumed=resumed,
     )
     town_page(engine.town)
     return room
 
 
-def _links(room: Room, host: str, port: int) -> dict[str, str]:
+def _links(room: seats.Room, host: str, port: int) -> dict[str, str]:
     """Returns the link of each seat; its secret is behind the #, which browsers do not send and servers do not log."""
     return {name: f"{address(host, port)}/seat#{seat.token}" for name, seat in room.seats.items()}
 
@@ -160,9 +158,7 @@ def _print_links(links: Facts, out: Path | None) -> None:
     for name, link in links.items():
         screen.print(f"{name.replace('_', '-').capitalize():<13} {link}", soft_wrap=True)
     if out is not None:
-        from dorothie_gym.lab.console.resuming import interrupted_sessions
-
-        for folder in interrupted_sessions(out):
+        for folder in seats.interrupted_sessions(out):
             screen.print(f"{folder} was interrupted; --resume {folder} goes on with it.", soft_wrap=True)
     recorded = f"Sessions are recorded in {out}." if out is not None else "Nothing is recorded; --out DIR records."
     screen.print(f"{recorded} Ctrl-C ends the session and the server.", soft_wrap=True)

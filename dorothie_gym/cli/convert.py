@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dorothie_gym import archive
+from dorothie_gym.archive import sdn
 from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.errors import SessionError, TownError
+from dorothie_gym.evaluation import rollout as rollouts
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session import recording
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from dorothie_gym.archive.corpus import Corpus, CorpusEntry
-    from dorothie_gym.session.recording.session import Session
 
 
 class TargetLayout(enum.StrEnum):
@@ -76,9 +79,7 @@ def convert(
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
     with reporting_errors():
-        from dorothie_gym.archive.corpus import Corpus
-
-        corpus = Corpus.load(source, maps=maps)
+        corpus = archive.Corpus.load(source, maps=maps)
         _check_out(source, out)
         if to is TargetLayout.TABLES:
             _write_tables(corpus, out, as_json=as_json)
@@ -108,7 +109,7 @@ def _check_out(source: Path, out: Path) -> None:
         fail(f"{out}: is a file; choose a folder")
 
 
-def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
+def _write_tables(corpus: archive.Corpus, out: Path, *, as_json: bool) -> None:
     """Writes the tables of all sessions; an unreadable session fails the command."""
     paths = [str(path) for path in corpus.export(out)]
     if as_json:
@@ -118,25 +119,19 @@ def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
 
 
 def _write_role(
-    corpus: Corpus, out: Path, to: TargetLayout, role: ExportedRole, maps: Path | None, storage: Storage,
+    corpus: archive.Corpus, out: Path, to: TargetLayout, role: ExportedRole, maps: Path | None, storage: Storage,
     fields: list[str], *, as_json: bool,
 ) -> None:  # fmt: skip
     """Writes the view of a role on all sessions; a session that cannot be simulated again fails the command."""
-    from dorothie_gym.evaluation.rollout.replay import ReplaySources
     from dorothie_gym.evaluation.rollout.role_episodes import role_episodes
-    from dorothie_gym.ontology.roles import Role
 
     whose = Role(role.value)
     with _progress(len(corpus), quiet=as_json) as advance:
-        episodes = role_episodes(corpus.entries, whose, ReplaySources(maps=maps))
+        episodes = role_episodes(corpus.entries, whose, rollouts.ReplaySources(maps=maps))
         if to is TargetLayout.MINARI:
-            from dorothie_gym.evaluation.rollout.minari_export import export_minari
-
-            name = export_minari(episodes, whose, out, advance, storage=storage.value, fields=fields)
+            name = rollouts.export_minari(episodes, whose, out, advance, storage=storage.value, fields=fields)
         else:
-            from dorothie_gym.evaluation.rollout.hugging_face_export import export_hugging_face
-
-            name = str(export_hugging_face(episodes, whose, out, advance))
+            name = str(rollouts.export_hugging_face(episodes, whose, out, advance))
     facts = {"to": to.value, "in": str(corpus.root), "out": str(out), "role": role.value, "dataset": name}
     if as_json:
         print_json({**facts, "sessions": len(corpus)})
@@ -146,7 +141,7 @@ def _write_role(
 
 
 def _convert(
-    corpus: Corpus, out: Path, to: TargetLayout, maps: Path | None, *, is_one: bool, quiet: bool
+    corpus: archive.Corpus, out: Path, to: TargetLayout, maps: Path | None, *, is_one: bool, quiet: bool
 ) -> list[Facts]:
     rows = []
     taken: set[Path] = set()
@@ -158,8 +153,8 @@ def _convert(
 
 
 def _convert_one(
-    corpus: Corpus,
-    entry: CorpusEntry,
+    corpus: archive.Corpus,
+    entry: archive.CorpusEntry,
     number: int,
     out: Path,
     to: TargetLayout,
@@ -169,16 +164,13 @@ def _convert_one(
     is_one: bool,
 ) -> Facts:
     """Converts a session; returns its row for --json."""
-    from dorothie_gym.archive.sdn.writer import write_sdn
-    from dorothie_gym.errors import SessionError, TownError
-
     path = entry.path.relative_to(corpus.root)
     row: Facts = {"path": str(path)}
     try:
         session = entry.load()
         target = out if is_one else out / path.with_name(_name(session, number, to, out / path.parent, taken))
         taken.add(target)
-        written = write_sdn(session, target, maps=maps) if to is TargetLayout.SDN else session.save(target)
+        written = sdn.write_sdn(session, target, maps=maps) if to is TargetLayout.SDN else session.save(target)
     except (SessionError, TownError) as error:
         return {**row, "error": str(error)}
     return {
@@ -192,7 +184,7 @@ def _convert_one(
     }
 
 
-def _name(session: Session, number: int, to: TargetLayout, folder: Path, taken: set[Path]) -> str:
+def _name(session: recording.Session, number: int, to: TargetLayout, folder: Path, taken: set[Path]) -> str:
     """Returns the name of the folder of a session: the original scripts look for `log_<number>`."""
     if to is TargetLayout.NATIVE or session.name.startswith("log_"):
         return session.name
@@ -214,15 +206,13 @@ def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
 
 
 def _show(rows: list[Facts], out: Path) -> None:
-    from dorothie_gym.session.recording.validation import report_lines
-
     console = stdout()
     for row in rows:
         if "error" in row:
             console.print(f"{row['path']}: not converted: {row['error']}", style="yellow", markup=False, soft_wrap=True)
             continue
         console.print(_line(row), markup=False, soft_wrap=True)
-        for line in (*report_lines(row["report"]), *(f"fault: {fault}" for fault in row["faults"])):
+        for line in (*recording.report_lines(row["report"]), *(f"fault: {fault}" for fault in row["faults"])):
             console.print(f"  {line}", style="dim", markup=False, soft_wrap=True)
     done = sum("error" not in row for row in rows)
     console.print(f"{done} of {len(rows)} sessions written to {out}.", markup=False, soft_wrap=True)

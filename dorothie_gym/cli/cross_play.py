@@ -33,11 +33,16 @@ from dorothie_gym.cli.output import (
     wide_stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.evaluation import closed_loop
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session import recording
+from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.evaluation.closed_loop.cross_play import CrossPlayResult, CrossPlaySettings
     from dorothie_gym.policies.policy_loader import Player
+
 
 USUAL = ["scripted", "silent"]
 """Players of both roles where none is given."""
@@ -94,9 +99,6 @@ def cross_play(
     The result does not depend on the number of workers. An interrupted run is resumed by the same command with --out.
     """
     with reporting_errors():
-        from dorothie_gym.evaluation.closed_loop.cross_play import RESULT_NAME, CrossPlaySettings
-        from dorothie_gym.evaluation.closed_loop.running import parse_towns
-
         if page is not None:
             if page.suffix != ".md":
                 fail(f"{page}: the page is Markdown; give a name that ends in .md")
@@ -113,11 +115,11 @@ def cross_play(
         )
         drivers, guides, adversary = _players(co_wizard or USUAL, participant or USUAL, ad_wizard, asked)
         try:
-            settings = CrossPlaySettings(
+            settings = closed_loop.CrossPlaySettings(
                 co_wizards=drivers,
                 participants=guides,
                 ad_wizard=adversary,
-                towns=parse_towns(towns),
+                towns=closed_loop.parse_towns(towns),
                 sessions=sessions,
                 seed=seed,
                 config=env_config(max_seconds, word_errors),
@@ -129,10 +131,7 @@ def cross_play(
         if out is None:
             shutil.rmtree(folder)
         else:
-            from dorothie_gym.session.recording.json_io import to_page
-            from dorothie_gym.support.files import write_atomically
-
-            write_atomically(folder / RESULT_NAME, to_page(result.to_json()))
+            write_atomically(folder / closed_loop.RESULT_NAME, recording.to_page(result.to_json()))
         if page is not None:
             page.write_text(result.page(), encoding="utf-8")
     if as_json:
@@ -150,16 +149,15 @@ def _players(
     drivers: list[str], guides: list[str], ad_wizard: str, asked: LanguageModelOptions
 ) -> tuple[list[Player], list[Player], Player]:
     """Returns the players of both roles and of the Ad-Wizard; exits if a name or file is unknown."""
-    from dorothie_gym.ontology.roles import Role
-
     casts = [find_cast(guides[0], name, ad_wizard, asked) for name in drivers]
     first = casts[0]
     others = [find_cast(name, "silent", "silent", asked)[Role.PARTICIPANT] for name in guides[1:]]
     return [cast[Role.CO_WIZARD] for cast in casts], [first[Role.PARTICIPANT], *others], first[Role.AD_WIZARD]
 
 
-def _play(settings: CrossPlaySettings, folder: Path, workers: int, ray: str | None, *, quiet: bool) -> CrossPlayResult:
-    from dorothie_gym.errors import ProcessError
+def _play(
+    settings: closed_loop.CrossPlaySettings, folder: Path, workers: int, ray: str | None, *, quiet: bool
+) -> closed_loop.CrossPlayResult:
     from dorothie_gym.evaluation.closed_loop.cross_play import cross_play
 
     try:

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from dorothie_gym import archive
 from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import Facts, check_file, fail, print_json, reporting_errors, stderr, wide_stdout
-
-if TYPE_CHECKING:
-    from dorothie_gym.archive.corpus import Corpus
-    from dorothie_gym.archive.visibility import Task
-    from dorothie_gym.evaluation.teacher_forced.labels import CorpusLabels, Split
-    from dorothie_gym.evaluation.teacher_forced.predictions import TaskPredictions
-    from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
+from dorothie_gym.errors import CacheError, PredictionError, SessionError
+from dorothie_gym.evaluation import rollout as rollouts
+from dorothie_gym.evaluation import teacher_forced
 
 DETAILED = 2
 """Largest number of models that are shown in detail."""
@@ -58,27 +55,19 @@ def evaluate(
             fail("--save writes the predictions of a trivial baseline; add --model majority or --model random")
         check_file(save)
     with reporting_errors():
-        from dorothie_gym.archive.corpus import Corpus
-        from dorothie_gym.errors import PredictionError
-        from dorothie_gym.evaluation.teacher_forced.labels import labels_of
-        from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_about
-        from dorothie_gym.evaluation.teacher_forced.table import evaluate_predictions
-
         chosen, part = _tasks(tasks), _split(split)
         if floor is not None:
             _check_floor(floor)
         try:
             read = _read(files, chosen)
-            where = Corpus.load(_default_sessions() if corpus is None else corpus, maps=maps)
-            labels = labels_of(where, part)
+            where = archive.Corpus.load(_default_sessions() if corpus is None else corpus, maps=maps)
+            labels = teacher_forced.labels_of(where, part)
             if floor is not None:
                 read += _floor(floor, where, labels, range(seed, seed + seeds), chosen, save)
-            about = {str(path): page for path in files if (page := read_about(path))}
-            table = evaluate_predictions(read, labels, about=about)
+            about = {str(path): page for path in files if (page := teacher_forced.read_about(path))}
+            table = teacher_forced.evaluate_predictions(read, labels, about=about)
             if out is not None:
-                from dorothie_gym.evaluation.teacher_forced.report import write_report
-
-                write_report(table, out)
+                teacher_forced.write_report(table, out)
         except PredictionError as error:
             fail(str(error))
     if as_json:
@@ -87,10 +76,8 @@ def evaluate(
         _show(table, out)
 
 
-def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]:
-    from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_predictions
-
-    read = [given for given in read_predictions(*files) if given.task in tasks]
+def _read(files: Sequence[Path], tasks: Sequence[archive.Task]) -> list[teacher_forced.TaskPredictions]:
+    read = [given for given in teacher_forced.read_predictions(*files) if given.task in tasks]
     if files and not read:
         names = ", ".join(task.value for task in tasks)
         fail(f"{', '.join(map(str, files))}: no row has the task {names} in its column 'task'")
@@ -98,76 +85,67 @@ def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]
 
 
 def _floor(
-    name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
-) -> list[TaskPredictions]:
-    from dorothie_gym.errors import SessionError
-    from dorothie_gym.evaluation.teacher_forced.labels import ALL, labels_of
-    from dorothie_gym.evaluation.teacher_forced.predictions import write_predictions
-    from dorothie_gym.evaluation.teacher_forced.trivial_baselines import predict_floor
-
+    name: str,
+    corpus: archive.Corpus,
+    labels: teacher_forced.CorpusLabels,
+    seeds: range,
+    tasks: Sequence[archive.Task],
+    save: Path | None,
+) -> list[teacher_forced.TaskPredictions]:
     try:
-        train = labels_of(corpus, "train")
+        train = teacher_forced.labels_of(corpus, "train")
     except SessionError as error:
-        if labels.split != ALL:
+        if labels.split != teacher_forced.ALL:
             fail(f"the trivial baseline {name} is fitted on the split train: {error}; or give a file of predictions")
         note = f"There is no split train: the trivial baseline {name} is fitted on the sessions that it is scored on."
         stderr().print(note, soft_wrap=True, markup=False)
         train = labels
-    drawn = [given for seed in seeds for given in predict_floor(name, train, labels, seed)]
+    drawn = [given for seed in seeds for given in teacher_forced.predict_floor(name, train, labels, seed)]
     wanted = [given for given in drawn if given.task in tasks]
     if save is not None:
-        write_predictions(save, wanted, about={"model": name, "corpus": str(corpus.root), "split": labels.split})
+        teacher_forced.write_predictions(
+            save, wanted, about={"model": name, "corpus": str(corpus.root), "split": labels.split}
+        )
     return wanted
 
 
-def _tasks(text: str) -> tuple[Task, ...]:
-    from dorothie_gym.archive.visibility import Task
-
+def _tasks(text: str) -> tuple[archive.Task, ...]:
     names = [name.strip().lower() for name in text.split(",")]
     if names == ["all"]:
-        return tuple(Task)
+        return tuple(archive.Task)
     for name in names:
-        if name not in {task.value for task in Task}:
-            fail(f"task {name!r} is unknown; choose from {', '.join(task.value for task in Task)}, or all")
-    return tuple(task for task in Task if task.value in names)
+        if name not in {task.value for task in archive.Task}:
+            fail(f"task {name!r} is unknown; choose from {', '.join(task.value for task in archive.Task)}, or all")
+    return tuple(task for task in archive.Task if task.value in names)
 
 
-def _split(text: str) -> Split:
-    from dorothie_gym.evaluation.teacher_forced.labels import SPLITS
-
-    for split in SPLITS:
+def _split(text: str) -> teacher_forced.Split:
+    for split in teacher_forced.SPLITS:
         if split == text:
             return split
-    fail(f"split {text!r} is unknown; choose from {', '.join(SPLITS)}")
+    fail(f"split {text!r} is unknown; choose from {', '.join(teacher_forced.SPLITS)}")
 
 
 def _check_floor(name: str) -> None:
-    from dorothie_gym.evaluation.teacher_forced.trivial_baselines import make_floor
-
     try:
-        make_floor(name)
+        teacher_forced.make_floor(name)
     except ValueError as error:
         fail(str(error))
 
 
 def _default_sessions() -> Path:
-    from dorothie_gym.errors import CacheError
-    from dorothie_gym.evaluation.rollout.corpus_cache import default_corpus
-
     try:
-        return default_corpus()
+        return rollouts.default_corpus()
     except CacheError as error:
         fail(str(error))
 
 
-def _flat(table: ResultsTable) -> Facts:
+def _flat(table: teacher_forced.ResultsTable) -> Facts:
     """Returns the scores of a single run over all parts; skipped points are unscored or scored in part."""
     if len(table.runs) != 1:
         return {}
-    from dorothie_gym.evaluation.teacher_forced.labels import ALL
-
     run = table.runs[0]
-    scores = run.parts[ALL]
+    scores = run.parts[teacher_forced.ALL]
     skipped = [row.task for row in (*run.left_out, *table.labels.skipped)]
     return {
         "model": run.model,
@@ -178,15 +156,13 @@ def _flat(table: ResultsTable) -> Facts:
     }
 
 
-def _show(table: ResultsTable, out: Path | None) -> None:
-    from dorothie_gym.evaluation.teacher_forced.terminal import print_counts, print_details, print_table
-
+def _show(table: teacher_forced.ResultsTable, out: Path | None) -> None:
     console = wide_stdout()
     if len(table.models) > DETAILED:
-        print_table(table, console)
+        teacher_forced.print_table(table, console)
     else:
         for name in table.models:
-            print_details(table, name, console)
-        print_counts(table, console)
+            teacher_forced.print_details(table, name, console)
+        teacher_forced.print_counts(table, console)
     if out is not None:
         console.print(f"Written: {out}", style="dim", markup=False, soft_wrap=True)

@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.archive.sound import mixed_track
 from dorothie_gym.cli.output import VideoWriter, add_sound, video_writer
+from dorothie_gym.pictures.camera.body_snapshots import bodies_between, snapshot_of
+from dorothie_gym.pictures.camera.session_pictures import windscreen_camera
 from dorothie_gym.pictures.views.scene import Actor, Scene, SpokenLine
 from dorothie_gym.pictures.views.session_scene import scene_of
 from dorothie_gym.pictures.views.session_views import SessionRenderer
@@ -21,6 +24,7 @@ from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.audio import SAMPLE_RATE, encode_wav
 from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
@@ -92,9 +96,6 @@ class Film:
         self._last = scene
 
     def _add_sound(self) -> None:
-        from dorothie_gym.archive.sound import mixed_track
-        from dorothie_gym.support.audio import encode_wav
-
         # the first picture is that of the beginning of the session
         track = mixed_track(self._spoken, 0.0, self.frames / FRAMES_PER_SECOND)
         with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
@@ -109,8 +110,6 @@ class Film:
 
 def spoken_pieces(engine: SessionEngine) -> Iterator[tuple[float, Samples]]:
     """Yields the start of each span that was delivered last [s], and its audio; the spans of an utterance follow on."""
-    from dorothie_gym.support.audio import SAMPLE_RATE
-
     ends: dict[object, float] = {}
     for event in engine.last_events:
         samples = engine.last_recordings.get(str(event.data.get("audio")))
@@ -132,8 +131,6 @@ class _Windscreen:
     """Camera on the car of a session in progress, at its decisions and between them."""
 
     def __init__(self, session: LiveSession, size: tuple[int, int]) -> None:
-        from dorothie_gym.pictures.camera.session_pictures import windscreen_camera
-
         self._world = session.world
         self._camera = windscreen_camera(session.world.town, session.scenario, session.config, size)
         self._last = self._moment()
@@ -150,8 +147,6 @@ class _Windscreen:
             scene: of that time, with the pose of the car.
             share: of the time.
         """
-        from dorothie_gym.pictures.camera.body_snapshots import bodies_between
-
         world, now = self._world, self._moment()
         height = self._last.height + share * (now.height - self._last.height)
         return self._camera.render_from(
@@ -164,8 +159,6 @@ class _Windscreen:
         ).rgb
 
     def _moment(self) -> _Moment:
-        from dorothie_gym.pictures.camera.body_snapshots import snapshot_of
-
         return _Moment(snapshot_of(self._world.actors.arrays), float(self._world.car.height))
 
 

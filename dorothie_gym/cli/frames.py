@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from dorothie_gym import archive
 from dorothie_gym.cli.options import AsJson, Maps, Players, SessionTown
 from dorothie_gym.cli.output import (
     FAILED,
@@ -22,10 +23,9 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.support.processors import available_processors
-
-if TYPE_CHECKING:
-    from dorothie_gym.evaluation.rollout.frame_export import ExportedSession, FrameExport
 
 
 def frames(
@@ -67,16 +67,15 @@ def frames(
     )
 
 
-def _export(rate: float, size: str, outputs: str | None, layout: str) -> FrameExport:
+def _export(rate: float, size: str, outputs: str | None, layout: str) -> rollouts.FrameExport:
     """Returns the settings of a command line; exits where one is wrong."""
-    from dorothie_gym.evaluation.rollout.frame_export import FrameExport, FrameLayout
-    from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-
     width, cross, height = size.partition("x")
     if not (cross and width.isdecimal() and height.isdecimal()):
         fail(f"--size is {size!r}; it must be like 480x320")
-    if layout not in [each.value for each in FrameLayout]:
-        fail(f"--layout is {layout!r}; it must be one of {', '.join(FrameLayout)}")
+    if layout not in [each.value for each in rollouts.FrameLayout]:
+        fail(f"--layout is {layout!r}; it must be one of {', '.join(rollouts.FrameLayout)}")
+    from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+
     known = [output.value for output in CameraOutput]
     named = known if outputs is None else outputs.split(",")
     unknown = [name for name in named if name not in known]
@@ -85,27 +84,28 @@ def _export(rate: float, size: str, outputs: str | None, layout: str) -> FrameEx
     chosen = tuple(output for output in CameraOutput if output.value in named)
     try:
         camera = CameraConfig(width=int(width), height=int(height), outputs=chosen)
-        return FrameExport(rate=rate, camera=camera, layout=FrameLayout(layout))
+        return rollouts.FrameExport(rate=rate, camera=camera, layout=rollouts.FrameLayout(layout))
     except ValueError as error:
         fail(str(error))
 
 
 def _write(
-    path: Path, out: Path, export: FrameExport, maps: tuple[str | None, Path | None], workers: int, *, quiet: bool
-) -> list[ExportedSession]:
-    from dorothie_gym.archive.corpus import Corpus
-    from dorothie_gym.errors import ProcessError
-    from dorothie_gym.evaluation.rollout.frame_export import export_frames
-    from dorothie_gym.evaluation.rollout.replay import ReplaySources
-
-    corpus = Corpus.load(path, maps=maps[1])
+    path: Path,
+    out: Path,
+    export: rollouts.FrameExport,
+    maps: tuple[str | None, Path | None],
+    workers: int,
+    *,
+    quiet: bool,
+) -> list[rollouts.ExportedSession]:
+    corpus = archive.Corpus.load(path, maps=maps[1])
     if out.resolve() == path.resolve() or path.resolve() in out.resolve().parents:
         fail(f"{out}: lies within {path}; choose a folder outside of it")
     compile_first(pictures=True)
     try:
         with _progress(quiet=quiet) as on_part:
-            sources = ReplaySources(town=maps[0], maps=maps[1])
-            return export_frames(corpus, out, export, sources, workers=workers, on_part=on_part)
+            sources = rollouts.ReplaySources(town=maps[0], maps=maps[1])
+            return rollouts.export_frames(corpus, out, export, sources, workers=workers, on_part=on_part)
     except KeyboardInterrupt:
         exit_interrupted(f"Interrupted; finished sessions are in {out}; the same command resumes.")
     except ProcessError as error:
@@ -124,7 +124,7 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, total: progress.update(bar, completed=done, total=total)
 
 
-def _facts(done: list[ExportedSession], out: Path, wall: float) -> Facts:
+def _facts(done: list[rollouts.ExportedSession], out: Path, wall: float) -> Facts:
     return {
         "out": str(out),
         "pictures": sum(each.pictures for each in done),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -20,11 +21,10 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.support.processors import available_processors
-
-if TYPE_CHECKING:
-    from dorothie_gym.evaluation.rollout.corpus_generation import Generated
 
 
 def generate(
@@ -44,15 +44,12 @@ def generate(
     The bytes do not depend on the number of workers. After an interruption the same command resumes.
     """
     with reporting_errors():
-        from dorothie_gym.errors import ProcessError
-        from dorothie_gym.evaluation.rollout.corpus_generation import generate_corpus
-
         config = env_config(max_seconds, word_errors, perception, speech)
         try:
             compile_first(pictures=perception is PerceptionModel.CAMERA)
             begun = time.perf_counter()
             with session_progress(quiet=as_json) as on_session:
-                made = generate_corpus(
+                made = rollouts.generate_corpus(
                     out,
                     sessions=sessions,
                     seed=seed,
@@ -87,9 +84,7 @@ def _exit_interrupted(
     perception: PerceptionModel,
     speech: bool,
 ) -> None:
-    from dorothie_gym.evaluation.rollout.corpus_generation import finished_sessions
-
-    done = finished_sessions(out, sessions=sessions, seed=seed)
+    done = rollouts.finished_sessions(out, sessions=sessions, seed=seed)
     command = f"dorothie-gym generate --sessions {sessions} --seed {seed} --out {out}"
     if max_seconds is not None:
         command += f" --max-seconds {max_seconds:g}"
@@ -102,9 +97,7 @@ def _exit_interrupted(
     exit_interrupted(f"Interrupted with {done} of {sessions} sessions finished; resume with: {command}")
 
 
-def _facts(made: Generated, seed: int, wall: float) -> Facts:
-    import json
-
+def _facts(made: rollouts.Generated, seed: int, wall: float) -> Facts:
     folds: dict[str, int] = {}
     for row in made.rows:
         fold = str(row["fold"])

@@ -6,15 +6,13 @@ import enum
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from dorothie_gym.cli.options import needs
 from dorothie_gym.cli.output import fail
-
-if TYPE_CHECKING:
-    from dorothie_gym.policies.language_model.config import LanguageModelConfig
+from dorothie_gym.policies import language_model as asked
 
 _PANEL = "Language models (llm:MODEL)"
 
@@ -83,20 +81,18 @@ class LanguageModelOptions:
     replay: bool
     prices: str | None
 
-    def config(self) -> LanguageModelConfig:
+    def config(self) -> asked.LanguageModelConfig:
         """Returns the settings; the name of the model is a placeholder. Exits if they are incomplete or wrong."""
-        from dorothie_gym.policies.language_model.config import URL_VARIABLE, LanguageModelConfig, SimulatedTime
-
-        url = self.url or os.environ.get(URL_VARIABLE, "")
+        url = self.url or os.environ.get(asked.URL_VARIABLE, "")
         if not url and not self.replay:
-            fail(f"llm:MODEL needs an endpoint: give --llm-url, or set the variable {URL_VARIABLE}")
+            fail(f"llm:MODEL needs an endpoint: give --llm-url, or set the variable {asked.URL_VARIABLE}")
         try:
-            return LanguageModelConfig(
+            return asked.LanguageModelConfig(
                 model="MODEL",
                 url=url,
                 timeout=self.timeout,
                 max_tokens=self.tokens,
-                time=SimulatedTime(self.time.value),
+                time=asked.SimulatedTime(self.time.value),
                 pictures=self.pictures,
                 cassette=self.cassette,
                 offline=self.replay,

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from dorothie_gym import maps as town_maps
 from dorothie_gym.cli.completion import complete_policy
-from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray
+from dorothie_gym.cli.language_model import AnswerTime, LanguageModelOptions
+from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, env_config, find_cast
 from dorothie_gym.cli.output import (
     FAILED,
     check_file,
@@ -21,10 +23,11 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
-
-if TYPE_CHECKING:
-    from dorothie_gym.evaluation.closed_loop.leaderboard import LeaderboardEntry
-    from dorothie_gym.evaluation.closed_loop.leaderboard_rows import LeaderboardPlan
+from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ProcessError, RolloutError
+from dorothie_gym.evaluation import closed_loop
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.support.processors import available_processors
 
 PAGE = Path("leaderboard.md")
 """Default page of the leaderboard, in the present folder."""
@@ -89,10 +92,6 @@ def leaderboard(
     nothing has checked is marked as claimed.
     """
     with reporting_errors():
-        from dorothie_gym.errors import RolloutError
-        from dorothie_gym.evaluation.closed_loop.leaderboard import figures_sha256, leaderboard_page, read_entries
-        from dorothie_gym.evaluation.closed_loop.leaderboard_chart import draw_leaderboard
-
         if out.suffix != ".md":
             fail(f"{out}: the page is Markdown; give a name that ends in .md")
         check_file(out)
@@ -103,28 +102,28 @@ def leaderboard(
             _check_weights(plan, folders[0])
             _play(plan, folders[0], workers, ray, quiet=as_json)
         try:
-            entries = read_entries(folders)
+            entries = closed_loop.read_entries(folders)
         except RolloutError as error:
             fail(str(error))
         if check:
             entries = _checked(entries, workers, quiet=as_json)
-        picture = draw_leaderboard(entries, out.with_suffix(".png"))
+        picture = closed_loop.draw_leaderboard(entries, out.with_suffix(".png"))
         definitions = DEFINITIONS if (out.parent / DEFINITIONS).is_file() else None
-        out.write_text(leaderboard_page(entries, picture.name, definitions), encoding="utf-8")
+        out.write_text(closed_loop.leaderboard_page(entries, picture.name, definitions), encoding="utf-8")
     if as_json:
         rows = [
             {"policy": entry.policy, "towns": entry.part, "claims": list(entry.claims), **entry.table.to_json()}
             for entry in entries
         ]
-        print_json({"page": str(out), "picture": str(picture), "sha256": figures_sha256(entries), "rows": rows})
+        print_json(
+            {"page": str(out), "picture": str(picture), "sha256": closed_loop.figures_sha256(entries), "rows": rows}
+        )
         return
     _print(entries, out, picture)
 
 
-def _print(entries: Sequence[LeaderboardEntry], out: Path, picture: Path) -> None:
-    from dorothie_gym.evaluation.closed_loop.leaderboard import labels_of
-
-    console, labels = stdout(), labels_of(entries)
+def _print(entries: Sequence[closed_loop.LeaderboardEntry], out: Path, picture: Path) -> None:
+    console, labels = stdout(), closed_loop.labels_of(entries)
     for entry in entries:
         success = entry.table.figures["success"]["mean"]
         share = "-" if success is None else f"{100 * success:.1f} %"
@@ -133,18 +132,16 @@ def _print(entries: Sequence[LeaderboardEntry], out: Path, picture: Path) -> Non
     console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)
 
 
-def _checked(entries: Sequence[LeaderboardEntry], workers: int | None, *, quiet: bool) -> tuple[LeaderboardEntry, ...]:
+def _checked(
+    entries: Sequence[closed_loop.LeaderboardEntry], workers: int | None, *, quiet: bool
+) -> tuple[closed_loop.LeaderboardEntry, ...]:
     """Returns the rollouts with the outcome of their check; exits if one has faults."""
-    from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.errors import ProcessError, RolloutError
     from dorothie_gym.evaluation.closed_loop import submission
-    from dorothie_gym.evaluation.closed_loop.leaderboard import checked_entries
-    from dorothie_gym.support.processors import available_processors
 
     try:
         compile_first(pictures=False)
         with session_progress(quiet=quiet) as on_session:
-            return checked_entries(
+            return closed_loop.checked_entries(
                 entries, submission.PROTOCOL, workers=workers or available_processors(), on_session=on_session
             )
     except KeyboardInterrupt:
@@ -155,16 +152,10 @@ def _checked(entries: Sequence[LeaderboardEntry], workers: int | None, *, quiet:
 
 def _plan(
     row: list[str] | None, parts: str, imported: list[str], sessions: int, max_seconds: float | None
-) -> LeaderboardPlan:
+) -> closed_loop.LeaderboardPlan:
     """Returns the rollouts to be played; exits if a name or file is unknown."""
-    from dorothie_gym.cli.language_model import AnswerTime, LanguageModelOptions
-    from dorothie_gym.cli.options import env_config, find_cast
-    from dorothie_gym.evaluation.closed_loop.leaderboard_rows import LeaderboardPlan, usual_rows
-    from dorothie_gym.maps.catalogue import load_town
-    from dorothie_gym.ontology.roles import Role
-
     for file in imported:
-        load_town(file)
+        town_maps.load_town(file)
     asked = LanguageModelOptions(
         url=None,
         timeout=30.0,
@@ -175,10 +166,10 @@ def _plan(
         replay=False,
         prices=None,
     )
-    names = row or list(usual_rows())
+    names = row or list(closed_loop.usual_rows())
     players = [find_cast("scripted", name, "scripted", asked)[Role.CO_WIZARD] for name in names]
     try:
-        return LeaderboardPlan(
+        return closed_loop.LeaderboardPlan(
             co_wizards=players,
             parts=tuple(part.strip() for part in parts.split(",") if part.strip()),
             imported=tuple(imported),
@@ -189,10 +180,8 @@ def _plan(
         fail(str(error))
 
 
-def _check_weights(plan: LeaderboardPlan, folder: Path) -> None:
+def _check_weights(plan: closed_loop.LeaderboardPlan, folder: Path) -> None:
     """Exits if the folder has a row of a planned model with other weights: the page could not have both."""
-    from dorothie_gym.ontology.roles import Role
-
     for name, settings in plan.rollouts().items():
         player = settings.cast[Role.CO_WIZARD]
         if player.sha256 is None:
@@ -206,16 +195,13 @@ def _check_weights(plan: LeaderboardPlan, folder: Path) -> None:
             fail(f"{found}: sessions of other weights of {player.name}; move or delete them, or choose another folder")
 
 
-def _play(plan: LeaderboardPlan, folder: Path, workers: int | None, ray: str | None, *, quiet: bool) -> None:
-    from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.errors import ProcessError
-    from dorothie_gym.evaluation.closed_loop.many_rollouts import roll_out_all
-    from dorothie_gym.support.processors import available_processors
-
+def _play(
+    plan: closed_loop.LeaderboardPlan, folder: Path, workers: int | None, ray: str | None, *, quiet: bool
+) -> None:
     try:
         compile_first(pictures=False)
         with session_progress(quiet=quiet) as on_session:
-            roll_out_all(
+            closed_loop.roll_out_all(
                 plan.rollouts(), folder, workers=workers or available_processors(), ray=ray, on_session=on_session
             )
     except KeyboardInterrupt:

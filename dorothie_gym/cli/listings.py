@@ -6,18 +6,20 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 from rich.table import Table
 
+from dorothie_gym import maps as town_maps
+from dorothie_gym import pictures as drawing
+from dorothie_gym import policies as players
+from dorothie_gym import tasks
+from dorothie_gym._registration import environments
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
 from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology.roles import AGENT_ROLES
-
-if TYPE_CHECKING:
-    from dorothie_gym.maps.lint.fault import Fault
 
 FAULTY = 1
 """Exit code for a town that has faults."""
@@ -48,17 +50,12 @@ def towns(
     if picture is not None:
         check_picture(picture)
     with reporting_errors():
-        from dorothie_gym.maps.catalogue import describe, fold_of, load_town
-        from dorothie_gym.maps.lint import check_town
-
-        loaded = load_town(town)
-        facts = describe(loaded)
-        faults = check_town(loaded) if check else ()
+        loaded = town_maps.load_town(town)
+        facts = town_maps.describe(loaded)
+        faults = town_maps.check_town(loaded) if check else ()
         if picture is not None:
-            from dorothie_gym.pictures.maps.map_sheet import town_picture
-
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
-                town_picture(loaded, picture, fold=fold_of(loaded.name))
+                drawing.town_picture(loaded, picture, fold=town_maps.fold_of(loaded.name))
     if as_json:
         print_json({"town": loaded.name, "faults": [_fault_row(fault) for fault in faults]} if check else facts)
     else:
@@ -76,9 +73,10 @@ def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
     with reporting_errors():
-        from dorothie_gym.maps.catalogue import describe, fold_of, load_town, town_names
-
-        rows = [{**describe(load_town(name)), "fold": fold_of(name)} for name in town_names()]
+        rows = [
+            {**town_maps.describe(town_maps.load_town(name)), "fold": town_maps.fold_of(name)}
+            for name in town_maps.town_names()
+        ]
     print_json(rows) if as_json else _show_towns(rows)
 
 
@@ -87,9 +85,7 @@ def storyboards(
 ) -> None:
     """List the shipped storyboards, with their stories as templates."""
     with reporting_errors():
-        from dorothie_gym.tasks.parsing import load_template, template_names
-
-        templates = [load_template(name) for name in template_names()]
+        templates = [tasks.load_template(name) for name in tasks.template_names()]
     if as_json:
         print_json([{"name": t.name, "subgoals": len(t.subgoals), "story": t.story} for t in templates])
         return
@@ -106,8 +102,6 @@ def envs(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """List the environments, with the call that makes each."""
-    from dorothie_gym._registration import environments
-
     rows = [{"id": env.id, "api": env.api, "description": env.description, "make": env.call} for env in environments()]
     if as_json:
         print_json(rows)
@@ -164,22 +158,19 @@ def policies(
 
 def _policy_rows() -> list[Facts]:
     """Returns the policies with their roles; shipped models with their cards."""
-    from dorothie_gym.policies.policy_loader import policy_names
-    from dorothie_gym.policies.pretrained import pretrained_card, pretrained_names, pretrained_size
-
     roles: dict[str, list[str]] = {}
     for role in AGENT_ROLES:
-        for name in policy_names(role):
+        for name in players.policy_names(role):
             roles.setdefault(name, []).append(str(role))
     rows = []
     for name, played in roles.items():
         row: Facts = {"name": name, "roles": played, "description": _DESCRIPTIONS.get(name, "")}
         row |= {"bytes": None, "training": [], "validation": None}
-        if name in pretrained_names():
-            card = pretrained_card(name)
+        if name in players.pretrained_names():
+            card = players.pretrained_card(name)
             validation = {"command": card.rollout, "sessions": card.sessions}
             validation |= {key: asdict(figure) for key, figure in card.figures.items()}
-            row |= {"description": card.description, "bytes": pretrained_size(name)}
+            row |= {"description": card.description, "bytes": players.pretrained_size(name)}
             row |= {"training": list(card.commands), "validation": validation}
         rows.append(row)
     return rows
@@ -234,7 +225,7 @@ def _show_town(facts: Facts) -> None:
     console.print(table)
 
 
-def _show_faults(facts: Facts, faults: Sequence[Fault]) -> None:
+def _show_faults(facts: Facts, faults: Sequence[town_maps.Fault]) -> None:
     """Prints a line per fault with kind, position and message, or a summary without faults."""
     console = stdout()
     for fault in faults:
@@ -252,7 +243,7 @@ def _show_faults(facts: Facts, faults: Sequence[Fault]) -> None:
         console.print(f"{facts['name']}: no faults: {numbers}, {more}", markup=False)
 
 
-def _fault_row(fault: Fault) -> Facts:
+def _fault_row(fault: town_maps.Fault) -> Facts:
     x, y = fault.position
     return {
         "kind": str(fault.kind),

@@ -211,20 +211,20 @@ class LiveShow:
 
     def __call__(self, engine: SessionEngine) -> None:
         """Shows the events of the last decision."""
-        if self._begun is None:
-            self._begun = time.perf_counter()
+        begun = self._begun
+        if begun is None:
+            begun = self._begun = time.perf_counter()
             self._console.print(_opening(engine.session, self._console, self._width))
         lines = script_lines(engine.last_events, engine.session.task.description)
         if lines:
             self._console.print(_script(lines, self._width))
         if self._live is not None:
-            self._live.update(self._standing(engine))
+            self._live.update(self._standing(engine, begun))
 
-    def _standing(self, engine: SessionEngine) -> RenderableType:
-        assert self._begun is not None
+    def _standing(self, engine: SessionEngine, begun: float) -> RenderableType:
         task, seconds = engine.session.task, engine.session.world.time
         apart = sum(each.seconds for each in (self._film, self._pace) if each is not None)
-        wall = max(time.perf_counter() - self._begun - apart, 1e-6)
+        wall = max(time.perf_counter() - begun - apart, 1e-6)
         reached = sum(task.reached(i) for i in task.live)
         bar = Table.grid(padding=(0, 1))
         bar.add_row(

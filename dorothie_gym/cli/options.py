@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from dorothie_gym import policies as players
 from dorothie_gym.cli.completion import complete_policy, complete_storyboard, complete_town
 from dorothie_gym.cli.output import exit_interrupted, fail
+from dorothie_gym.errors import PolicyLoadError, SpeechError
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.session import spaces
 from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.support.interruption import message, raising_interrupts
+from dorothie_gym.support.optional_modules import check_installed
 from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.language_model import LanguageModelOptions
-    from dorothie_gym.ontology.roles import Role
-    from dorothie_gym.policies.policy_loader import Player
     from dorothie_gym.session.config import EnvConfig
 
 
@@ -149,9 +152,6 @@ def env_config(
     if speech and word_errors is not None:
         fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")
     if speech:
-        from dorothie_gym.errors import SpeechError
-        from dorothie_gym.support.optional_modules import check_installed
-
         try:
             check_installed()
         except SpeechError as error:
@@ -172,7 +172,7 @@ def env_config(
 
 def find_cast(
     participant: str, co_wizard: str, ad_wizard: str, language_model: LanguageModelOptions
-) -> dict[Role, Player]:
+) -> dict[Role, players.Player]:
     """Returns the player of each role; exits if a name or file is unknown.
 
     Args:
@@ -181,15 +181,11 @@ def find_cast(
         ad_wizard: as for the participant.
         language_model: options of the policies `llm:MODEL`.
     """
-    from dorothie_gym.errors import PolicyLoadError
-    from dorothie_gym.ontology.roles import AGENT_ROLES
-    from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, find_player
-
     given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
-    asks = any(name.startswith(LANGUAGE_MODEL) for name in given.values())
+    asks = any(name.startswith(players.LANGUAGE_MODEL) for name in given.values())
     config = language_model.config() if asks else None
     try:
-        cast = {role: find_player(name, role, config) for role, name in given.items()}
+        cast = {role: players.find_player(name, role, config) for role, name in given.items()}
     except PolicyLoadError as error:
         fail(str(error))
     for role, player in cast.items():
@@ -198,12 +194,10 @@ def find_cast(
     return cast
 
 
-def _check_loads(player: Player, role: Role) -> None:
+def _check_loads(player: players.Player, role: Role) -> None:
     """Makes a policy once, so that a damaged file or a missing package is reported before the first session."""
-    from dorothie_gym.session.spaces.limits import SpaceLimits
-
     try:
-        player.make(role, SpaceLimits())
+        player.make(role, spaces.SpaceLimits())
     except ValueError as error:
         fail(f"{role}: {error}")
 

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeAlias
 import typer
 from rich.console import Console
 
-from dorothie_gym.errors import SpeechError, one_line
+from dorothie_gym.errors import DorothieGymError, OutputFolderError, SpeechError, one_line
 from dorothie_gym.support.interruption import exit_code
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
 
 Facts: TypeAlias = dict[str, Any]
 """Fields of a JSON object that a command prints, or of a row of its table; the command knows the type of each."""
@@ -99,8 +100,6 @@ def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
 @contextmanager
 def reporting_errors() -> Iterator[None]:
     """Turns errors into one message and exit code 2, or 1 if the disk is full or the output was deleted meanwhile."""
-    from dorothie_gym.errors import DorothieGymError, OutputFolderError
-
     try:
         yield
     except OutputFolderError as error:

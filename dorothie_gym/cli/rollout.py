@@ -6,7 +6,7 @@ import shlex
 import shutil
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -47,12 +47,10 @@ from dorothie_gym.cli.output import (
     wide_stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.support.processors import available_processors
-
-if TYPE_CHECKING:
-    from dorothie_gym.evaluation.closed_loop.results import RolloutResult
-    from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
 
 
 def rollout(
@@ -92,8 +90,6 @@ def rollout(
     The table does not depend on the number of workers. After an interruption it prints the command that resumes.
     """
     with reporting_errors():
-        from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, parse_towns
-
         asked = LanguageModelOptions(
             url=llm_url,
             timeout=llm_timeout,
@@ -106,34 +102,31 @@ def rollout(
         )
         cast = find_cast(participant, co_wizard, ad_wizard, asked)
         try:
-            chosen = parse_towns(towns)
+            chosen = closed_loop.parse_towns(towns)
         except ValueError as error:
             fail(str(error))
         config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures)
-        settings = RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
+        settings = closed_loop.RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
         result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
     if as_json:
         print_json(result.to_json())
         return
-    from dorothie_gym.evaluation.closed_loop.results import print_result
-
     console = wide_stdout()
-    print_result(result, console)
+    closed_loop.print_result(result, console)
     if out is not None:
         console.print(f"Folder for `dorothie-gym replay` and `leaderboard`: {out}", style="dim", soft_wrap=True)
 
 
-def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool) -> RolloutResult:
-    from dorothie_gym.errors import ProcessError
-    from dorothie_gym.evaluation.closed_loop.running import roll_out
-
+def _play(
+    settings: closed_loop.RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool
+) -> closed_loop.RolloutResult:
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
         compile_first(
             pictures=settings.config.perception is PerceptionModel.CAMERA or settings.config.camera is not None
         )
         with session_progress(quiet=quiet) as on_session:
-            result = roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
+            result = closed_loop.roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
     except KeyboardInterrupt:
         _exit_interrupted(folder, settings)
     except ProcessError as error:
@@ -143,12 +136,10 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
     return result
 
 
-def _exit_interrupted(folder: Path, settings: RolloutSettings) -> None:
-    from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, read_result
-    from dorothie_gym.evaluation.closed_loop.running import command_of
-
-    done = len(read_result(folder).rows) if (folder / RESULT_FILE).is_file() else 0
+def _exit_interrupted(folder: Path, settings: closed_loop.RolloutSettings) -> None:
+    done = len(closed_loop.read_result(folder).rows) if (folder / closed_loop.RESULT_FILE).is_file() else 0
+    command = f"{closed_loop.command_of(settings.to_json())} --out {shlex.quote(str(folder))}"
     exit_interrupted(
         f"Interrupted with {done} of {settings.sessions} sessions finished; their results are in "
-        f"{folder / RESULT_FILE}; resume with: {command_of(settings.to_json())} --out {shlex.quote(str(folder))}"
+        f"{folder / closed_loop.RESULT_FILE}; resume with: {command}"
     )

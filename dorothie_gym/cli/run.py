@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dorothie_gym import pictures as drawing
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.language_model import (
     AnswerTime,
@@ -49,6 +50,7 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.support.render_view import RenderView
 
@@ -57,6 +59,7 @@ if TYPE_CHECKING:
     from dorothie_gym.cli.live import Pace
     from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.session_log import SessionSummary
+
 
 PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
@@ -182,7 +185,6 @@ def _check_outputs(plan: _Plan) -> None:
 
 def _play(plan: _Plan, *, quiet: bool) -> Facts:
     """Plays the session and returns what --json writes."""
-    from dorothie_gym.evaluation.rollout.play import play_session
     from dorothie_gym.session.session_engine import SessionEngine
 
     cast = find_cast(*plan.players, plan.language_model)
@@ -207,12 +209,12 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
                 watcher(engine)
 
         try:
-            ending = play_session(engine, policies, seed=plan.seed, folder=plan.out, on_step=watch)
+            ending = rollouts.play_session(engine, policies, seed=plan.seed, folder=plan.out, on_step=watch)
         except KeyboardInterrupt:
             stack.close()
             _exit_interrupted(engine, plan)
-    drawing, waiting = film.seconds if film is not None else 0.0, pace.seconds if pace is not None else 0.0
-    wall = time.perf_counter() - begun - drawing - waiting
+    filming, waiting = film.seconds if film is not None else 0.0, pace.seconds if pace is not None else 0.0
+    wall = time.perf_counter() - begun - filming - waiting
     if plan.picture is not None:
         draw_session(engine, plan.picture)
     return _facts(engine, ending, wall, plan.out)
@@ -252,12 +254,11 @@ def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
 
 def draw_session(engine: SessionEngine, path: Path) -> None:
     """Draws the whole town at the end of the session, with route and dialogue."""
-    from dorothie_gym.pictures.views.frames import PICTURE_SIZE, SceneRenderer
-    from dorothie_gym.pictures.views.session_scene import scene_of
-
     scenario = engine.scenario
     caption = f"{engine.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"
-    SceneRenderer(PICTURE_SIZE, transcript=True).save(scene_of(engine.session, caption), path, follow=False)
+    drawing.SceneRenderer(drawing.PICTURE_SIZE, transcript=True).save(
+        drawing.scene_of(engine.session, caption), path, follow=False
+    )
 
 
 def _facts(engine: SessionEngine, ending: SessionSummary, wall: float, out: Path | None) -> Facts:

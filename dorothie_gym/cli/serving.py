@@ -17,6 +17,7 @@ from dorothie_gym.cli.output import fail
 if TYPE_CHECKING:
     from starlette.applications import Starlette
 
+
 LOCAL = "127.0.0.1"
 """Address that is reached from this machine only."""
 

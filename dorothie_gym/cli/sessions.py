@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dorothie_gym import archive
+from dorothie_gym import pictures as drawing
+from dorothie_gym._version import __version__
 from dorothie_gym.cli.options import AsJson, Maps, Players, SessionTown, View, needs
 from dorothie_gym.cli.output import (
     Facts,
@@ -22,6 +25,9 @@ from dorothie_gym.cli.output import (
     stdout,
     video_writer,
 )
+from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.evaluation import rollout as rollouts
+from dorothie_gym.pictures import camera
 from dorothie_gym.support.processors import available_processors
 from dorothie_gym.support.render_view import RenderView
 
@@ -29,10 +35,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dorothie_gym.archive.comparison import Difference
-    from dorothie_gym.evaluation.rollout.replay import ReplayCheck, ReplaySources
-    from dorothie_gym.pictures.views.playback import Playback
     from dorothie_gym.session.recording.session import Session
+
 
 DIFFERENT = 1
 """Exit code where a session differs from its replay, or from another session."""
@@ -70,9 +74,7 @@ def replay(
         fail("--check and --video exclude each other; give one of them")
     if video is not None:
         check_video(video)
-    from dorothie_gym.evaluation.rollout.replay import ReplaySources
-
-    sources = ReplaySources(town=town, maps=maps, storyboard=storyboard)
+    sources = rollouts.ReplaySources(town=town, maps=maps, storyboard=storyboard)
     with reporting_errors():
         if check:
             _check(path, sources, workers, as_json=as_json)
@@ -80,13 +82,10 @@ def replay(
             _play_back(path, sources, fps, video, as_json=as_json)
 
 
-def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: bool) -> None:
-    from dorothie_gym.archive.corpus import Corpus
-    from dorothie_gym.evaluation.rollout.replay import check_replays
-
+def _check(path: Path, sources: rollouts.ReplaySources, workers: int | None, *, as_json: bool) -> None:
     checks = []
-    for check in check_replays(
-        Corpus.load(path, maps=sources.maps).entries, sources, workers=workers or available_processors()
+    for check in rollouts.check_replays(
+        archive.Corpus.load(path, maps=sources.maps).entries, sources, workers=workers or available_processors()
     ):
         checks.append(check)
         if not as_json:
@@ -100,9 +99,7 @@ def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: 
         raise typer.Exit(DIFFERENT)
 
 
-def _check_line(check: ReplayCheck) -> str:
-    from dorothie_gym._version import __version__
-
+def _check_line(check: rollouts.ReplayCheck) -> str:
     found = check.difference
     if found is None:
         until = "" if check.complete else ", as far as it was recorded"
@@ -116,12 +113,9 @@ def _check_line(check: ReplayCheck) -> str:
     return text
 
 
-def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.archive.corpus import read_session
-    from dorothie_gym.pictures.views.playback import Playback
-
-    session = read_session(path, maps=sources.maps)
-    playback = Playback(session, sources.town_of(session))
+def _play_back(path: Path, sources: rollouts.ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
+    session = archive.read_session(path, maps=sources.maps)
+    playback = drawing.Playback(session, sources.town_of(session))
     shown = _write_video(playback, fps, video) if video is not None else _show_window(playback, fps)
     facts = {
         "session": session.name,
@@ -140,10 +134,8 @@ def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | Non
         )
 
 
-def _write_video(playback: Playback, fps: float, video: Path) -> int:
-    from dorothie_gym.pictures.views.frames import SceneRenderer
-
-    renderer = SceneRenderer()
+def _write_video(playback: drawing.Playback, fps: float, video: Path) -> int:
+    renderer = drawing.SceneRenderer()
     return _write(video, fps, (renderer.draw(scene) for scene in playback.scenes(fps)), playback.count(fps))
 
 
@@ -177,12 +169,10 @@ def _write(video: Path, fps: float, frames: Iterable[NDArray[np.uint8]], count: 
     return shown
 
 
-def _show_window(playback: Playback, fps: float) -> int:
-    from dorothie_gym.pictures.views.frames import HumanWindow, SceneRenderer
-
-    renderer = SceneRenderer()
+def _show_window(playback: drawing.Playback, fps: float) -> int:
+    renderer = drawing.SceneRenderer()
     try:
-        window = HumanWindow(renderer.size, "dorothie_gym")
+        window = drawing.HumanWindow(renderer.size, "dorothie_gym")
     except RuntimeError:
         fail("no window can be opened here; write a video instead: --video FILE.mp4")
     shown = 0
@@ -223,10 +213,8 @@ def film(
     A spoken session is filmed with its sound.
     """
     check_video(out)
-    from dorothie_gym.evaluation.rollout.replay import ReplaySources
-
     with reporting_errors():
-        facts = _film(path, ReplaySources(town=town, maps=maps), out, view, fps)
+        facts = _film(path, rollouts.ReplaySources(town=town, maps=maps), out, view, fps)
     if as_json:
         print_json(facts)
     else:
@@ -235,25 +223,20 @@ def film(
         stdout().print(line, markup=False, soft_wrap=True)
 
 
-def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: float) -> Facts:
-    from dorothie_gym.archive.corpus import read_session
-    from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.pictures.views.playback import Playback
-    from dorothie_gym.pictures.views.session_views import SessionRenderer
+def _film(path: Path, sources: rollouts.ReplaySources, out: Path, view: RenderView, fps: float) -> Facts:
     from dorothie_gym.sim.config import FRAME_RATE
 
-    session = read_session(path, maps=sources.maps)
-    town, renderer = sources.town_of(session), SessionRenderer(view)
-    playback, size = Playback(session, town), renderer.windscreen
+    session = archive.read_session(path, maps=sources.maps)
+    town, renderer = sources.town_of(session), drawing.SessionRenderer(view)
+    playback, size = drawing.Playback(session, town), renderer.windscreen
     if size is None:
         frames: Iterable[NDArray[np.uint8]] = (renderer.draw(scene) for scene in playback.scenes(fps))
         count, first = playback.count(fps), playback.first_frame
     else:
-        from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
+        compile_first(pictures=True)
         from dorothie_gym.session.camera_config import CameraConfig
 
-        compile_first(pictures=True)
-        pictures = RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
+        pictures = camera.RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
         frames = (renderer.draw(playback.scene(frame), taken.rgb) for frame, taken in pictures.pictures(fps))
         taken_at = pictures.frames(fps)
         count, first, fps = len(taken_at), taken_at.start, FRAME_RATE / taken_at.step
@@ -276,12 +259,11 @@ def _sound_file(session: Session, start: float, seconds: float) -> Iterator[Path
     if not session.audio:
         yield None
         return
-    from dorothie_gym.archive.sound import sound_track
     from dorothie_gym.support.audio import encode_wav
 
     with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
         file = Path(folder) / "sound.wav"
-        file.write_bytes(encode_wav(sound_track(session, start, seconds)))
+        file.write_bytes(encode_wav(archive.sound_track(session, start, seconds)))
         yield file
 
 
@@ -297,11 +279,9 @@ def compare(
 
     Sessions of folders are compared with those of the same path. The exit code is 1 if any of them differs.
     """
-    from dorothie_gym.archive.comparison import compare_folders
-
-    rows: list[tuple[str, Difference | None]] = []
+    rows: list[tuple[str, archive.Difference | None]] = []
     with reporting_errors():
-        for name, difference in compare_folders(first, second):
+        for name, difference in archive.compare_folders(first, second):
             rows.append((name, difference))
             if not as_json:
                 stdout().print(f"{name}: {_difference_line(difference)}", markup=False, soft_wrap=True)
@@ -317,7 +297,7 @@ def compare(
         raise typer.Exit(DIFFERENT)
 
 
-def _difference_line(difference: Difference | None) -> str:
+def _difference_line(difference: archive.Difference | None) -> str:
     if difference is None:
         return "equal"
     if difference.field == "session":  # one of the two folders has no such session
@@ -326,7 +306,7 @@ def _difference_line(difference: Difference | None) -> str:
     return f"differs first {when}, {difference.field}: {difference.recorded} and {difference.replayed}"
 
 
-def _difference_page(difference: Difference | None) -> dict[str, int | str] | None:
+def _difference_page(difference: archive.Difference | None) -> dict[str, int | str] | None:
     if difference is None:
         return None
     return {

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from dorothie_gym import archive
 from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import FAILED, check_file, fail, reporting_errors, stdout
+from dorothie_gym.evaluation import analysis
 
 if TYPE_CHECKING:
     from dorothie_gym.support.audio import Samples
+
 
 PLAYERS: Final[Sequence[Sequence[str]]] = (
     ("pw-play",),
@@ -53,10 +56,7 @@ def show(
         _play(session, play, out, maps)
         return
     with reporting_errors():
-        from dorothie_gym.archive.corpus import read_session
-        from dorothie_gym.evaluation.analysis.transcript import markdown
-
-        page = "\n".join(markdown(read_session(path, maps=maps)) for path in session)
+        page = "\n".join(analysis.markdown(archive.read_session(path, maps=maps)) for path in session)
         if out is not None:
             out.write_text(page, encoding="utf-8", newline="\n")
         else:
@@ -74,12 +74,10 @@ def _play(sessions: Sequence[Path], wanted: str, out: Path | None, maps: Path | 
             fail(f"{out}: sound is written as WAV; give a name that ends in .wav")
         check_file(out)
     with reporting_errors():
-        from dorothie_gym.archive.corpus import read_session
-        from dorothie_gym.archive.sound import utterance_audio
         from dorothie_gym.support.audio import encode_wav
 
         number, span = int(found[1]), None if found[2] is None else int(found[2])
-        samples = utterance_audio(read_session(sessions[0], maps=maps), number, span)
+        samples = archive.utterance_audio(archive.read_session(sessions[0], maps=maps), number, span)
         if out is not None:
             out.write_bytes(encode_wav(samples))
             return

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.table import Table
 
 from dorothie_gym.cli.output import Facts, print_json, session_progress, wide_stdout
+from dorothie_gym.evaluation import analysis
 
 if TYPE_CHECKING:
     from dorothie_gym.archive.corpus import Corpus
+
 
 _SHARES: Final = (
     ("somebody speaks, share of the time", "speech_share"),
@@ -23,10 +25,8 @@ _ERRORS: Final = (("speaker", "by_speaker"), ("noise", "by_noise"), ("word", "by
 
 def show_speech(corpus: Corpus, *, as_json: bool) -> None:
     """Prints the statistics of a corpus."""
-    from dorothie_gym.evaluation.analysis.speech_stats import speech_stats_of
-
     with session_progress(quiet=as_json) as on_session:
-        figures: Facts = speech_stats_of(corpus, on_session).to_json()
+        figures: Facts = analysis.speech_stats_of(corpus, on_session).to_json()
     if as_json:
         print_json(figures)
         return
@@ -88,14 +88,12 @@ def _errors(figures: Facts) -> Table | None:
 
 
 def _published(figures: Facts) -> Table:
-    from dorothie_gym.evaluation.analysis.speech_stats import figure_at
-
     shown = Table(box=None, pad_edge=False)
     for title in ("published", "there", "here"):
         shown.add_column(title, justify="left" if title == "published" else "right", no_wrap=title != "published")
     shown.add_column("source")
     for row in figures["published"]:
-        here = figure_at(figures, row["figure"])
+        here = analysis.figure_at(figures, row["figure"])
         name = (
             row["figure"].removeprefix("recognition.").replace(".quantiles.0.5", ", median").replace(".mean", ", mean")
         )

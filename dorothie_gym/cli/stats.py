@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from dorothie_gym import archive
 from dorothie_gym.cli.options import OWN_NAME, AsJson, Maps
 from dorothie_gym.cli.output import (
     Facts,
@@ -21,9 +22,8 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.speech_table import show_speech
-
-if TYPE_CHECKING:
-    from dorothie_gym.archive.corpus import Corpus
+from dorothie_gym.evaluation import analysis
+from dorothie_gym.evaluation.analysis import truth_checks
 
 PICTURE = Path("statistics.png")
 """Default file of `--picture`."""
@@ -99,13 +99,12 @@ def stats(
         picture = PICTURE if picture == Path(OWN_NAME) else picture
         check_picture(picture)
     with reporting_errors():
-        from dorothie_gym.archive.corpus import Corpus
-
         if kappa is not None:
             _kappa(*kappa, maps, as_json=as_json)
             return
-        assert folder is not None
-        corpus = Corpus.load(folder, maps=maps)
+        if folder is None:
+            fail("give a corpus, a folder of sessions, or one session: dorothie-gym stats DIR")
+        corpus = archive.Corpus.load(folder, maps=maps)
         if check:
             _check(corpus, as_json=as_json)
         elif phenomena:
@@ -127,21 +126,15 @@ def _check_choice(folder: Path | None, kappa: object, **chosen: bool) -> None:
         fail(f"{' and '.join(given)} exclude each other; give one of them")
     if kappa is not None and folder is not None:
         fail(f"{folder}: --kappa compares the two sessions that follow it; omit the folder")
-    if kappa is None and folder is None:
-        fail("give a corpus, a folder of sessions, or one session: dorothie-gym stats DIR")
 
 
 # --- table 2 --------------------------------------------------------------------------------------------------------
 
 
-def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.evaluation.analysis.corpus_stats import corpus_stats_of
-
-    census = corpus_stats_of(corpus)
+def _count(corpus: archive.Corpus, picture: Path | None, *, as_json: bool) -> None:
+    census = analysis.corpus_stats_of(corpus)
     if picture is not None:
-        from dorothie_gym.evaluation.analysis.profiles import draw_profiles
-
-        draw_profiles(census.profiles, census.counts.heading, corpus.root.resolve().name, picture)
+        analysis.draw_profiles(census.profiles, census.counts.heading, corpus.root.resolve().name, picture)
     table = census.to_json()
     if as_json:
         print_json(table)
@@ -161,16 +154,14 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
 
 
 def _table2(table: Facts) -> Table:
-    from dorothie_gym.evaluation.analysis.corpus_stats import PAPER
-
     shown = Table(box=None, pad_edge=False)
     for title in ("", "here", "paper", "per session here", "in the paper"):
         shown.add_column(title, justify="right" if title else "left", no_wrap=True)
     for title, key in _ROWS:
-        mine, paper = table[key], PAPER[key]
+        mine, paper = table[key], analysis.PAPER[key]
         row = [title, _figure(mine), _figure(paper)]
         if key not in _NOT_PER_SESSION:
-            row += [_per_session(mine, table["sessions"], key), _per_session(paper, PAPER["sessions"], key)]
+            row += [_per_session(mine, table["sessions"], key), _per_session(paper, analysis.PAPER["sessions"], key)]
         shown.add_row(*row)
     return shown
 
@@ -187,19 +178,15 @@ def _per_session(value: float, sessions: float, key: str) -> str:
 
 
 def _folds(folds: Mapping[str, int]) -> Table:
-    from dorothie_gym.archive.corpus import PAPER_FOLDS
-
     shown = Table(box=None, pad_edge=False)
     for title in ("fold", "sessions", "paper"):
         shown.add_column(title, justify="left" if title == "fold" else "right")
-    for fold, paper in PAPER_FOLDS.items():
+    for fold, paper in archive.PAPER_FOLDS.items():
         shown.add_row(fold.value, str(folds.get(fold.value, 0)), str(paper))
     return shown
 
 
 def _anchors(anchors: Facts) -> Table:
-    from dorothie_gym.evaluation.analysis.corpus_stats import ANCHOR_TOLERANCE
-
     shown = Table(box=None, pad_edge=False)
     for title in ("majority baselines", "here", "allowed", "paper", "unseen"):
         shown.add_column(title, justify="left" if title.startswith("majority") else "right", no_wrap=True)
@@ -209,7 +196,8 @@ def _anchors(anchors: Facts) -> Table:
         note = row.get("label") or ""
         if row["within"] is False:
             note += f"{', ' if note else ''}out of range"
-        allowed = f"{100 * (row['paper'] - ANCHOR_TOLERANCE):.1f} to {100 * (row['paper'] + ANCHOR_TOLERANCE):.1f} %"
+        low, high = row["paper"] - analysis.ANCHOR_TOLERANCE, row["paper"] + analysis.ANCHOR_TOLERANCE
+        allowed = f"{100 * low:.1f} to {100 * high:.1f} %"
         shown.add_row(
             title, _percent(row["share"]), allowed, _percent(row["paper"]), _percent(row["paper_unseen"]), note
         )
@@ -217,8 +205,6 @@ def _anchors(anchors: Facts) -> Table:
 
 
 def _diversity(diversity: Facts) -> Table:
-    from dorothie_gym.evaluation.analysis.diversity import has_language_models
-
     shown = Table(box=None, pad_edge=False)
     shown.add_column("diversity of the dialogue")
     shown.add_column("", justify="right")
@@ -228,7 +214,7 @@ def _diversity(diversity: Facts) -> Table:
     note = "" if commonest is None else f'"{commonest}"'
     shown.add_row("commonest utterance", _percent(diversity["commonest_utterance_share"]), note)
     perplexity = diversity["perplexity"]
-    lacking = "" if has_language_models() else "needs nltk: pip install 'dorothie-gym[statistics]'"
+    lacking = "" if analysis.has_language_models() else "needs nltk: pip install 'dorothie-gym[statistics]'"
     note = lacking or ("needs utterances in train and test" if perplexity is None else "")
     shown.add_row("trigram perplexity, train on test", "-" if perplexity is None else f"{perplexity:.1f}", note)
     return shown
@@ -241,10 +227,8 @@ def _percent(share: float | None) -> str:
 # --- phenomena, consistency, agreement ------------------------------------------------------------------------------
 
 
-def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.evaluation.analysis.corpus_stats import phenomena_of
-
-    rows = phenomena_of(corpus)
+def _phenomena(corpus: archive.Corpus, *, as_json: bool) -> None:
+    rows = analysis.phenomena_of(corpus)
     if as_json:
         print_json({"sessions": len(corpus), "phenomena": rows})
         return
@@ -259,11 +243,8 @@ def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
     stdout().print(shown)
 
 
-def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.evaluation.analysis.behaviour import verdicts_of
-    from dorothie_gym.evaluation.analysis.intervals import RESAMPLES
-
-    verdicts = verdicts_of(corpus)
+def _behaviour(corpus: archive.Corpus, *, as_json: bool) -> None:
+    verdicts = analysis.verdicts_of(corpus)
     if as_json:
         print_json({"sessions": len(corpus), "behaviour": [verdict.to_json() for verdict in verdicts]})
         return
@@ -279,15 +260,14 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
     console = stdout()
     console.print(shown)
     console.print(
-        f"{len(corpus)} sessions, drawn {RESAMPLES:,} times; docs/statistics.md defines the comparisons.", style="dim"
+        f"{len(corpus)} sessions, drawn {analysis.RESAMPLES:,} times; docs/statistics.md defines the comparisons.",
+        style="dim",
     )
 
 
-def _talk(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.evaluation.analysis.truth_checks.checks import talk_checks_of
-
+def _talk(corpus: archive.Corpus, *, as_json: bool) -> None:
     with session_progress(quiet=as_json) as on_session:
-        found = talk_checks_of(corpus, on_session)
+        found = truth_checks.talk_checks_of(corpus, on_session)
     if as_json:
         print_json({"sessions": len(corpus), **found.to_json()})
         return
@@ -301,10 +281,8 @@ def _talk(corpus: Corpus, *, as_json: bool) -> None:
     console.print(f"{len(corpus)} sessions; docs/statistics.md defines the figures.", style="dim")
 
 
-def _check(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.evaluation.analysis.corpus_stats import faults_of_corpus
-
-    found = faults_of_corpus(corpus)
+def _check(corpus: archive.Corpus, *, as_json: bool) -> None:
+    found = analysis.faults_of_corpus(corpus)
     faulty = {name: faults for name, faults in found.items() if faults}
     if as_json:
         print_json({"sessions": len(found), "consistent": len(found) - len(faulty), "faults": _listed(faulty)})
@@ -330,10 +308,7 @@ def _show_faults(faulty: Mapping[str, Sequence[str]], sessions: int) -> None:
 
 
 def _kappa(first: Path, second: Path, maps: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.archive.corpus import read_session
-    from dorothie_gym.evaluation.analysis.agreement import agreement
-
-    found = agreement(read_session(first, maps=maps), read_session(second, maps=maps))
+    found = analysis.agreement(archive.read_session(first, maps=maps), archive.read_session(second, maps=maps))
     if as_json:
         print_json({"moves": found.moves, "slots": found.slots, "pieces": found.pieces, "utterances": found.utterances})
         return

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,9 +13,8 @@ from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import FAILED, Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
-
-if TYPE_CHECKING:
-    from dorothie_gym.lab.studies.study import Study
+from dorothie_gym.lab import studies
+from dorothie_gym.support.files import write_atomically
 
 study = typer.Typer(help="Studies with people in the browser, from consent to completion code.", no_args_is_help=True)
 
@@ -32,13 +32,11 @@ def init(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="New file, such as study.yaml.")],
 ) -> None:
     """Write an example study to change: two conditions, consent, instructions, questionnaires, debriefing."""
-    from importlib.resources import files
-
-    from dorothie_gym.support.files import write_atomically
-
     if file.exists():
         fail(f"{file}: exists; give the name of a new file")
     with reporting_errors():
+        from importlib.resources import files
+
         example = files("dorothie_gym.lab.studies") / "data" / "example.yaml"
         write_atomically(file, example.read_text(encoding="utf-8"))
     stdout().print(f"{file} is an example. Change it, then: dorothie-gym study check {file}", soft_wrap=True)
@@ -47,11 +45,9 @@ def init(
 @study.command()
 def check(file: StudyFile, as_json: AsJson = False) -> None:
     """Check a study file, and the towns, storyboards and policies that it names; print the order of conditions."""
-    from dorothie_gym.lab.studies.study_file import check_sources, read_study
-
     with reporting_errors():
-        found = read_study(file)
-        check_sources(found, file)
+        found = studies.read_study(file)
+        studies.check_sources(found, file)
     facts = _facts(found)
     if as_json:
         print_json(facts)
@@ -64,10 +60,8 @@ def check(file: StudyFile, as_json: AsJson = False) -> None:
         screen.print(f"  {number}  {'; '.join(slot)}", soft_wrap=True)
 
 
-def _facts(found: Study) -> Facts:
-    from dorothie_gym.lab.studies.assignment import Assigner
-
-    assigner = Assigner(found)
+def _facts(found: studies.Study) -> Facts:
+    assigner = studies.Assigner(found)
     slots = [assigner.slot(number) for number in range(assigner.block_size)]
     return {
         "title": found.title,
@@ -97,15 +91,11 @@ def run(
     After a crash or Ctrl-C, the same command goes on: people are where they were.
     """
     check_libraries("study run")
-    from dorothie_gym.lab.studies.folder import running_study
-    from dorothie_gym.lab.studies.server import StudyServer
-    from dorothie_gym.lab.studies.study_file import check_sources, read_study
-
     with reporting_errors():
-        check_sources(read_study(file), file)
-    compile_first(pictures=read_study(file).session.pictures)
-    with reporting_errors(), running_study(file, out) as (found, records):
-        server = StudyServer(found, file.parent, records)
+        studies.check_sources(studies.read_study(file), file)
+    compile_first(pictures=studies.read_study(file).session.pictures)
+    with reporting_errors(), studies.running_study(file, out) as (found, records):
+        server = studies.StudyServer(found, file.parent, records)
         listener = listen(host, port)
         link = f"{address(host, listener.getsockname()[1])}/"
         experimenter = f"{link}experimenter#{server.experimenter.token}"
@@ -119,11 +109,9 @@ def run(
         serve(server.app(), listener, host)
 
 
-def _print_links(found: Study, link: str, out: Path) -> None:
-    from dorothie_gym.lab.studies.study import Admission
-
+def _print_links(found: studies.Study, link: str, out: Path) -> None:
     screen, names = stdout(), found.recruitment.parameters
-    if found.recruitment.admission is Admission.INVITED:
+    if found.recruitment.admission is studies.Admission.INVITED:
         screen.print(f"Invitations: dorothie-gym study invite {out} --address {link} --count N", soft_wrap=True)
     else:
         query = "&".join(f"{name}={{{{%{name}%}}}}" for name in names)
@@ -139,14 +127,9 @@ def invite(
     as_json: AsJson = False,
 ) -> None:
     """Print links of which each admits one person once; only their hashes are stored."""
-    import contextlib
-
-    from dorothie_gym.lab.studies.folder import check_folder
-    from dorothie_gym.lab.studies.records import StudyRecords
-
     with reporting_errors():
-        check_folder(folder)
-        with contextlib.closing(StudyRecords(folder)) as records:
+        studies.check_folder(folder)
+        with contextlib.closing(studies.StudyRecords(folder)) as records:
             links = [f"{site.rstrip('/')}/#{token}" for token in records.invite(count)]
     if as_json:
         print_json({"links": links})
@@ -163,18 +146,10 @@ def readmit(
     as_json: AsJson = False,
 ) -> None:
     """Print a link with which a person goes on in another browser, once; the old browser is then shut out."""
-    import contextlib
-
-    from dorothie_gym.lab.studies.entrance import Entrance
-    from dorothie_gym.lab.studies.folder import check_folder
-    from dorothie_gym.lab.studies.record_types import STUDY_FILE
-    from dorothie_gym.lab.studies.records import StudyRecords
-    from dorothie_gym.lab.studies.study_file import read_study
-
     with reporting_errors():
-        check_folder(folder)
-        with contextlib.closing(StudyRecords(folder)) as records:
-            token = Entrance(read_study(folder / STUDY_FILE), records).readmit(participant)
+        studies.check_folder(folder)
+        with contextlib.closing(studies.StudyRecords(folder)) as records:
+            token = studies.Entrance(studies.read_study(folder / studies.STUDY_FILE), records).readmit(participant)
     if token is None:
         fail(f"{folder}: has no participant {participant!r}; give the number or the id of the recruiting platform")
     link = f"{site.rstrip('/')}/#{token}"
@@ -191,10 +166,8 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write pseudonymous tables as CSV, and as Parquet: participants, answers, stages, sessions, utterances."""
-    from dorothie_gym.lab.studies.export import export_study
-
     with reporting_errors():
-        rows = export_study(folder, out)
+        rows = studies.export_study(folder, out)
     if as_json:
         print_json({"folder": str(out), "rows": rows})
     else:
@@ -208,23 +181,18 @@ def delete(
     as_json: AsJson = False,
 ) -> None:
     """Delete everything of a person; the server must be stopped. Exports made before still have the person."""
-    from dorothie_gym.lab.studies.erasure import erase, find_traces, finish_erasures, is_unfinished
-    from dorothie_gym.lab.studies.folder import open_study
-    from dorothie_gym.lab.studies.record_types import STUDY_FILE
-    from dorothie_gym.lab.studies.study_file import read_study
-
-    with reporting_errors(), open_study(folder) as records:
-        unfinished = is_unfinished(records)
-        left = finish_erasures(records)
-        key = next(iter(read_study(folder / STUDY_FILE).recruitment.parameters), None)
+    with reporting_errors(), studies.open_study(folder) as records:
+        unfinished = studies.is_unfinished(records)
+        left = studies.finish_erasures(records)
+        key = next(iter(studies.read_study(folder / studies.STUDY_FILE).recruitment.parameters), None)
         name = records.find_person(participant, key)
         if name is None and not unfinished:
             fail(f"{folder}: has no participant {participant!r}")
         sessions: list[str] = []
         if name is not None:
             ids = [] if key is None else records.platform_ids(name, key)
-            sessions, left = erase(records, name)
-            left += find_traces(records, [name, *ids], sessions)
+            sessions, left = studies.erase(records, name)
+            left += studies.find_traces(records, [name, *ids], sessions)
     _print_deletion(name, sessions, left, as_json)
 
 

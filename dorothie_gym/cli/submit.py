@@ -19,10 +19,15 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
+from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.session import recording
+from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop.submission import SubmissionCheck
+
 
 FAULTY = 1
 """Exit code for a rollout that cannot be submitted."""
@@ -58,15 +63,13 @@ def submit(
         check_file(out)
     with reporting_errors():
         from dorothie_gym.evaluation.closed_loop import submission
-        from dorothie_gym.session.recording.json_io import to_page
-        from dorothie_gym.support.files import write_atomically
 
         found = _check(folder, None if sample == ALL else int(sample), seed, workers, quiet=as_json)
         faults = found.faults
         if found.submission is not None and check is not None:
             faults = submission.differences_from(check, found.submission)
         elif found.submission is not None:
-            write_atomically(out, to_page(found.submission))
+            write_atomically(out, recording.to_page(found.submission))
     written = None if faults or check is not None else str(out)
     if as_json:
         print_json(
@@ -87,8 +90,6 @@ def submit(
 
 
 def _check(folder: Path, sample: int | None, seed: int | None, workers: int | None, *, quiet: bool) -> SubmissionCheck:
-    from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.errors import ProcessError
     from dorothie_gym.evaluation.closed_loop import submission
 
     try:

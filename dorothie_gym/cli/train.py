@@ -25,6 +25,10 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.train_roles import ROLES, train_role
 from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
+from dorothie_gym.errors import CacheError, CheckpointError, EncoderError, PredictionError, ProcessError
+from dorothie_gym.evaluation import rollout as rollouts
+from dorothie_gym.evaluation import teacher_forced
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
@@ -213,8 +217,6 @@ def table(
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import PREDICTIONS, gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import ROWS, find_row
-        from dorothie_gym.evaluation.teacher_forced.predictions import write_predictions
-        from dorothie_gym.evaluation.teacher_forced.report import write_report
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
@@ -224,8 +226,8 @@ def table(
         )  # fmt: skip
         results = _run(jobs, workers, quiet=as_json)
         made, predictions = gather_table(jobs)
-        write_predictions(where / PREDICTIONS, predictions)
-        write_report(made, where)
+        teacher_forced.write_predictions(where / PREDICTIONS, predictions)
+        teacher_forced.write_report(made, where)
     seconds = time.perf_counter() - begun
     if as_json:
         print_json({**made.to_json(), "out": str(where), "runs": results, "wall_seconds": round(seconds, 3)})
@@ -239,7 +241,6 @@ def table(
 def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> list[Facts]:
     """Runs the trainings, and returns their results in the same order."""
     from dorothie_gym.baselines.experiment import run_experiments
-    from dorothie_gym.support.processors import available_processors
 
     _name_former_trainings(jobs)
     found: dict[Path, Facts] = {}
@@ -311,11 +312,8 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
     """Returns the corpus, and the folder of its trainings, which is created."""
     folder = corpus
     if folder is None:
-        from dorothie_gym.errors import CacheError
-        from dorothie_gym.evaluation.rollout.corpus_cache import default_corpus
-
         try:
-            folder = default_corpus()
+            folder = rollouts.default_corpus()
         except CacheError as error:
             fail(str(error))
     where = out or RUNS / folder.absolute().name
@@ -324,10 +322,8 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
 
 
 def _show(table: ResultsTable) -> None:
-    from dorothie_gym.evaluation.teacher_forced.terminal import print_table
-
     console = wide_stdout()
-    print_table(table, console)
+    teacher_forced.print_table(table, console)
 
 
 @contextmanager
@@ -337,8 +333,6 @@ def _reporting_errors() -> Iterator[None]:
         import torch  # noqa: F401
     except ImportError:
         fail("training needs torch; run: pip install 'dorothie-gym[baselines]'")
-    from dorothie_gym.errors import CheckpointError, EncoderError, PredictionError, ProcessError
-
     with reporting_errors():
         try:
             yield

@@ -7,19 +7,18 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn, TypeAlias
+from typing import Annotated, NoReturn, TypeAlias
 
 import typer
 
+from dorothie_gym import policies as players
+from dorothie_gym.baselines import rl
 from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.errors import ModelFileError, ProcessError, SettingsError
 from dorothie_gym.support.processors import available_processors
-
-if TYPE_CHECKING:
-    from dorothie_gym.baselines.rl.run import OnProgress, OnStage, TrainingEvaluation, TrainingResult
-    from dorothie_gym.baselines.rl.settings import TrainingSettings
 
 DEFAULT_ENV = "dorothie_gym/Navigation-v0"
 """Environment of train-rl."""
@@ -129,8 +128,6 @@ def _reporting_errors() -> Iterator[None]:
         import torch  # noqa: F401
     except ImportError:
         fail("train-rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'")
-    from dorothie_gym.errors import ModelFileError, ProcessError, SettingsError
-
     with reporting_errors():
         try:
             yield
@@ -163,19 +160,15 @@ def _train(
         device: device of the networks; None for the processor.
         as_json: whether to print one JSON object and nothing else.
     """
-    from dorothie_gym.baselines.rl.environments import has_batch
-    from dorothie_gym.baselines.rl.settings import tuned_settings
-    from dorothie_gym.baselines.rl.training import Training, best_of
-
-    settings = tuned_settings(algorithm, env, env_settings=given, **changes)
-    if changes["workers"] is None and ray is None and not has_batch(settings.env):
+    settings = rl.tuned_settings(algorithm, env, env_settings=given, **changes)
+    if changes["workers"] is None and ray is None and not rl.has_batch(settings.env):
         settings = _with_default_workers(settings)
     if ray is None and settings.env.startswith("dorothie_gym/"):
-        compile_first(batches=has_batch(settings.env) and settings.workers == 0, pictures=settings.sees)
+        compile_first(batches=rl.has_batch(settings.env) and settings.workers == 0, pictures=settings.sees)
     with _progress(settings.steps, out, quiet=as_json) as (on_progress, on_stage):
-        result = Training(settings, out, on_progress, ray, on_stage, device or "cpu").run()
+        result = rl.Training(settings, out, on_progress, ray, on_stage, device or "cpu").run()
     if as_json:
-        best = best_of(result.rows, settings)
+        best = rl.best_of(result.rows, settings)
         print_json({**_facts(result, settings), "best": None if best is None else best.as_json()})
     else:
         _show(result, settings)
@@ -185,7 +178,7 @@ def _train(
         _exit_interrupted(result.steps, settings, out, _command(arguments, given, settings, ray))
 
 
-def _line(row: TrainingEvaluation) -> str:
+def _line(row: rl.TrainingEvaluation) -> str:
     outcome = row.outcome
     return (
         f"{row.steps:>10,} steps, {row.seconds:6.0f} s: success {100 * outcome.success:5.1f} % "
@@ -194,29 +187,25 @@ def _line(row: TrainingEvaluation) -> str:
     )
 
 
-def _show(result: TrainingResult, settings: TrainingSettings) -> None:
-    from dorothie_gym.baselines.rl.run import BEST, CURVE
-    from dorothie_gym.baselines.rl.training import best_of
-    from dorothie_gym.policies.policy_loader import DESCRIPTION
-
+def _show(result: rl.TrainingResult, settings: rl.TrainingSettings) -> None:
     console = stdout()
     console.print(_rate_line(f"{settings.algorithm} on {settings.env}", result), markup=False, soft_wrap=True)
-    best = best_of(result.rows, settings)
+    best = rl.best_of(result.rows, settings)
     if best is not None:
         console.print(f"Best: {_line(best).strip()}", markup=False, soft_wrap=True)
-        console.print(f"Curve: {result.folder / CURVE}", markup=False, soft_wrap=True)
-        console.print(f"Best model: {result.folder / BEST / DESCRIPTION}", markup=False, soft_wrap=True)
-    console.print(f"Model: {result.folder / DESCRIPTION}", markup=False, soft_wrap=True)
+        console.print(f"Curve: {result.folder / rl.CURVE}", markup=False, soft_wrap=True)
+        console.print(f"Best model: {result.folder / rl.BEST / players.DESCRIPTION}", markup=False, soft_wrap=True)
+    console.print(f"Model: {result.folder / players.DESCRIPTION}", markup=False, soft_wrap=True)
 
 
-def _with_default_workers(settings: TrainingSettings) -> TrainingSettings:
+def _with_default_workers(settings: rl.TrainingSettings) -> rl.TrainingSettings:
     """Returns settings with one worker process per processor; with none on a single processor."""
     processors = available_processors()
     return replace(settings, workers=min(processors, settings.environments) if processors > 1 else 0)
 
 
 @contextmanager
-def _progress(total: int, out: Path, *, quiet: bool) -> Iterator[tuple[OnProgress, OnStage]]:
+def _progress(total: int, out: Path, *, quiet: bool) -> Iterator[tuple[rl.OnProgress, rl.OnStage]]:
     """Shows a progress bar on a terminal and a line per evaluation; handles Ctrl-C before the first step.
 
     Args:
@@ -234,7 +223,7 @@ def _progress(total: int, out: Path, *, quiet: bool) -> Iterator[tuple[OnProgres
     with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
         bar = progress.add_task("Steps", total=total)
 
-        def on_progress(done: int, steps: int, row: TrainingEvaluation | None) -> None:
+        def on_progress(done: int, steps: int, row: rl.TrainingEvaluation | None) -> None:
             progress.update(bar, description="Steps", completed=done, total=steps)
             if row is not None and not quiet:
                 progress.console.print(_line(row), markup=False, soft_wrap=True)
@@ -249,7 +238,7 @@ def _progress(total: int, out: Path, *, quiet: bool) -> Iterator[tuple[OnProgres
             exit_interrupted("Interrupted before the first step; the same command starts again.")
 
 
-def _facts(result: TrainingResult, settings: TrainingSettings) -> dict[str, object]:
+def _facts(result: rl.TrainingResult, settings: rl.TrainingSettings) -> dict[str, object]:
     """Returns the result of a run and its settings in JSON types."""
     return {
         "out": str(result.folder),
@@ -262,13 +251,13 @@ def _facts(result: TrainingResult, settings: TrainingSettings) -> dict[str, obje
     }
 
 
-def _rate_line(name: str, result: TrainingResult) -> str:
+def _rate_line(name: str, result: rl.TrainingResult) -> str:
     """Returns a line with the number of steps of a run and their rate."""
     rate = result.steps / result.seconds if result.seconds else 0.0
     return f"{name}: {result.steps:,} steps in {result.seconds:.0f} s ({rate:.0f} per second, without evaluations)"
 
 
-def _command(arguments: list[str], given: Given, settings: TrainingSettings, ray: str | None) -> str:
+def _command(arguments: list[str], given: Given, settings: rl.TrainingSettings, ray: str | None) -> str:
     """Returns the command that resumes a run."""
     words = ["dorothie-gym", "train-rl", *arguments]
     words += [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
@@ -278,7 +267,7 @@ def _command(arguments: list[str], given: Given, settings: TrainingSettings, ray
     return shlex.join(words)
 
 
-def _exit_interrupted(steps: int, settings: TrainingSettings, out: Path, command: str) -> NoReturn:
+def _exit_interrupted(steps: int, settings: rl.TrainingSettings, out: Path, command: str) -> NoReturn:
     """Prints after Ctrl-C the folder of the run and the command that resumes it, and exits."""
     exit_interrupted(
         f"Interrupted after {steps:,} of {settings.steps:,} steps; the run is saved in {out}. Resume with: {command}"

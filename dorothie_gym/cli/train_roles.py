@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit
@@ -96,8 +97,6 @@ ROLES: Final[Mapping[str, Callable[[Request], RoleReport]]] = MappingProxyType(
 
 def train_role(model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, as_json: bool) -> None:
     """Trains players of a role with several seeds, each in a folder of its own, and prints how to play them."""
-    from dorothie_gym.support.processors import available_processors
-
     found: list[tuple[Path, RoleReport]] = []
     try:
         with stage_progress(quiet=as_json) as on_stage:

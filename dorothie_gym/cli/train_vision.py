@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym.cli.output import Facts, exit_interrupted, fail, print_json, stage_progress, stdout, wide_stdout
+from dorothie_gym.support.processors import available_processors
 
 VISION_MODELS: Final = ("segformer", "detr")
 """Commands of the vision models."""
@@ -49,7 +50,6 @@ def train_vision(
     """Trains a vision model with several seeds, tests it, and prints its figures beside the paper's."""
     from dorothie_gym.baselines.trainer import device as best_device
     from dorothie_gym.baselines.vision.experiment import VisionExperiment, check_experiment, run_vision_experiment
-    from dorothie_gym.support.processors import available_processors
 
     if inputs is not None and model != "detr":
         fail("--inputs is for detr only")
@@ -63,9 +63,9 @@ def train_vision(
                     size=size,
                     seed=seed,
                     out=out,
-                    epochs=epochs,  # type: ignore[arg-type]
+                    epochs=epochs,
                     inputs=inputs or "predicted",
-                    device=device or str(best_device()),  # type: ignore[arg-type]
+                    device=device or str(best_device()),
                 )
                 check_experiment(job)
                 results.append(run_vision_experiment(job, workers=workers or available_processors(), on_stage=on_stage))

@@ -386,8 +386,9 @@ def _decoded(predicate: Predicate, name: str, value: object, where: str, depth: 
 def _labels(kind: type[enum.Enum]) -> dict[str, Argument]:
     found: dict[str, Argument] = {}
     for member in kind:
-        encoded = _encoded(member)  # type: ignore[arg-type]
-        found[str(encoded)] = member  # type: ignore[assignment]
+        if not isinstance(member, SlotValue | Direction | WeatherParameter | PropKind | Sensor):
+            raise TypeError(f"{kind.__name__} is no type of an argument")
+        found[str(_encoded(member))] = member
     return found
 
 

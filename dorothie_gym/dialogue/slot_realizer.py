@@ -15,14 +15,16 @@ from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, load_grammar
 from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import cardinal, duration, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
-from dorothie_gym.dialogue.propositions import Argument, Proposition
+from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, in_label_order
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, GoalStatus, LandmarkName, Slot, SlotValue
 from dorothie_gym.ontology.world_exceptions import PropKind
 
 _Option = TypeVar("_Option")
+_Kind = TypeVar("_Kind")
 
 
 class Draw(Protocol):
@@ -131,8 +133,8 @@ class SlotRealizer:
         manners = _action_keys(self._wording)
         # A sentence names at most two actions.
         spoken = []
-        for value in self.values[_ACTION][: min(2, self._names)]:
-            assert isinstance(value, ActionValue)
+        named = [value for value in self.values[_ACTION] if isinstance(value, ActionValue)]
+        for value in named[: min(2, self._names)]:
             phrases = load_grammar().actions[value]
             keys = manners.get(value) or manners[_OTHERS]
             key = next(key for key in keys if ("do", key) in phrases or (form, key) in phrases)
@@ -184,9 +186,7 @@ class SlotRealizer:
 
     def metres(self) -> str:
         """Returns the distance of the content in words."""
-        metres = self.argument("metres")
-        assert isinstance(metres, int)
-        return self._length(metres)
+        return self._length(self.argument("metres", int))
 
     def _length(self, metres: float) -> str:
         words = cardinal(10 * round(metres / 10) if metres >= 9.5 else max(round(metres), 2))
@@ -200,23 +200,29 @@ class SlotRealizer:
         """Returns the name of a landmark of the wording."""
         return self.pick(load_lexicon().forms(landmark or LandmarkName.UNKNOWN, "say"))
 
-    def argument(self, name: str) -> Argument:
-        """Returns an argument of the content."""
+    def argument(self, name: str, kind: type[_Kind]) -> _Kind:
+        """Returns an argument of the content, which has all that the chosen template has gaps for.
+
+        Raises:
+            PhraseFileError: the content has no such argument of that type.
+        """
         content = self._wording.content
         value = None if content is None else content.get(name)
-        assert value is not None  # a template is chosen only if the content has its gaps
+        if value is None or not isinstance(value, kind):
+            raise PhraseFileError(f"a template has a gap for {name!r}, a {kind.__name__}; the content is {content}")
         return value
+
+    def words(self, name: str) -> str:
+        """Returns an argument of the content as it is spoken."""
+        return str(self.argument(name, object))
 
     def duration(self) -> str:
         """Returns the time of the content in words."""
-        seconds = self.argument("seconds")
-        assert isinstance(seconds, int)
-        return duration(seconds)
+        return duration(self.argument("seconds", int))
 
     def clause(self) -> str:
         """Returns the clause that states the cause of the content."""
-        cause = self.argument("cause")
-        assert isinstance(cause, Proposition)
+        cause = self.argument("cause", Proposition)
         tense = "past " if self._wording.topic == "because_then" else ""
         clauses, stem = load_grammar().clauses, f"{tense}{'not ' * cause.negated}{cause.predicate}"
         action = cause.get("action")
@@ -225,13 +231,11 @@ class SlotRealizer:
 
     def prop(self) -> str:
         """Returns the name of the prop of the content, with an article."""
-        kind = self.argument("prop")
-        assert isinstance(kind, PropKind)
-        return load_grammar().props[kind].say(self)
+        return load_grammar().props[self.argument("prop", PropKind)].say(self)
 
     def definite_item(self) -> str:
         """Returns the item of the content with a definite article: "the newspaper" of "a newspaper"."""
-        item = str(self.argument("item"))
+        item = self.words("item")
         return item if _POSSESSED.match(item) else f"the {_INDEFINITE.sub('', item)}"
 
     def past(self) -> str:
@@ -333,12 +337,12 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "metres": SlotRealizer.metres,
         "cause": SlotRealizer.clause,
         "prop": SlotRealizer.prop,
-        "feature": lambda realizer: str(realizer.argument("feature")),
-        "purpose": lambda realizer: str(realizer.argument("purpose")),
-        "person": lambda realizer: str(realizer.argument("person")),
-        "item": lambda realizer: str(realizer.argument("item")),
+        "feature": lambda realizer: realizer.words("feature"),
+        "purpose": lambda realizer: realizer.words("purpose"),
+        "person": lambda realizer: realizer.words("person"),
+        "item": lambda realizer: realizer.words("item"),
         "the_item": SlotRealizer.definite_item,
-        "reason": lambda realizer: str(realizer.argument("reason")),
+        "reason": lambda realizer: realizer.words("reason"),
     }
 )
 

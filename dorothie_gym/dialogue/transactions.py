@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeGuard
 
 from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.dialogue.exchanges import Exchange, ExchangeTracker
@@ -89,7 +90,6 @@ class TransactionTracker:
         if found is not None and status in _OVER:
             found.over = True
         elif found is None and status is GoalStatus.COMPLETE and self._is_anonymous(self._current):
-            assert self._current is not None
             self._current.landmark, self._current.over = landmark, True
 
     def _aim(self, acts: tuple[DialogueAct, ...]) -> tuple[LandmarkName, GoalStatus | None] | None:
@@ -122,7 +122,6 @@ class TransactionTracker:
         transaction = None if again else self._of(landmark)
         current = self._current
         if transaction is None and self._is_anonymous(current) and status not in _ASIDE:
-            assert current is not None
             transaction = current
             transaction.landmark = landmark
         elif transaction is None:
@@ -157,7 +156,7 @@ class TransactionTracker:
         return self.transactions[-1]
 
     @staticmethod
-    def _is_anonymous(transaction: Transaction | None) -> bool:
+    def _is_anonymous(transaction: Transaction | None) -> TypeGuard[Transaction]:
         return transaction is not None and transaction.landmark is None and not transaction.over
 
 

@@ -16,7 +16,7 @@ from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_batch import SessionBatch
-from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.support.processors import available_processors
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
@@ -105,9 +105,7 @@ class BatchedEnv(Restorable, Generic[C, B]):
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of the environments; pictures are started again."""
-        parts = values.pop("batches")
-        assert isinstance(parts, list)  # of `mutable_values`
-        for batch, part in zip(self.batches, parts, strict=True):
+        for batch, part in zip(self.batches, taken(values, "batches", list), strict=True):
             batch.apply_values(part)
         super().apply_values(values)
 

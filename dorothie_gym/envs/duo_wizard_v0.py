@@ -35,7 +35,7 @@ from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
 from dorothie_gym.session.spaces.limits import UNBOUNDED, SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
-from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
@@ -111,22 +111,22 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
         self.turns: TurnBasedDuoWizard | None = None
-        self.observation_spaces = {str(role): deepcopy(self.engine.observation_space(role)) for role in AGENT_ROLES}
-        self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in AGENT_ROLES}
+        self.observation_spaces: dict[str, spaces.Dict] = {
+            str(role): deepcopy(self.engine.observation_space(role)) for role in AGENT_ROLES
+        }
+        self.action_spaces: dict[str, spaces.Dict] = {
+            str(role): deepcopy(action_space(role, self.limits)) for role in AGENT_ROLES
+        }
 
     # --- PettingZoo -------------------------------------------------------------------------------------------------
 
     def observation_space(self, agent: str) -> spaces.Dict:
         """Returns the observation space of an agent, always the same object."""
-        space = self.observation_spaces[agent]
-        assert isinstance(space, spaces.Dict)
-        return space
+        return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Dict:
         """Returns the action space of an agent, always the same object."""
-        space = self.action_spaces[agent]
-        assert isinstance(space, spaces.Dict)
-        return space
+        return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: ResetOptions | None = None
@@ -204,17 +204,15 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
 
     def mutable_values(self) -> dict[str, object]:
         """Returns the changing values of the environment, its engine, and the turn-based wrapper if there is one."""
-        turns = None if self.turns is None else self.turns.turn_values()
+        turns = {} if self.turns is None else self.turns.turn_values()
         return {**super().mutable_values(), "engine": self.engine.mutable_values(), "turns": turns}
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of the environment and of its engine."""
-        engine, turns = values.pop("engine"), values.pop("turns")
-        assert isinstance(engine, dict)
+        engine, turns = taken(values, "engine", dict), taken(values, "turns", dict)
         super().apply_values(values)
         self.engine.apply_values(engine)
         if self.turns is not None:
-            assert isinstance(turns, dict)  # equal forms are compatible only
             self.turns.apply_turn_values(turns)
 
     def compatibility(self) -> dict[str, object]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -148,11 +149,13 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
 
     def _spaces(self, single: Mapping[str, spaces.Dict]) -> tuple[dict[str, spaces.Dict], dict[str, spaces.Dict]]:
         """Returns spaces of one environment, and those of all, by agent."""
-        batched = {}
-        for agent, space in single.items():
-            whole = batch_space(space, self.num_envs)
-            assert isinstance(whole, spaces.Dict)
-            batched[agent] = whole
+        batched = {
+            agent: spaces.Dict(
+                {name: batch_space(part, self.num_envs) for name, part in space.spaces.items()},
+                seed=deepcopy(space.np_random),  # as `batch_space` of the whole
+            )
+            for agent, space in single.items()
+        }
         return dict(single), batched
 
     def observation_space(self, agent: str) -> spaces.Dict:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Final
+from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ def metadata_at(decision_frequency: float) -> dict[str, object]:
     rate = int(decision_frequency) if decision_frequency == int(decision_frequency) else decision_frequency
     return {"render_modes": list(RENDER_MODES), "render_fps": rate}
 
+
+Notes: TypeAlias = tuple["pictures.RoleView | None", "list[pictures.SpokenLine]"]
+"""What was noted of a session for its pictures: what the role has seen, and what was said."""
 
 METADATA: Final[dict[str, object]] = metadata_at(2.0)
 """Metadata of the environments with two decisions per second."""
@@ -83,14 +86,13 @@ class SessionView(CachedViews):
             self._seen = pictures.RoleView(self._role, session.world.town)
 
     @property
-    def notes(self) -> tuple[pictures.RoleView | None, list[pictures.SpokenLine]]:
+    def notes(self) -> Notes:
         """Notes on the session, for a state of the environment."""
         return self._seen, self._heard
 
-    def apply_values(self, notes: object, session: LiveSession) -> None:
+    def apply_values(self, notes: Notes, session: LiveSession) -> None:
         """Applies the notes of a state; a view that draws starts empty if the state has no notes for pictures."""
         self.begin(session)
-        assert isinstance(notes, tuple)  # of `notes`
         seen, heard = notes
         if self._seen is not None and seen is not None:
             self._seen = seen

@@ -21,7 +21,7 @@ from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
 from dorothie_gym.session.spaces.observations import Observation
-from dorothie_gym.support.copying import Restorable, Unchanged
+from dorothie_gym.support.copying import Restorable, Unchanged, taken
 from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
@@ -176,8 +176,8 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of the environment, its engine and its partners."""
-        engine, states, notes = values.pop("engine"), values.pop("partners"), values.pop("view")
-        assert isinstance(engine, dict) and isinstance(states, dict)
+        engine, states = taken(values, "engine", dict), taken(values, "partners", dict)
+        notes = taken(values, "view", tuple)
         super().apply_values(values)
         self.engine.apply_values(engine)
         self._states = {role: state.value for role, state in states.items()}

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import ClassVar, Final
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 
 from dorothie_gym.archive.corpus import Corpus, CorpusEntry, Fold
 from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint, Point, task_points
@@ -132,12 +133,13 @@ class TeacherForcedEnv(PointEnv):
         raise ValueError(f"option 'session' is {wanted!r}; it must be a number below {len(names)} or a session's name")
 
     def _now(self) -> tuple[Session, Town | None]:
-        assert self._session is not None  # an episode has begun
+        if self._session is None:
+            raise ResetNeeded("no episode has begun: call reset() first")
         return self._session, self._town
 
     def _info(self) -> StepInfo:
-        assert self._session is not None  # an episode has begun
-        return {"session": self._session.name}
+        session, _ = self._now()
+        return {"session": session.name}
 
     def _judge(self, action: ActionMapping, point: Point) -> None:
         self._done.append((action, point))

@@ -6,6 +6,8 @@ from .catalogue import describe as describe
 from .catalogue import fold_of as fold_of
 from .catalogue import load_town as load_town
 from .catalogue import town_names as town_names
+from .lint import check_town as check_town
+from .lint.fault import Fault as Fault
 from .model import NO_JUNCTION as NO_JUNCTION
 from .model import NO_STREET as NO_STREET
 from .model import Crosswalk as Crosswalk

@@ -5,16 +5,13 @@ from __future__ import annotations
 import importlib.util
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 _FILES = {False: "DejaVuSans.ttf", True: "DejaVuSans-Bold.ttf"}
 _loaded: dict[tuple[int, bool], pygame.font.Font] = {}
@@ -32,8 +29,6 @@ def font_path(bold: bool = False) -> str | None:
 
 def font(size: int, bold: bool = False) -> pygame.font.Font:
     """Returns a `pygame.font.Font` of a height [px]; needs no display."""
-    import pygame
-
     if not pygame.font.get_init():
         pygame.font.init()
     held = _loaded.get((size, bold))
@@ -46,8 +41,6 @@ def font(size: int, bold: bool = False) -> pygame.font.Font:
 
 def _alive(held: pygame.font.Font) -> bool:
     """Returns whether a font is still valid: `pygame.quit()` invalidates all earlier ones."""
-    import pygame
-
     try:
         held.get_height()
     except pygame.error:
@@ -87,8 +80,6 @@ def set_along(surface: pygame.Surface, text: str, path: Array, size: int, colour
 
 def _stamp(surface: pygame.Surface, piece: pygame.Surface, centre: Array, angle: float) -> None:
     """Draws a surface rotated clockwise by an angle [rad] around its centre."""
-    import pygame
-
     turned = pygame.transform.rotozoom(piece, -float(np.degrees(angle)), 1.0) if abs(angle) > 1e-3 else piece
     surface.blit(turned, turned.get_rect(center=(round(float(centre[0])), round(float(centre[1])))))
 

@@ -6,6 +6,8 @@ from .co_wizard.policy import ScriptedCoWizard as ScriptedCoWizard
 from .participant.policy import ScriptedParticipant as ScriptedParticipant
 from .policy import Policy as Policy
 from .policy_loader import ALL_SCRIPTED as ALL_SCRIPTED
+from .policy_loader import DESCRIPTION as DESCRIPTION
+from .policy_loader import LANGUAGE_MODEL as LANGUAGE_MODEL
 from .policy_loader import POLICY_NAMES as POLICY_NAMES
 from .policy_loader import Loader as Loader
 from .policy_loader import Player as Player
@@ -18,6 +20,7 @@ from .pretrained import PretrainedCard as PretrainedCard
 from .pretrained import pretrained_card as pretrained_card
 from .pretrained import pretrained_folder as pretrained_folder
 from .pretrained import pretrained_names as pretrained_names
+from .pretrained import pretrained_size as pretrained_size
 from .trivial import LaneFollowPolicy as LaneFollowPolicy
 from .trivial import RandomPolicy as RandomPolicy
 from .trivial import SilentPolicy as SilentPolicy

@@ -138,11 +138,10 @@ class PlannedTrick:
 
 @dataclass(frozen=True, kw_only=True)
 class Restoration:
-    """Change that is to be undone, and the time [s]; `prop` is the position of a prop [m]."""
+    """Change that is to be undone, a parameter of the weather or the position of a prop [m], and the time [s]."""
 
     at: float
-    weather: WeatherParameter | None = None
-    prop: tuple[float, float] | None = None
+    change: WeatherParameter | tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -326,14 +325,13 @@ def _restore(state: AdWizardState, observation: ObservationMapping, now: float) 
     if due is None:
         return None, state
     state = state.after_restoration(due)
-    if due.weather is not None:
-        low, high, clear = due.weather.low, due.weather.high, due.weather.clear_noon
+    if isinstance(due.change, WeatherParameter):
+        low, high, clear = due.change.low, due.change.high, due.change.clear_noon
         share = (clear - low) / (high - low)
-        return AdWizardAction(exception=ExceptionKind.WEATHER, weather=due.weather, share=share), state
-    assert due.prop is not None
+        return AdWizardAction(exception=ExceptionKind.WEATHER, weather=due.change, share=share), state
     for row, prop in enumerate(observation["props"]):
         x, y = float(prop[PropColumn.X]), float(prop[PropColumn.Y])
-        if prop[PropColumn.KIND] > 0 and pm.hypot(x - due.prop[0], y - due.prop[1]) < SAME_PROP:
+        if prop[PropColumn.KIND] > 0 and pm.hypot(x - due.change[0], y - due.change[1]) < SAME_PROP:
             return AdWizardAction(exception=ExceptionKind.DELETE_PROP, item=row), state
     return None, state
 
@@ -356,7 +354,7 @@ def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float
     if town_lane.in_junction or not suits:
         return None, state
     point = town_lane.position(round(station))
-    removal = Restoration(at=now + config.roadblock_time, prop=(float(point[0]), float(point[1])))
+    removal = Restoration(at=now + config.roadblock_time, change=(float(point[0]), float(point[1])))
     action = AdWizardAction(
         exception=ExceptionKind.PLACE_PROP,
         prop=tuple(PROPS)[int(rng.choice(len(PROPS), p=np.array(list(PROPS.values())) / sum(PROPS.values())))],
@@ -398,7 +396,7 @@ def _weather(state: AdWizardState, observation: ObservationMapping, now: float, 
     weights = np.array([weight for weight, _ in options.values()])
     parameter = tuple(options)[int(rng.choice(len(options), p=weights / weights.sum()))]
     share = float(rng.uniform(*options[parameter][1]))
-    clearing = Restoration(at=now + float(rng.uniform(*state.config.bad_weather_time)), weather=parameter)
+    clearing = Restoration(at=now + float(rng.uniform(*state.config.bad_weather_time)), change=parameter)
     action = AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=round(share, 2))
     return action, state.with_restoration(clearing)
 

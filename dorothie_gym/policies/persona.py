@@ -7,13 +7,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
 from dorothie_gym.errors import did_you_mean
 from dorothie_gym.policies.speech_timing import Delivery
 from dorothie_gym.support import portable_math as pm
+
+_Style = TypeVar("_Style", bound=enum.StrEnum)
 
 
 class Directions(enum.StrEnum):
@@ -110,17 +112,22 @@ class Persona:
             rng: source of randomness; the same numbers are drawn whatever is given.
             given: values of some traits, or ranges of them.
         """
-        drawn: dict[str, float | str] = {name: float(rng.random()) for name in SHARES}
-        drawn["directions"] = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})
-        drawn["driving"] = _pick(rng, {Driving.GENTLE: 0.3, Driving.USUAL: 0.45, Driving.BRISK: 0.25})
+        drawn = {name: float(rng.random()) for name in SHARES}
+        directions = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})
+        driving = _pick(rng, {Driving.GENTLE: 0.3, Driving.USUAL: 0.45, Driving.BRISK: 0.25})
         for name, (median, spread, low, high) in _TIMES.items():
             drawn[name] = min(max(median * pm.exp(spread * float(rng.standard_normal())), low), high)
         # from a stream of its own, so that the other numbers stay those of sessions without voices
         drawn["pitch"] = round(float(rng.spawn(1)[0].uniform(*PITCHES)), 3)
         for name, trait in (given or {}).items():
             place = float(rng.random())
-            drawn[name] = trait if isinstance(trait, str) else trait[0] + (trait[1] - trait[0]) * place
-        return cls(**drawn)  # type: ignore[arg-type]  # the names and types are those of the fields
+            if not isinstance(trait, str):
+                drawn[name] = trait[0] + (trait[1] - trait[0]) * place
+            elif name == "directions":
+                directions = Directions(trait)
+            else:
+                driving = Driving(trait)
+        return cls(directions=directions, driving=driving, **drawn)
 
 
 Trait = str | tuple[float, float]
@@ -199,7 +206,7 @@ def within(low: float, high: float, trait: float, rng: np.random.Generator) -> f
     return low + (high - low) * (0.75 * trait + 0.25 * float(rng.random()))
 
 
-def _pick(rng: np.random.Generator, shares: Mapping[str, float]) -> str:
+def _pick(rng: np.random.Generator, shares: Mapping[_Style, float]) -> _Style:
     drawn = float(rng.random())
     for name, share in shares.items():
         drawn -= share

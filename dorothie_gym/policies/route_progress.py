@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, place_records
 from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
@@ -260,8 +261,13 @@ class RouteProgress:
     @property
     def _legs(self) -> tuple[RecordArray[LegRecord], int, int]:
         """Arguments of the compiled functions: legs as records, their number, and the present one."""
-        assert self.route is not None
-        return self.route.records, len(self.route.legs), self.leg
+        return self._planned.records, len(self._planned.legs), self.leg
+
+    @property
+    def _planned(self) -> Route:
+        if self.route is None:
+            raise PolicyStateError("there is no route to the goal, and so no leg of it")
+        return self.route
 
     def way_in(self) -> Place | None:
         """Returns the place of the last lane change of the route; None if it has none."""
@@ -283,8 +289,7 @@ class RouteProgress:
             before, row, distance = find_crossing(tables, *self._legs, station, first)
             if before < 0:
                 return
-            assert self.route is not None
-            lane, first = self.route.legs[before].lane, before + 1
+            lane, first = self._planned.legs[before].lane, before + 1
             way = town.exits(lane)[row - int(tables.rows[lane])]
             yield RouteJunction(lane=lane, exit=way, distance=distance)
 
@@ -357,6 +362,13 @@ class RouteState:
     misses: int = 0
 
     @property
+    def to_goal(self) -> RouteProgress:
+        """Progress on the route, for what is done on a route only; raises `PolicyStateError` without one."""
+        if self.progress is None:
+            raise PolicyStateError("the agent has no route: it was given no place to go to, or gave it up")
+        return self.progress
+
+    @property
     def closed(self) -> tuple[Place, ...]:
         """Places that the planner must not use."""
         return self.blocked + self.avoided
@@ -371,13 +383,11 @@ class RouteState:
 
     def replanned(self, town: Town, start: Place) -> RouteState:
         """Plans another route to the same goal."""
-        assert self.progress is not None
-        return replace(self, progress=self.progress.replanned(town, start, self.closed))
+        return replace(self, progress=self.to_goal.replanned(town, start, self.closed))
 
     def has_missed(self, before: float, station: float) -> bool:
         """Returns whether the goal, `before` metres ahead on the former route, now needs a long detour."""
-        assert self.progress is not None
-        return before < NEAR_MISS and self.progress.left(station) > before + WAY_ROUND
+        return before < NEAR_MISS and self.to_goal.left(station) > before + WAY_ROUND
 
     def after_miss(self, town: Town, start: Place, former: RouteProgress) -> RouteState:
         """Counts a drive past the goal; from the second one on, avoids the last lane change of the former route."""

@@ -28,7 +28,7 @@ from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import plain
-from dorothie_gym.support.copying import CachedViews
+from dorothie_gym.support.copying import CachedViews, taken
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _observe_share = direct(observe_share)
@@ -93,15 +93,12 @@ class SessionBatch(CachedViews):
         """Returns the changing values of the sessions."""
         return {"engines": [engine.mutable_values() for engine in self.engines], "views": self.views}
 
-    def apply_values(self, values: Mapping[str, object]) -> None:
+    def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of `mutable_values`."""
-        engines, views = values["engines"], values["views"]
-        assert isinstance(engines, list)  # of `mutable_values`
-        assert isinstance(views, RoleArrays)
-        for engine, own in zip(self.engines, engines, strict=True):
+        for engine, own in zip(self.engines, taken(values, "engines", list), strict=True):
             engine.apply_values(own)
         self.close()
-        self.views = views
+        self.views = taken(values, "views", RoleArrays)
 
     def begin(self, row: int, seed: int | None, scenario: Scenario | None) -> None:
         """Begins a session, see `SessionEngine.reset`; `observe` is to follow."""

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import re
 from collections.abc import Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
@@ -37,8 +38,7 @@ class HibariSynthesizer:
 
     def __init__(self) -> None:
         module = speech_module("hibari")
-        assert module.__file__ is not None
-        model = Path(module.__file__).parent / "assets" / "hibari.onnx"
+        model = Path(str(files(module))) / "assets" / "hibari.onnx"
         if not model.is_file() or hashlib.sha256(model.read_bytes()).hexdigest() != MODEL_SHA256:
             raise SpeechError(
                 f"{model}: is not the model of hibari-tts 0.2.1; pip install --force-reinstall hibari-tts==0.2.1"

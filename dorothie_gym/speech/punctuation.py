@@ -8,7 +8,7 @@ clause ("should I", "which way") than on its end, so the beginning also counts.
 from __future__ import annotations
 
 import json
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -48,12 +48,12 @@ class PunctuationModel:
         """Returns the model of sentences with their marks (see `spoken_tokens`), and their weights."""
         learned = [(_ended(tokens), weight) for tokens, weight in sentences]
         learned = [(tokens, weight) for tokens, weight in learned if tokens]
-        asked: Counter[tuple[str, ...]] = Counter()
-        counted: Counter[tuple[str, ...]] = Counter()
+        asked: dict[tuple[str, ...], float] = defaultdict(float)  # weights may be fractions
+        counted: dict[tuple[str, ...], float] = defaultdict(float)
         for tokens, weight in learned:
             for opening in ((), *_openings(tokens[:-1])):
-                counted[opening] += weight  # type: ignore[assignment]  # weights may be fractions
-                asked[opening] += weight * (tokens[-1] == "?")  # type: ignore[assignment]
+                counted[opening] += weight
+                asked[opening] += weight * (tokens[-1] == "?")
         share = asked[()] / counted[()]
         shares = {start: (asked[start] + _PRIOR * share) / (counted[start] + _PRIOR) for start in counted if start}
         return cls(estimate(learned), shares, share)

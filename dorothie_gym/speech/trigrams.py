@@ -111,24 +111,24 @@ def estimate(sentences: Iterable[tuple[Sequence[str], float]], words: Iterable[s
         sentences: words of each sentence, and its weight; a weight of 1 is one occurrence.
         words: further words of the vocabulary.
     """
-    two: Counter[tuple[str, str]] = Counter()
-    three: Counter[tuple[str, str, str]] = Counter()
+    two: dict[tuple[str, str], float] = defaultdict(float)  # counts may be fractions
+    three: dict[tuple[str, str, str], float] = defaultdict(float)
     for sentence, weight in sentences:
         tokens = [START, *sentence, END]
         for pair in pairwise(tokens):
-            two[pair] += weight  # type: ignore[assignment]  # counts may be fractions
+            two[pair] += weight
         for triple in zip(tokens, tokens[1:], tokens[2:], strict=False):
-            three[triple] += weight  # type: ignore[assignment]
+            three[triple] += weight
     before = Counter(second for _, second in two)
     vocabulary = sorted({*before, *words, END})
     total = sum(before.values()) or 1
     unigrams = {word: (1 - _UNIFORM) * before[word] / total + _UNIFORM / len(vocabulary) for word in vocabulary}
-    bigrams, backoff1 = _smoothed({pair: float(count) for pair, count in two.items()}, unigrams)
+    bigrams, backoff1 = _smoothed(two, unigrams)
     trigrams: dict[tuple[str, str, str], float] = {}
     backoff2: dict[tuple[str, str], float] = {}
     following: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
     for (first, second, word), count in three.items():
-        following[first, second][word] = float(count)
+        following[first, second][word] = count
     for (first, second), counts in following.items():
         lower = {word: bigrams[second, word] for word in counts}
         found, backoff2[first, second] = _discounted(counts, lower)

@@ -72,7 +72,7 @@ class State:
 
     __slots__ = ("_fits", "_shared", "_values")
 
-    def __init__(self, owner: object, values: object, fits: Mapping[str, object]) -> None:
+    def __init__(self, owner: object, values: dict[str, object], fits: Mapping[str, object]) -> None:
         """Keeps values.
 
         Args:
@@ -88,7 +88,7 @@ class State:
         """Memory of the values, without shared objects [bytes]."""
         return len(self._values)
 
-    def values(self, owner: object, fits: Mapping[str, object]) -> object:
+    def values(self, owner: object, fits: Mapping[str, object]) -> dict[str, object]:
         """Returns a new copy of the values for an object; `fits` as above.
 
         Raises:
@@ -101,10 +101,25 @@ class State:
                     f"the state is one of {_difference(name, found, wanted)}: "
                     "restore it in an environment that was made with the same arguments"
                 )
-        return _Unpickler(self._values, [owner, *self._shared]).load()
+        values: dict[str, object] = _Unpickler(self._values, [owner, *self._shared]).load()
+        return values
 
     def __repr__(self) -> str:
         return f"<State of {self.nbytes} bytes>"
+
+
+def taken(values: dict[str, object], name: str, kind: type[T]) -> T:
+    """Removes one of the values that `mutable_values` has returned, and returns it.
+
+    Raises:
+        StateError: it is of another type: the values are of another class.
+    """
+    value = values.pop(name)
+    if not isinstance(value, kind):
+        raise StateError(
+            f"{name} is {short_repr(value)}, not of the type {kind.__name__}: the state is of another class"
+        )
+    return value
 
 
 def _difference(name: str, found: object, wanted: object) -> str:
@@ -189,7 +204,6 @@ class Restorable:
         if not isinstance(state, State):
             raise StateError(f"state is {short_repr(state)}; it must be a value that clone_state() has returned")
         values = state.values(self, self.compatibility())
-        assert isinstance(values, dict)  # made by `mutable_values`
         self.apply_values(values)
 
     def mutable_values(self) -> dict[str, object]:

@@ -20,15 +20,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, TypeVar
 
 import msgspec
 
 from dorothie_gym.errors import DorothieGymError, InputFileError, one_line
 from dorothie_gym.support.files import JsonValue
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from dorothie_gym.support.libraries import pa, pc, pq
 
 _T = TypeVar("_T")
 
@@ -347,9 +345,6 @@ def read_parquet(path: Path, limits: ParquetLimits, columns: Sequence[str] | Non
         InputFileError: it is not a Parquet file, damaged, or beyond a limit, or has a column twice.
         OSError: it is missing or cannot be read.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     content = read_file(path, limits.file)
     try:
         with pq.ParquetFile(pa.BufferReader(content)) as file:
@@ -391,9 +386,6 @@ def _check_footer(file: pa.parquet.ParquetFile, path: Path, limits: ParquetLimit
 
 def _text_size(column: pa.ChunkedArray) -> int:
     """Returns the size of the texts of a column and of the lists and structs in it, without a dictionary [bytes]."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     size = 0
     for chunk in column.chunks:
         parts = [chunk]

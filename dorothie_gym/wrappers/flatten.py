@@ -85,11 +85,11 @@ class FlattenObservation(gym.Wrapper[FlatObservation, ActType, Unflattened, ActT
         RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
         self._flat = FlatObservations(env.observation_space)
-        self._masked = isinstance(env.action_space, spaces.MultiDiscrete) and env.has_wrapper_attr("action_masks")
+        self._masked, actions = False, env.action_space
         found: dict[str, AnySpace] = {"observation": spaces.Box(self._flat.low, self._flat.high, dtype=np.float32)}
-        if self._masked:
-            assert isinstance(env.action_space, spaces.MultiDiscrete)
-            found["action_mask"] = spaces.MultiBinary(int(env.action_space.nvec.sum()))
+        if isinstance(actions, spaces.MultiDiscrete) and env.has_wrapper_attr("action_masks"):
+            self._masked = True
+            found["action_mask"] = spaces.MultiBinary(int(actions.nvec.sum()))
         self.observation_space: AnySpace = spaces.Dict(found)
 
     def reset(self, *, seed: int | None = None, options: StepInfo | None = None) -> tuple[FlatObservation, StepInfo]:

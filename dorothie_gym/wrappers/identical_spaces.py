@@ -58,10 +58,12 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
             self.nvec[: len(flat.nvec)] = np.maximum(self.nvec[: len(flat.nvec)], flat.nvec)
         self._length = max(len(flat.low) for flat in self._observations.values())
         low, high = self._bounds()
-        self.observation_spaces = {
+        self.observation_spaces: dict[str, spaces.Box] = {
             agent: spaces.Box(low.copy(), high.copy(), dtype=np.float32) for agent in self.possible_agents
         }
-        self.action_spaces = {agent: spaces.MultiDiscrete(self.nvec) for agent in self.possible_agents}
+        self.action_spaces: dict[str, spaces.MultiDiscrete] = {
+            agent: spaces.MultiDiscrete(self.nvec) for agent in self.possible_agents
+        }
 
     def _bounds(self) -> tuple[FlatVector, FlatVector]:
         """Returns bounds that cover all roles."""
@@ -85,15 +87,11 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
 
     def observation_space(self, agent: str) -> spaces.Box:
         """Returns the observation space, equal for all agents."""
-        space = self.observation_spaces[agent]
-        assert isinstance(space, spaces.Box)
-        return space
+        return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.MultiDiscrete:
         """Returns the action space, equal for all agents."""
-        space = self.action_spaces[agent]
-        assert isinstance(space, spaces.MultiDiscrete)
-        return space
+        return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, object] | None = None
@@ -121,9 +119,7 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
             raise ValueError(f"action of {agent}: the shape is {values.shape}; it must be {self.nvec.shape}")
         own = self._actions[agent].nvec
         mine = values[: len(own)]
-        taken = self._actions[agent].action(np.where((mine >= 0) & (mine < own), mine, 0))
-        assert isinstance(taken, dict)  # the action space of a role is a Dict
-        return taken
+        return self._actions[agent].fields(np.where((mine >= 0) & (mine < own), mine, 0))
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view, see `DuoWizardEnv.render`."""

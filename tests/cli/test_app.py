@@ -240,7 +240,7 @@ class TestEvaluate:
         assert (tmp_path / "r/confusion-majority.png").is_file()
 
     def test_default_corpus_is_used_without_sessions(self, monkeypatch: pytest.MonkeyPatch, sessions: Path) -> None:
-        monkeypatch.setattr("dorothie_gym.evaluation.rollout.corpus_cache.default_corpus", lambda: sessions)
+        monkeypatch.setattr("dorothie_gym.evaluation.rollout.default_corpus", lambda: sessions)
         assert loaded("evaluate", "--json")["corpus"]["folder"] == str(sessions)
 
     def test_unwritable_cache_is_reported(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,7 @@ from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import AdWizardAction, ParticipantAction, Speech, noop
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World
+from dorothie_gym.support.copying import taken
 from tests.session.recording.builders import session
 from tests.session.recording.dialogues import talk
 
@@ -248,3 +249,10 @@ def test_state_of_another_town_or_of_other_settings_is_refused(other: Callable[[
     assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 500
     with pytest.raises(StateError, match="a value that clone_state"):
         env.restore_state(b"bytes" * 1000)  # type: ignore[arg-type]  # what a user may try
+
+
+def test_values_of_another_class_are_refused() -> None:
+    values: dict[str, object] = {"engine": {"time": 1.0}, "batches": (1, 2)}
+    assert taken(values, "engine", dict) == {"time": 1.0} and set(values) == {"batches"}
+    with pytest.raises(StateError, match=r"batches is \(1, 2\), not of the type list"):
+        taken(values, "batches", list)

@@ -68,8 +68,8 @@ def test_turn_that_was_not_taken_twice_is_avoided():
     connector = human.env.town.exits(lane)[0].connector
     step: StepKey = ("turn", lane, connector)
     human.state.guidance = replace(human.state.guidance, step=step)
-    assert not remark_on_wrong_turn(human.state, human.view)
-    assert remark_on_wrong_turn(human.state, human.view)
+    assert not remark_on_wrong_turn(human.state, human.view, step)
+    assert remark_on_wrong_turn(human.state, human.view, step)
     assert predicates(human) == [Predicate.TRIED, Predicate.WILL]
     assert connector in [place[0] for place in human.state.route.avoided]
 

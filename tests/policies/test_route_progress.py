@@ -1,7 +1,18 @@
+import pytest
+
 from dorothie_gym.dialogue import Direction
+from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps import LinkType, load_town
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.policies.route_progress import RouteProgress, find_exit, light_ahead, next_choice, stopping_distance
+from dorothie_gym.policies.participant.state import TaskProgress
+from dorothie_gym.policies.route_progress import (
+    RouteProgress,
+    RouteState,
+    find_exit,
+    light_ahead,
+    next_choice,
+    stopping_distance,
+)
 from dorothie_gym.policies.route_tables import is_choice
 
 TOWN = load_town("brookside")
@@ -97,3 +108,10 @@ def test_overrun_u_turn_does_not_count_as_the_last_leg_of_the_same_lane():
     assert legs[0] == legs[-1] == 0 and len(legs) == 3, "round and back again, to a place just behind"
     gone_on = progress.followed(town, 0, 80.0)
     assert gone_on.astray == 1 and gone_on.leg == 0
+
+
+def test_what_needs_a_route_or_a_target_is_refused_without_one() -> None:
+    with pytest.raises(PolicyStateError, match="the agent has no route"):
+        RouteState().replanned(TOWN, (0, 1.0))
+    with pytest.raises(PolicyStateError, match="the participant has no target"):
+        _ = TaskProgress().destination

@@ -114,10 +114,10 @@ class SdnMap:
         if town is None:
             return None
         if lane >= 0:
-            found = self._angle_ahead(lane, road)
+            found = self._angle_ahead(town, lane, road)
             if found is not None:
                 return found
-        approaches = self._approaches(road)
+        approaches = self._approaches(town, road)
         at_next = {key: angle for key, angle in approaches.items() if key[0] == junction}
         for choice in (at_next, approaches):
             own = {key: angle for key, angle in choice.items() if lane >= 0 and key[1] == town.lanes[lane].road_id}
@@ -126,10 +126,9 @@ class SdnMap:
                     return next(iter(only.values()))
         return None
 
-    def _angle_ahead(self, lane: int, road: int) -> float | None:
+    def _angle_ahead(self, town: Town, lane: int, road: int) -> float | None:
         """Returns the angle into a road at the next junction ahead, from a lane or from adjacent lanes."""
-        assert self.town is not None
-        town, lanes = self.town, self._side_by_side(lane)
+        lanes = self._side_by_side(town, lane)
         for _ in range(len(town.lanes)):  # along the road to the junction
             for beside in lanes:
                 for way in town.exits(beside):
@@ -141,25 +140,25 @@ class SdnMap:
             lanes = list(dict.fromkeys(onward))
         return None
 
-    def _side_by_side(self, lane: int) -> list[int]:
+    @staticmethod
+    def _side_by_side(town: Town, lane: int) -> list[int]:
         """Returns a lane and those that lane changes lead to, nearest first."""
-        assert self.town is not None
         found = [lane]
         for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
-            beside = self.town.neighbour(lane, side)
+            beside = town.neighbour(lane, side)
             while beside is not None and beside not in found:
                 found.append(beside)
-                beside = self.town.neighbour(beside, side)
+                beside = town.neighbour(beside, side)
         return found
 
-    def _approaches(self, road: int) -> dict[tuple[int, int], float]:
+    @staticmethod
+    def _approaches(town: Town, road: int) -> dict[tuple[int, int], float]:
         """Returns the angle into a road for each junction and road from which connectors lead there."""
-        assert self.town is not None
         found: dict[tuple[int, int], float] = {}
-        for lane in self.town.lanes:
-            for way in self.town.exits(lane.id):
-                connector = self.town.lanes[way.connector]
-                if way.junction_id >= 0 and road in (self.town.lanes[way.lane].road_id, connector.road_id):
+        for lane in town.lanes:
+            for way in town.exits(lane.id):
+                connector = town.lanes[way.connector]
+                if way.junction_id >= 0 and road in (town.lanes[way.lane].road_id, connector.road_id):
                     found.setdefault((way.junction_id, lane.road_id), float(way.angle))
         return found
 

@@ -11,7 +11,7 @@ from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import DECISION_INTERVAL
-from dorothie_gym.policies.route_progress import stopping_distance
+from dorothie_gym.policies.route_progress import Choice, stopping_distance
 from dorothie_gym.sim.state.codes import Motion
 
 BEFORE_JUNCTION: Final = 40.0
@@ -65,13 +65,12 @@ class TriggerState:
         """
         hazard = self._hazard(view)
         changed = math.isinf(hazard) is not math.isinf(self.hazard)
-        near = view.choice is not None and view.choice.distance <= BEFORE_JUNCTION
-        at_junction = near and self._lacks_turn(view)
+        near = view.choice if view.choice is not None and view.choice.distance <= BEFORE_JUNCTION else None
+        at_junction = near is not None and self._lacks_turn(view, near)
         at_place = place is not None and _would_stop_at(place, view.speed)
         watch = replace(self, hazard=hazard, at_place=at_place)
-        if near and (at_junction or heard):
-            assert view.choice is not None
-            watch = replace(watch, junction=view.choice.lane, waited=view.time)
+        if near is not None and (at_junction or heard):
+            watch = replace(watch, junction=near.lane, waited=view.time)
         speaks = heard or at_junction
         stands = view.motion is Motion.STOPPED and view.time - self.drove >= DECISION_REPEAT_TIME
         wanted = speaks or changed or stands or self.owed or (at_place and not self.at_place)
@@ -79,13 +78,12 @@ class TriggerState:
         drove = view.time if drives else self.drove
         return DecisionTrigger(speaks=speaks, drives=drives), replace(watch, drove=drove, owed=wanted and not drives)
 
-    def _lacks_turn(self, view: CoWizardView) -> bool:
+    def _lacks_turn(self, view: CoWizardView, near: Choice) -> bool:
         """Returns whether the car approaches a junction, or has waited there long, without a planned turn."""
-        assert view.choice is not None
         if view.motion is Motion.STOPPED or view.manoeuvring or view.manoeuvre is PhysicalAction.J_TURN:
             return False
         waits = view.motion is Motion.WAITING and view.time - self.waited >= DECISION_REPEAT_TIME
-        return view.choice.lane != self.junction or waits
+        return near.lane != self.junction or waits
 
     def _hazard(self, view: CoWizardView) -> float:
         if view.hazard is not ObjectClass.UNLABELED:

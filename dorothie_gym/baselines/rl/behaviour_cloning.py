@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.archive.corpus import Corpus
+from dorothie_gym.baselines.gradients import backpropagate
 from dorothie_gym.baselines.rl.checkpoint import Model, Network
 from dorothie_gym.baselines.rl.run import OnStage, ignore_stage
 from dorothie_gym.errors import SessionError
@@ -165,7 +166,7 @@ def clone(
         for rows in torch.split(torch.randperm(len(training), generator=generator), BATCH_SIZE):
             optimiser.zero_grad()
             loss = _negative_log_likelihood(policy, training, rows)
-            loss.backward()  # type: ignore[no-untyped-call]  # torch does not annotate it
+            backpropagate(loss)
             torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
             optimiser.step()
         held_out_loss = _held_out_loss(policy, held_out)

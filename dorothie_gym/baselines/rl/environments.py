@@ -140,8 +140,10 @@ class SquashedObservation(gym.ObservationWrapper[Vector, object, dict[str, NDArr
 
     def __init__(self, env: AnyEnv) -> None:
         super().__init__(env)
-        assert isinstance(env.observation_space, spaces.Dict)
-        shape = env.observation_space["observation"].shape
+        space = env.observation_space
+        if not isinstance(space, spaces.Dict) or "observation" not in space.spaces:
+            raise SettingsError(f"the observations are of {space}; wrap the environment in `FlattenObservation` first")
+        shape = space["observation"].shape
         self.observation_space = spaces.Box(-1.0, 1.0, shape, dtype=np.float32)
 
     def observation(self, observation: dict[str, NDArray[np.generic]]) -> Vector:
@@ -189,7 +191,7 @@ class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
         self, *, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[Vector, dict[str, object]]:
         """Begins an episode."""
-        self._start = {"seed": seed} if seed is not None else self.unwrapped.np_random.bit_generator.state  # type: ignore[assignment]  # a mapping of its own type
+        self._start = {"seed": seed} if seed is not None else {**self.unwrapped.np_random.bit_generator.state}
         self._actions = []
         return self.env.reset(seed=seed, options=options)
 

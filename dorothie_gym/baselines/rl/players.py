@@ -90,9 +90,7 @@ class FlatPolicy(Policy[None]):
         seen = {name: value for name, value in observation.items() if name != "action_mask"}
         vector, mask = squashed(self._observations.vector(seen)), self._actions.mask(observation["action_mask"])
         (chosen,) = self._act(vector[None], mask[None])
-        action = self._actions.action(np.asarray(chosen, dtype=np.int64))
-        assert isinstance(action, dict)
-        return action, None
+        return self._actions.fields(np.asarray(chosen, dtype=np.int64)), None
 
 
 # --- Models of `Navigation-v0` ---------------------------------------------------------------------------------------

@@ -202,7 +202,8 @@ def _result(vector: VecEnv, name: str, arguments: tuple[Any, ...]) -> Answer:
         return vector.reset(), vector.reset_infos
     if name == "has_attr":
         return vector.has_attr(*arguments)
-    assert name == "some", name
+    if name != "some":
+        raise ValueError(f"there is no command {name!r}")
     method, indices, positional, keywords = arguments
     answers = getattr(vector, method)(*positional, indices=indices, **keywords)
     return [None] * len(indices) if method == "set_attr" else answers

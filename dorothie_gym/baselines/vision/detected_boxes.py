@@ -206,8 +206,7 @@ class DetectedBoxes:
         drawn, views = [], []
         for record in records:
             picture = pictures.picture(int(frames[record]))
-            assert picture.rgb is not None
-            drawn.append(picture.rgb.copy())
+            drawn.append(picture.colours.copy())
             views.append(picture.view)
         rgb = np.stack(drawn)
         semantic, depth = predict_pixels(reader, rgb)

@@ -193,14 +193,15 @@ class Detector(nn.Module):
             nn.ReLU(),
             nn.Linear(config.size, config.size),
             nn.ReLU(),
-            nn.Linear(config.size, SOLID),
         )
+        last = nn.Linear(config.size, SOLID)
+        self.solid_head.append(last)
         self.detr.model.backbone.requires_grad_(True)  # the library freezes it, as if it were trained already
-        self._start_heads()
+        self._start_heads(last)
         self.register_state_dict_post_hook(_drop_shared)  # type: ignore[no-untyped-call]
         self.register_load_state_dict_pre_hook(_add_shared)  # type: ignore[no-untyped-call]
 
-    def _start_heads(self) -> None:
+    def _start_heads(self, last: nn.Linear) -> None:
         """Sets the first outputs of the heads, as the authors' code does: few objects, and boxes at their places."""
         decoder = self.detr.model.decoder
         if self.config.two_stage:  # the decoder refines boxes with the heads themselves
@@ -212,8 +213,6 @@ class Detector(nn.Module):
             nn.init.zeros_(head.layers[-1].bias)
             if not self.config.two_stage:
                 nn.init.constant_(head.layers[-1].bias[2:], -2.0)
-        last = self.solid_head[-1]
-        assert isinstance(last, nn.Linear)
         nn.init.zeros_(last.weight)
         with torch.no_grad():
             last.bias.copy_(torch.tensor(_FIRST_SOLID))

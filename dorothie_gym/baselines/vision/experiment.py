@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import torch
 
@@ -22,14 +22,10 @@ from dorothie_gym.baselines.vision.object_learner import LEAST_PIXELS, ObjectLea
 from dorothie_gym.baselines.vision.pixel_learner import PixelLearner, pixel_scores
 from dorothie_gym.baselines.vision.predicted_pixels import with_predictions
 from dorothie_gym.baselines.vision.segformer import SegFormer, SegFormerConfig
-from dorothie_gym.baselines.vision.training import Learner, OnStep, train_learner
+from dorothie_gym.baselines.vision.training import OnStep, train_learner
 from dorothie_gym.errors import CheckpointError, SessionError, one_line
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import checked, raising
-
-Model = Literal["segformer", "detr"]
-Size = Literal["small", "paper"]
-PixelInputs = Literal["predicted", "true"]
 
 MODELS: Final = ("segformer", "detr")
 """Commands of the vision models."""
@@ -72,11 +68,11 @@ class VisionExperiment:
     """
 
     corpus: Path
-    model: Model
-    size: Size
+    model: str
+    size: str
     seed: int
     out: Path
-    inputs: PixelInputs = "predicted"
+    inputs: str = "predicted"
     device: str = "cpu"
     epochs: int | None = None
 
@@ -148,7 +144,7 @@ def _run(job: VisionExperiment, workers: int, on_stage: OnStage) -> dict[str, ob
         folds = _predicted(folds, reader, job.segformer / PIXELS_FOLDER, on_stage)
     training = folds["train"]
     validation = FrameSet([session for fold in ("val/seen", "val/unseen") for session in folds[fold].sessions])
-    learner: Learner
+    learner: PixelLearner | ObjectLearner
     if isinstance(config, SegFormerConfig):
         learner = PixelLearner(config, training, validation, job.seed, device)
     else:
@@ -179,7 +175,7 @@ def _run(job: VisionExperiment, workers: int, on_stage: OnStage) -> dict[str, ob
     return result
 
 
-def config_of(model: Model, size: Size) -> SegFormerConfig | DetectorConfig:
+def config_of(model: str, size: str) -> SegFormerConfig | DetectorConfig:
     """Returns the settings of a model; raises `ValueError` for an unknown size."""
     if size not in ("small", "paper"):
         raise ValueError(f"there is no config {size!r}; choose from small, paper")
@@ -252,13 +248,12 @@ def _predicted(
     return {fold: with_predictions(pictures, reader, folder, on_session) for fold, pictures in folds.items()}
 
 
-def _test(learner: Learner, pictures: FrameSet) -> dict[str, object]:
+def _test(learner: PixelLearner | ObjectLearner, pictures: FrameSet) -> dict[str, object]:
     """Returns the figures of a model on pictures, in JSON types."""
     if isinstance(learner, PixelLearner):
         scores = pixel_scores(learner.model, pictures, most=TESTED)
         classes = {kind.name.lower(): round(value, 4) for kind, value in scores.overlaps.items()}
         return {**_known(scores.figures()), "iou": classes}
-    assert isinstance(learner, ObjectLearner)
     return _known(object_figures(detected_boxes(learner.model, pictures, most=TESTED)))
 
 

@@ -188,8 +188,7 @@ def _camera_faults(session: Session) -> list[tuple[int, int]]:
 
 def _most_pixels(drawn: CameraFrame) -> int:
     """Returns the visible pixels of the largest road user or prop in a picture."""
-    assert drawn.boxes is not None
-    return int(drawn.boxes.pixels[drawn.boxes.keys > 0].max(initial=0))
+    return int(drawn.bodies.pixels[drawn.bodies.keys > 0].max(initial=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,20 +393,19 @@ def _boxes(number: int, drawn: CameraFrame, solid: SolidBoxes, heading: float) -
         solid: boxes in space of the bodies near the camera.
         heading: heading of the camera [rad].
     """
-    assert drawn.boxes is not None and drawn.instance is not None and drawn.semantic is not None
     places = {key: place for place, key in enumerate(solid.keys.tolist())}
     middles = (solid.centres - drawn.view.origin) @ drawn.view.axes.T  # right, up, ahead
-    chosen = np.flatnonzero(drawn.boxes.keys > 0)  # landmarks have negative keys
+    chosen = np.flatnonzero(drawn.bodies.keys > 0)  # landmarks have negative keys
     rows = np.zeros(len(chosen), BOX_DTYPE)
     for place, k in enumerate(chosen.tolist()):
-        left, top, right, bottom = drawn.boxes.limits[k].tolist()
-        inside = drawn.instance[top:bottom, left:right] == drawn.boxes.keys[k]
-        kind = int(np.bincount(drawn.semantic[top:bottom, left:right][inside]).argmax())
-        body = places[int(drawn.boxes.keys[k])]
+        left, top, right, bottom = drawn.bodies.limits[k].tolist()
+        inside = drawn.keys[top:bottom, left:right] == drawn.bodies.keys[k]
+        kind = int(np.bincount(drawn.classes[top:bottom, left:right][inside]).argmax())
+        body = places[int(drawn.bodies.keys[k])]
         aside, up, ahead = middles[body].tolist()
         turned = wrap_radians(float(solid.headings[body]) - heading)
         rows[place] = (
-            number, kind, left, top, right, bottom, int(drawn.boxes.pixels[k]), aside, -up, ahead,
+            number, kind, left, top, right, bottom, int(drawn.bodies.pixels[k]), aside, -up, ahead,
             *solid.sizes[body].tolist(), turned,
         )  # fmt: skip
     return rows

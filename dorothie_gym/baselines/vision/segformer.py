@@ -234,8 +234,8 @@ class SegFormer(nn.Module):
     @staticmethod
     def _scores(features: Tensor, head: nn.Conv2d, place: int, places: int) -> Tensor:
         """Returns the scores of a head (B, n, h / 4, w / 4) at one place of each cell, as `pixel_shuffle` counts."""
-        assert head.bias is not None
-        return F.conv2d(features, head.weight[place::places], head.bias[place::places]).float()
+        bias = None if head.bias is None else head.bias[place::places]
+        return F.conv2d(features, head.weight[place::places], bias).float()
 
     def _depth_loss(self, scores: Tensor, depth: Tensor) -> Tensor:
         """Returns the loss of scores (B, b, ...) of log depths (B, ...): entropy of the bins, and expected error."""

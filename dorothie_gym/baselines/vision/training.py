@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines import checkpoints
-from dorothie_gym.baselines.model_io import backpropagate
+from dorothie_gym.baselines.gradients import backpropagate
 from dorothie_gym.baselines.trainer import BEST_FILE, LAST_FILE, DeterministicAlgorithms, mixed_seed
 from dorothie_gym.errors import CheckpointError
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from typing import Annotated, Final, NamedTuple, TypeVar
+from typing import Annotated, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,11 +119,10 @@ class DrivingTown(NamedTuple):
     pedals: bool
 
 
-T = TypeVar("T")
+T = TypeVar("T", bound=tuple[Any, ...])
 
 
 @gives_row
 def row_of(batch: T, number: int) -> T:
     """Returns a row of each array of a named tuple: views, of the same types as those of a single environment."""
-    row: T = type(batch)._make(array[number] for array in batch)  # type: ignore[attr-defined]  # of named tuples
-    return row
+    return type(batch)(*(array[number] for array in batch))

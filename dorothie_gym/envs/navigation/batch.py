@@ -209,13 +209,15 @@ class DrivingBatch(DrivingRows):
         if self._config.exceptions <= 0.0:
             return
         for number in np.flatnonzero(playing & self._plans["acts"]).tolist():
-            face, live, plans = self._face(number), self.catch_up(number), self._plans[number]
-            assert face.ad_wizard_trigger is not None
+            face, live, plans = self.face(number), self.catch_up(number), self._plans[number]
+            trigger = face.ad_wizard_trigger
+            if trigger is None:
+                continue
             live.begin_decision()
             seen, face.seen = face.seen or LazyObservations(live), None
-            live.play_ad_wizard(face.ad_wizard_trigger.act(seen, int(plans["count"])))
+            live.play_ad_wizard(trigger.act(seen, int(plans["count"])))
             self._move_in(number)
-            face.ad_wizard_trigger.write(plans)
+            trigger.write(plans)
             self._look(number)
             weather = tuple(live.world.weather.values.values())
             plain(self._drivers.inputs)["weather"][number, 0] = weather
@@ -224,12 +226,12 @@ class DrivingBatch(DrivingRows):
     def _foresee(self) -> None:
         """Lets the Ad-Wizards that act next observe the paths that are to be replaced."""
         for number in np.flatnonzero(self._plans["acts"] & (self._decisions["stage"] == Stage.LOST)).tolist():
-            self._face(number).seen = seen = LazyObservations(self.catch_up(number))
+            self.face(number).seen = seen = LazyObservations(self.catch_up(number))
             seen[Role.AD_WIZARD]  # builds them
 
     def _send_note(self, number: int) -> None:
         """Sends a belief update of the Co-Wizard, which changes where the car slows down."""
-        face = self._face(number)
+        face = self.face(number)
         note, reason = face.notes.pop(0), None
         if face.live is None and note.action is MentalAction.GOAL_UPDATE:
             face.goals = note.goals
@@ -253,7 +255,7 @@ class DrivingBatch(DrivingRows):
 
     def _note_task(self, number: int, task: TaskState) -> None:
         """Writes the state of the task into the row after a change."""
-        face = self._face(number)
+        face = self.face(number)
         if task.version == face.version:
             return
         face.version = task.version
@@ -269,7 +271,7 @@ class DrivingBatch(DrivingRows):
 
     def _note_goal(self, number: int) -> None:
         """Queues the belief updates for a goal: a place on the map, or a place at the stated distance ahead."""
-        face, state = self._face(number), self._decisions[number]
+        face, state = self.face(number), self._decisions[number]
         said = plain(self._guidances.said)[number, 0]
         if state["fresh"]:
             face.notes = [Mental(action=MentalAction.GOAL_UPDATE)]

@@ -76,8 +76,7 @@ class DrivingCameras:
 
     def _camera(self, batch: DrivingRows, number: int) -> camera.SessionCamera:
         """Returns the camera of an environment, a new one in a new session."""
-        face, known = batch.faces[number], self._cameras[number]
-        assert face is not None  # the session has begun
+        face, known = batch.face(number), self._cameras[number]
         if known is not None and known[0] is face:
             return known[1]
         made = camera.camera_of(batch.town, face.scenario, self.config)
@@ -85,8 +84,7 @@ class DrivingCameras:
         return made
 
     def _draw(self, batch: DrivingRows, number: int, eye: camera.SessionCamera) -> None:
-        face, arrays = batch.faces[number], batch.row(number)
-        assert face is not None  # see `_camera`
+        face, arrays = batch.face(number), batch.row(number)
         car, plan = plain(arrays.vehicles)[0], plain(arrays.plan)[0]
         # the Ad-Wizard changes weather and sensors of a session with objects only
         world = None if face.live is None else face.live.world
@@ -99,9 +97,8 @@ class DrivingCameras:
             head_lights=bool(plan["lights"]),
             faults=() if world is None else world.faults,
         )
-        assert frame.rgb is not None  # see `NavigationConfig`
         picture = self.pictures[number]
-        picture[:] = frame.rgb
+        picture[:] = frame.colours  # see `NavigationConfig`
         show_dashboard(picture, readings_of(batch, number))
 
 

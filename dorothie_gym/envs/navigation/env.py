@@ -24,7 +24,7 @@ from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option, template_option
 from dorothie_gym.session.spaces.actions import StepInfo
-from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
@@ -65,8 +65,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of the environment and the notes for its pictures."""
-        notes, batch = values.pop("view"), values.pop("batch")
-        assert isinstance(batch, dict)  # of `mutable_values`
+        notes, batch = taken(values, "view", tuple), taken(values, "batch", dict)
         super().apply_values(values)
         self.batch.apply_values(batch)
         if self.batch.has_begun:

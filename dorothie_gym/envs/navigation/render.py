@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from dorothie_gym.envs.navigation.batch import DrivingBatch
-from dorothie_gym.envs.session_view import SessionView
+from dorothie_gym.envs.session_view import Notes, SessionView
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.instructor import words_of
 from dorothie_gym.session.live_session import LiveSession
@@ -24,13 +24,12 @@ class DrivingView:
         self._shown = -math.inf  # time of the last instruction that was noted [s]
 
     @property
-    def notes(self) -> tuple[object, float]:
+    def notes(self) -> tuple[Notes, float]:
         """Notes on the session, for a state of the environment."""
         return self.view.notes, self._shown
 
-    def apply_values(self, notes: object, live: LiveSession) -> None:
+    def apply_values(self, notes: tuple[Notes, float], live: LiveSession) -> None:
         """Applies the notes of a state to the same session, see `SessionView.apply_values`."""
-        assert isinstance(notes, tuple)  # of `notes`
         self._live = live
         drawn, self._shown = notes
         self.view.apply_values(drawn, live)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Final, cast
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.ad_wizard_trigger import AdWizardTrigger
@@ -41,7 +42,7 @@ from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, with_room_of
 from dorothie_gym.support.compilation.records import plain
-from dorothie_gym.support.copying import CachedViews
+from dorothie_gym.support.copying import CachedViews, taken
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
@@ -182,8 +183,7 @@ class DrivingRows(CachedViews):
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of `mutable_values`; the costs to the goals may be in other rows here."""
-        goals = values.pop("goals")
-        assert isinstance(goals, dict)  # of `mutable_values`
+        goals = taken(values, "goals", dict)
         self.__setstate__(values)
         if not self._stacks:
             return
@@ -325,15 +325,16 @@ class DrivingRows(CachedViews):
 
     # --- Sessions and rows ------------------------------------------------------------------------------------------
 
-    def _face(self, number: int) -> DrivingFace:
-        """Returns the face of an environment."""
+    def face(self, number: int) -> DrivingFace:
+        """Returns the face of an environment; raises `ResetNeeded` before its first session."""
         face = self.faces[number]
-        assert face is not None
+        if face is None:
+            raise ResetNeeded(f"environment {number} has no session: call reset() first")
         return face
 
     def catch_up(self, number: int) -> LiveSession:
         """Returns the session of an environment, with the time and place of its row."""
-        face = self._face(number)
+        face = self.face(number)
         if face.live is None:
             face.live = LiveSession(
                 self.town, self._network, face.scenario, self._session_config, self._limits, self.row(number)

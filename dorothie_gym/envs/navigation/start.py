@@ -137,7 +137,7 @@ def _bytes_of(array: NDArray[np.generic], rows: int) -> NDArray[np.uint8]:
 def stacked(arrays: Arrays, count: int) -> Arrays:
     """Returns a tuple of arrays with a leading axis, of `count` copies."""
     rooms = [np.zeros((count, *array.shape), dtype=array.dtype) for array in arrays]
-    stack: Arrays = type(arrays)._make(room.view(np.recarray) if room.dtype.names else room for room in rooms)  # type: ignore[attr-defined]  # of named tuples
+    stack = type(arrays)(*(room.view(np.recarray) if room.dtype.names else room for room in rooms))
     for number in range(count):
         copy_row(row_of(stack, number), arrays)
     return stack

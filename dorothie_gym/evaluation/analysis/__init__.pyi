@@ -6,6 +6,7 @@ from .behaviour import CLAIMS as CLAIMS
 from .behaviour import BehaviourClaim as BehaviourClaim
 from .behaviour import BehaviourVerdict as BehaviourVerdict
 from .behaviour import verdicts_of as verdicts_of
+from .corpus_stats import ANCHOR_TOLERANCE as ANCHOR_TOLERANCE
 from .corpus_stats import PAPER as PAPER
 from .corpus_stats import Anchors as Anchors
 from .corpus_stats import CorpusStats as CorpusStats
@@ -14,16 +15,19 @@ from .corpus_stats import anchors_of as anchors_of
 from .corpus_stats import corpus_stats_of as corpus_stats_of
 from .corpus_stats import faults_of_corpus as faults_of_corpus
 from .corpus_stats import phenomena_of as phenomena_of
+from .diversity import has_language_models as has_language_models
 from .exception_attribution import Handled as Handled
 from .exception_attribution import handled_by as handled_by
 from .exception_attribution import handling as handling
 from .exception_attribution import handling_of_events as handling_of_events
+from .intervals import RESAMPLES as RESAMPLES
 from .phenomena.catalogue import PHENOMENA as PHENOMENA
 from .phenomena.dialogue_view import DialogueView as DialogueView
 from .phenomena.dialogue_view import Occurrence as Occurrence
 from .phenomena.dialogue_view import Phenomenon as Phenomenon
 from .profiles import Profile as Profile
 from .profiles import Profiles as Profiles
+from .profiles import draw_profiles as draw_profiles
 from .segmentation_agreement import SegmentationAgreement as SegmentationAgreement
 from .segmentation_agreement import SegmentedSession as SegmentedSession
 from .segmentation_agreement import UnitSpan as UnitSpan
@@ -35,5 +39,8 @@ from .span_agreement import LabelledSpan as LabelledSpan
 from .span_agreement import agreement_of as agreement_of
 from .span_agreement import alpha_of as alpha_of
 from .span_agreement import has_alpha as has_alpha
+from .speech_stats import figure_at as figure_at
+from .speech_stats import speech_stats_of as speech_stats_of
+from .transcript import markdown as markdown
 from .units import SaidUnit as SaidUnit
 from .units import Units as Units

@@ -208,8 +208,9 @@ def times_mentioned(units: Units) -> dict[int, list[float]]:
         return found
     for event in session.of_type(EventType.EXCEPTION):
         kind = kind_of(event)
-        for move in moves if kind is not None else ():
-            assert kind is not None
+        if kind is None:
+            continue
+        for move in moves:
             near = is_near(session, event, move.start)
             if move.start >= event.time and mentions(move.meaning, kind, event, near=near):
                 found.setdefault(id(event), []).append(move.start)

@@ -1,5 +1,18 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
+from .cross_play import RESULT_NAME as RESULT_NAME
+from .cross_play import CrossPlayResult as CrossPlayResult
+from .cross_play import CrossPlaySettings as CrossPlaySettings
+from .leaderboard import LeaderboardEntry as LeaderboardEntry
+from .leaderboard import checked_entries as checked_entries
+from .leaderboard import figures_sha256 as figures_sha256
+from .leaderboard import labels_of as labels_of
+from .leaderboard import leaderboard_page as leaderboard_page
+from .leaderboard import read_entries as read_entries
+from .leaderboard_chart import draw_leaderboard as draw_leaderboard
+from .leaderboard_rows import LeaderboardPlan as LeaderboardPlan
+from .leaderboard_rows import usual_rows as usual_rows
+from .many_rollouts import roll_out_all as roll_out_all
 from .metrics import METRICS as METRICS
 from .metrics import PENALTIES as PENALTIES
 from .metrics import SPL as SPL
@@ -21,11 +34,14 @@ from .metrics import Success as Success
 from .metrics import UtterancesPerSubgoal as UtterancesPerSubgoal
 from .metrics import figures_of as figures_of
 from .metrics import interval_of as interval_of
+from .results import RESULT_FILE as RESULT_FILE
 from .results import RolloutResult as RolloutResult
 from .results import RolloutRow as RolloutRow
+from .results import print_result as print_result
 from .results import read_result as read_result
 from .running import RolloutPlan as RolloutPlan
 from .running import RolloutSettings as RolloutSettings
+from .running import command_of as command_of
 from .running import parse_towns as parse_towns
 from .running import roll_out as roll_out
 from .session_record import MetException as MetException

@@ -142,12 +142,14 @@ def _differences_of_shipped(settings: Mapping[str, Any], player: Player) -> Iter
 
 
 def _faults_of_weights(settings: Mapping[str, Any]) -> Iterator[str]:
-    hashes, training = settings.get("sha256"), settings.get("training")
-    for field, value in (("sha256", hashes), ("training", training)):
+    found: dict[str, Mapping[str, Any]] = {}
+    for field in ("sha256", "training"):
+        value = settings.get(field)
         if not isinstance(value, Mapping) or value.keys() - {str(Role.CO_WIZARD)}:
             yield f"settings, {field} is {short_repr(value)}; it may have a field co_wizard, and no other"
             return
-    assert isinstance(hashes, Mapping) and isinstance(training, Mapping)
+        found[field] = value
+    hashes, training = found["sha256"], found["training"]
     given = hashes.get(str(Role.CO_WIZARD), "0" * 64)
     if not isinstance(given, str) or not _HASH.fullmatch(given):
         yield f"settings, sha256 is {short_repr(given)}; it must be a SHA-256 in hexadecimal digits"

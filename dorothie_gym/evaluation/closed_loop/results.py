@@ -166,7 +166,11 @@ class RolloutResult:
         """
         found: dict[str, RolloutTable] = {}
         for kind in ExceptionKind:
-            rows = [_only(row, kind) for row in self.rows if kind in _kinds(row)]
+            rows = [
+                replace(row, record=record)
+                for row in self.rows
+                if row.record is not None and (record := _only(row.record, kind)).exceptions
+            ]
             if rows:
                 found[kind.name.lower()] = RolloutTable.of(rows)
         free = [row for row in self.rows if row.record is not None and not row.record.exceptions]
@@ -268,15 +272,9 @@ def _figures(rows: Sequence[RolloutRow]) -> dict[str, MetricInterval]:
     return figures_of(records, len(rows) - len(records))
 
 
-def _kinds(row: RolloutRow) -> frozenset[ExceptionKind]:
-    return frozenset() if row.record is None else frozenset(each.kind for each in row.record.exceptions)
-
-
-def _only(row: RolloutRow, kind: ExceptionKind) -> RolloutRow:
-    """Returns the row with the exceptions of one kind only."""
-    assert row.record is not None
-    kept = tuple(each for each in row.record.exceptions if each.kind is kind)
-    return replace(row, record=replace(row.record, exceptions=kept))
+def _only(record: SessionRecord, kind: ExceptionKind) -> SessionRecord:
+    """Returns the record with the exceptions of one kind only."""
+    return replace(record, exceptions=tuple(each for each in record.exceptions if each.kind is kind))
 
 
 # --- terminal ---------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from dorothie_gym.archive.comparison import first_difference
 from dorothie_gym.errors import DorothieGymError, SessionError, one_line, short_repr
 from dorothie_gym.evaluation.closed_loop.results import RolloutRow
 from dorothie_gym.evaluation.closed_loop.running import RolloutPlan
-from dorothie_gym.evaluation.closed_loop.session_record import measure
+from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
 from dorothie_gym.evaluation.closed_loop.task_progress import task_at_end
 from dorothie_gym.evaluation.closed_loop.usage import read_usage
 from dorothie_gym.evaluation.rollout.play import USAGE_FILE, play_session, with_personas
@@ -100,7 +100,7 @@ class SessionChecker:
         plan = task.plan
         found = SessionFindings(number=plan.number, faults=())
         try:
-            row = self._row(task)
+            row, record = self._row(task)
             session = self._load(plan, row)
             found = replace(
                 found,
@@ -112,14 +112,14 @@ class SessionChecker:
             if task.simulated:
                 self._play_again(plan, session)
                 found = replace(found, simulated=True)
-            faults = tuple(f"{plan}: {fault}" for fault in self._differences(plan, session, row))
+            faults = tuple(f"{plan}: {fault}" for fault in self._differences(plan, session, row, record))
         except DorothieGymError as error:
             faults = (f"{plan}: {error}",)
         return replace(found, faults=faults)
 
     # --- Row and files ------------------------------------------------------------------------------------------------
 
-    def _row(self, task: SessionTask) -> RolloutRow:
+    def _row(self, task: SessionTask) -> tuple[RolloutRow, SessionRecord]:
         plan, row = task.plan, task.row
         if row is None:
             raise SessionError("has no row")
@@ -134,7 +134,7 @@ class SessionChecker:
             )
         if surplus := sorted(row.usage.keys() - {str(Role.CO_WIZARD)}):
             raise SessionError(f"its row has a usage of {surplus[0]}, whose policy has none")
-        return row
+        return row, row.record
 
     def _load(self, plan: RolloutPlan, row: RolloutRow) -> Session:
         folder = self._root / plan.path
@@ -218,14 +218,15 @@ class SessionChecker:
 
     # --- Measures -----------------------------------------------------------------------------------------------------
 
-    def _differences(self, plan: RolloutPlan, session: Session, row: RolloutRow) -> Iterator[str]:
+    def _differences(
+        self, plan: RolloutPlan, session: Session, row: RolloutRow, record: SessionRecord
+    ) -> Iterator[str]:
         """Yields differences between the row and the measures of the session."""
-        assert row.record is not None
         try:
             wanted = measure(session, self._engine(plan.town).town).to_json()
         except Exception as error:  # a session that was not played again may hold anything
             raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
-        given: Mapping[str, object] = row.record.to_json()
+        given: Mapping[str, object] = record.to_json()
         for name, value in wanted.items():
             if not same_json(value, given.get(name)):
                 yield f"{name} is {given.get(name)!r}; the session has {value!r}"

@@ -337,8 +337,8 @@ def _differences_of_settings(root: Path, result: RolloutResult) -> Iterator[str]
 
 def _differences_of_result(root: Path, result: RolloutResult) -> Iterator[str]:
     """Yields differences between the result file and the figures computed from its rows, in session order."""
-    page = read_json(root / RESULT_FILE, MAX_RESULT_JSON)
-    assert isinstance(page, Mapping)
+    with raising(RolloutError):
+        page = checked(read_json(root / RESULT_FILE, MAX_RESULT_JSON), dict[str, Any], root / RESULT_FILE)
     wanted = result.to_json()
     if not same_json(page.get("rows"), wanted["rows"]):
         yield f"{RESULT_FILE}: its rows have another order, or fields that nothing checks"

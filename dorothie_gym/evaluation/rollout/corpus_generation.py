@@ -151,8 +151,7 @@ def generate_corpus(
     played = 0
     with run_sessions(job, plans, root, workers=workers, ray=ray, on_session=on_session) as outcomes:
         for outcome in outcomes:
-            assert outcome.result is not None
-            rows[outcome.plan.number] = outcome.result
+            rows[outcome.plan.number] = outcome.success
             played += outcome.played
         manifest = write_manifest(root, list(rows.values()))
     return Generated(root=root, manifest=manifest, rows=tuple(rows[plan.number] for plan in plans), played=played)

@@ -399,8 +399,7 @@ def _image(picture: CameraFrame, frame: int, pictures: RecordedPictures, files: 
 
 def _boxes(picture: CameraFrame, frame: int, pictures: RecordedPictures, session: Session) -> Iterator[Page]:
     """Yields the boxes of a picture, by ascending keys, without their ids."""
-    boxes, semantic, instance = picture.boxes, picture.semantic, picture.instance
-    assert boxes is not None and semantic is not None and instance is not None
+    boxes, semantic, instance = picture.bodies, picture.classes, picture.keys
     solid = pictures.solid_boxes(frame)
     rows = {key: row for row, key in enumerate(solid.keys.tolist())}
     for key, (left, top, right, bottom), pixels in zip(

@@ -123,11 +123,12 @@ def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate
     """
     if session.decisions is None:
         raise SessionError(f"{session.name}: what the roles decided was not recorded; it cannot be played again")
-    if session.header.seed is None:
+    seed = session.header.seed
+    if seed is None:
         raise SessionError(f"{session.name}: has no seed; it cannot be played again")
     config = config_of(session.header)
     engine = SessionEngine(town, config=config, max_cycles=_cycles(session, config))
-    engine.reset(scenario=_scenario(session, town, storyboard))
+    engine.reset(scenario=_scenario(session, seed, town, storyboard))
     engine.session.dialogue.give_voices(_voices(session))
     return engine
 
@@ -176,14 +177,13 @@ def _cycles(session: Session, config: EnvConfig) -> int | None:
     return max(int(session.trajectory["frame"][-1]) // config.frames, 1)
 
 
-def _scenario(session: Session, town: Town, storyboard: StoryboardTemplate | None) -> Scenario:
+def _scenario(session: Session, seed: int, town: Town, storyboard: StoryboardTemplate | None) -> Scenario:
     """Returns the scenario of the session, drawn again with a drawn storyboard or with a given one."""
     header = session.header
-    assert header.seed is not None
     templates: list[StoryboardTemplate | None] = [storyboard]
     if storyboard is None and header.storyboard in template_names():
         templates.append(load_template(header.storyboard))
-    drawn = [draw_scenario(town, template, header.seed) for template in templates]
+    drawn = [draw_scenario(town, template, seed) for template in templates]
     for scenario in drawn:
         if _fits(scenario, header):
             return scenario

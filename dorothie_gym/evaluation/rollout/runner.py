@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final, Generic, TypeVar
 
-from dorothie_gym.errors import InputFileError, OutputFolderError, SessionError
+from dorothie_gym.errors import InputFileError, OutputFolderError, ProcessError, SessionError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
 from dorothie_gym.evaluation.rollout.play import play_session
@@ -132,6 +132,13 @@ class SessionOutcome(Generic[Plan, Result]):
     error: str | None = None
     played: bool
     cpu_seconds: float
+
+    @property
+    def success(self) -> Result:
+        """The result; raises `ProcessError` after an error."""
+        if self.result is None:
+            raise ProcessError(f"{self.plan}: {self.error or 'the job has taken no result from the session'}")
+        return self.result
 
 
 @dataclass(frozen=True, kw_only=True)

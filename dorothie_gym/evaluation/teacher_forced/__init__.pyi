@@ -1,5 +1,6 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
+from .labels import ALL as ALL
 from .labels import SPLITS as SPLITS
 from .labels import CorpusLabels as CorpusLabels
 from .labels import Split as Split
@@ -35,6 +36,7 @@ from .predictions import TaskPredictions as TaskPredictions
 from .predictions import act_labels as act_labels
 from .predictions import action_labels as action_labels
 from .predictions import write_predictions as write_predictions
+from .report import write_report as write_report
 from .scoring import RunScore as RunScore
 from .scoring import Scores as Scores
 from .scoring import score_runs as score_runs
@@ -42,6 +44,9 @@ from .scoring import score_task as score_task
 from .table import ResultsTable as ResultsTable
 from .table import evaluate_files as evaluate_files
 from .table import evaluate_predictions as evaluate_predictions
+from .terminal import print_counts as print_counts
+from .terminal import print_details as print_details
+from .terminal import print_table as print_table
 from .trivial_baselines import FLOORS as FLOORS
 from .trivial_baselines import FloorModel as FloorModel
 from .trivial_baselines import MajorityModel as MajorityModel

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,7 @@ from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 from dorothie_gym.ontology.slots import SlotValue
 from dorothie_gym.support.files import replacing
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from dorothie_gym.support.libraries import pa, pq
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +180,6 @@ SLOT_TEXTS: Final = tuple(slot_text(value) for value in LABELS)
 
 def file_schema() -> pa.Schema:
     """Returns the columns that `write_predictions` writes."""
-    import pyarrow as pa
-
     return pa.schema(
         [
             ("version", pa.int32()),
@@ -217,9 +213,6 @@ def write_predictions(
     Raises:
         OSError: it cannot be written.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     schema = file_schema()
     if about is not None:
         schema = schema.with_metadata({ABOUT: json.dumps(about, sort_keys=True, allow_nan=False).encode()})

@@ -16,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -95,7 +96,7 @@ def finish_erasures(records: StudyRecords) -> list[str]:
         failures = list(_remove_records(records, session, attempts_only=False))
         left += failures
         if not failures:
-            _attempt(left, lambda session=session: _note_removal(records, session))  # type: ignore[misc]
+            _attempt(left, partial(_note_removal, records, session))
     return left
 
 

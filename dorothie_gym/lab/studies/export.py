@@ -22,6 +22,7 @@ from dorothie_gym.lab.studies.study_file import read_study
 from dorothie_gym.session.recording.file_names import SessionState
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.support.files import replacing, write_atomically
+from dorothie_gym.support.libraries import pa, pq
 
 Row: TypeAlias = Mapping[str, str | int | float | bool | None]
 """Row of a table."""
@@ -202,9 +203,6 @@ def _cell(value: object) -> object:
 
 
 def _write_parquet(path: Path, columns: Mapping[str, str], rows: Sequence[Row]) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     schema = pa.schema([(name, getattr(pa, kind)()) for name, kind in columns.items()])
     with replacing(path) as part:
         pq.write_table(pa.Table.from_pylist([dict(row) for row in rows], schema=schema), part, compression="zstd")

@@ -86,7 +86,8 @@ def _fail(path: Path, root: yaml.Node, field: str, reason: str) -> NoReturn:
 
 def _child(node: yaml.Node, name: str, index: str) -> yaml.Node | None:
     if index and isinstance(node, yaml.SequenceNode) and int(index) < len(node.value):
-        return node.value[int(index)]  # type: ignore[no-any-return]  # a list of nodes
+        found: yaml.Node = node.value[int(index)]
+        return found
     if isinstance(node, yaml.MappingNode):
         return next((value for key, value in node.value if key.value == name), None)
     return None

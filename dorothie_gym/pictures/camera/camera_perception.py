@@ -72,8 +72,7 @@ class CameraPerception(CachedViews):
 
     def look(self) -> None:
         """Looks at the present decision."""
-        boxes = self._camera.render(self._world).boxes
-        assert boxes is not None
+        boxes = self._camera.render(self._world).bodies
         self._pixels = dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))
         self.in_view = tuple(
             landmark.index

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import PictureError
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.pictures.camera.atlas import AtlasArrays
 from dorothie_gym.pictures.camera.cells import CellOrder, CellTable, new_order, sorted_by_cell
@@ -33,6 +35,8 @@ from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.compilation import direct, fixed
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.support.copying import shared
+
+T = TypeVar("T")
 
 _ROOM = 4096  # triangles of bodies, at first
 _NO_BODIES = empty_records(PlacementRecord, 0)
@@ -84,6 +88,32 @@ class CameraFrame:
     semantic: NDArray[np.uint8] | None = None
     instance: NDArray[np.int32] | None = None
     boxes: Boxes | None = None
+
+    @property
+    def colours(self) -> NDArray[np.uint8]:
+        """`rgb`; this and the following raise `PictureError` if the configuration leaves the part out."""
+        return _drawn(self.rgb, CameraOutput.RGB)
+
+    @property
+    def classes(self) -> NDArray[np.uint8]:
+        """`semantic`."""
+        return _drawn(self.semantic, CameraOutput.SEMANTIC)
+
+    @property
+    def keys(self) -> NDArray[np.int32]:
+        """`instance`."""
+        return _drawn(self.instance, CameraOutput.INSTANCE)
+
+    @property
+    def bodies(self) -> Boxes:
+        """`boxes`."""
+        return _drawn(self.boxes, CameraOutput.BOXES)
+
+
+def _drawn(part: T | None, output: CameraOutput) -> T:
+    if part is None:
+        raise PictureError(f"the picture has no {output.value}: add it to the outputs of the camera's configuration")
+    return part
 
 
 @dataclass(frozen=True)
@@ -183,7 +213,7 @@ class FirstPersonCamera:
         config = self.config
         view = self.view_of(pose)
         bodies = argument(bodies)
-        frame: dict[str, NDArray[np.generic] | Boxes] = {}
+        rgb: NDArray[np.uint8] | None = None
         placed = -1
         if self._draws_rgb:
             light = self._daylight(weather, head_lights)
@@ -202,11 +232,11 @@ class FirstPersonCamera:
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))
             apply_faults(picture, faults, self._scratch)
-            frame["rgb"] = picture
+            rgb = picture
         if self._labelled:
             self._draw(view, self._label_buffer, self._label_orders, bodies, placed)
-            frame.update(self._write_labels(view, bodies))
-        return CameraFrame(view, **frame)  # type: ignore[arg-type]  # by the names of the outputs
+            return self._write_labels(view, rgb, bodies)
+        return CameraFrame(view, rgb)
 
     def _daylight(self, weather: Weather, head_lights: bool) -> Daylight:
         """Returns the light of a weather, and turns the maps of shadows, once as long as it stays."""
@@ -241,7 +271,9 @@ class FirstPersonCamera:
                 return count
             self._bodies = empty_mesh(2 * count)
 
-    def _write_labels(self, view: View, bodies: RecordArray[PlacementRecord]) -> dict[str, NDArray[np.generic] | Boxes]:
+    def _write_labels(
+        self, view: View, rgb: NDArray[np.uint8] | None, bodies: RecordArray[PlacementRecord]
+    ) -> CameraFrame:
         labels, outputs = self._labels, self.config.outputs
         _write_labels(
             view,
@@ -253,18 +285,21 @@ class FirstPersonCamera:
             self._samples,
             labels,
         )
-        found: dict[str, NDArray[np.generic] | Boxes] = {
-            output.value: getattr(labels, output.value).copy()
-            for output in (CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE)
-            if output in outputs
-        }
+        boxes: Boxes | None = None
         if CameraOutput.BOXES in outputs:
             keys = np.unique(np.concatenate((self._keys, plain(bodies)["key"])))
             table = np.zeros((len(keys), 5), np.int32)
             find_boxes(labels.instance, keys, table)
             seen = table[:, 4] > 0
-            found["boxes"] = Boxes(keys[seen], table[seen, :4], table[seen, 4])
-        return found
+            boxes = Boxes(keys[seen], table[seen, :4], table[seen, 4])
+        return CameraFrame(
+            view,
+            rgb,
+            labels.depth.copy() if CameraOutput.DEPTH in outputs else None,
+            labels.semantic.copy() if CameraOutput.SEMANTIC in outputs else None,
+            labels.instance.copy() if CameraOutput.INSTANCE in outputs else None,
+            boxes,
+        )
 
     @property
     def nbytes(self) -> int:

@@ -97,10 +97,11 @@ def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, tilt: floa
         maps: maps of shadows.
         tilt: tilt of the car upwards [rad].
     """
-    return Optics(  # type: ignore[call-arg]  # unpacked arrays, in the order of the fields
+    numbers = (
         *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, pm.tan(tilt),
         bool(maps.strength[0] > 0.0), *maps.slope.tolist(), *maps.window.tolist(),
     )  # fmt: skip
+    return Optics._make(numbers)  # in the order of the fields
 
 
 @inlined

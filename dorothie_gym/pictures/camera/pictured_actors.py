@@ -36,8 +36,7 @@ def pictured_actors(session: Session, town: Town) -> SceneTable:
 
 def _are_seen(pictures: RecordedPictures, frame: int, rows: slice) -> list[bool]:
     """Returns whether each actor of a record is seen."""
-    boxes, pose, visibility = pictures.picture(frame).boxes, pictures.pose(frame), pictures.visibility(frame)
-    assert boxes is not None
+    boxes, pose, visibility = pictures.picture(frame).bodies, pictures.pose(frame), pictures.visibility(frame)
     pixels = dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))
     actors = pictures.actors[rows]
     return [

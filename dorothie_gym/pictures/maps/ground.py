@@ -5,7 +5,6 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,7 @@ from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.shapes import Shape, disc, ribbon, simplified, strokes
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 # Larger holes between connectors are islands (such as the middle of a roundabout), not asphalt [m2].
 _LARGEST_HOLE = 160.0
@@ -71,8 +68,6 @@ class _Piece:
 
 def _free(outlines: Sequence[Array], scale: float, border: float) -> list[_Piece]:
     """Returns the areas outside polygons (n, 2) [m], within a frame extended by a border [m]."""
-    import pygame
-
     surface, low = _painted(outlines, scale, border)
     free = pygame.mask.from_surface(surface)
     free.invert()
@@ -93,8 +88,6 @@ def junction_areas(town: Town) -> list[Array]:
 
 
 def _closed(town: Town, connectors: Sequence[int]) -> Iterator[Array]:
-    import pygame
-
     lanes = [town.lanes[k] for k in connectors]
     outlines = [ribbon(lane, -_INSET) for lane in lanes]
     for lane in dict.fromkeys(k for c in connectors for k in town.predecessors(c)):
@@ -128,8 +121,6 @@ class _Part:
 
 
 def _pieces(cells: NDArray[np.bool_]) -> Iterator[_Part]:
-    import pygame
-
     numbers, count = label(cells)
     for k in range(1, count + 1):
         array = numbers == k
@@ -160,8 +151,6 @@ def smooth_outline(outline: Array, size: int) -> Array:
 
 def _painted(outlines: Sequence[Array], scale: float, border: float) -> tuple[pygame.Surface, Array]:
     """Draws polygons (n, 2) [m] on a surface, extended by a border [m]; returns it and its corner (2,) [m]."""
-    import pygame
-
     points = np.concatenate(outlines)
     low, high = points.min(axis=0) - border, points.max(axis=0) + border
     width, height = (int(n) for n in np.ceil((high - low) * scale))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import font
 from dorothie_gym.support import portable_arrays as pn
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 ICON_SUPERSAMPLING = 4  # supersampling factor
 _LAMPS = (
@@ -45,8 +42,6 @@ def sign_icon(kind: SignalKind, size: int, shown: LightColour | None = None) -> 
 
 
 def _light(size: int, shown: LightColour | None) -> pygame.Surface:
-    import pygame
-
     high, wide = size * ICON_SUPERSAMPLING, round(0.5 * size) * ICON_SUPERSAMPLING
     fine = pygame.Surface((wide, high), pygame.SRCALPHA, 32)
     rim = max(1, round(0.045 * high))
@@ -60,8 +55,6 @@ def _light(size: int, shown: LightColour | None) -> pygame.Surface:
 
 
 def _stop(size: int) -> pygame.Surface:
-    import pygame
-
     side = size * ICON_SUPERSAMPLING
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     for radius, ink in ((0.5, palette.SIGN_WHITE), (0.44, palette.SIGN_RED)):
@@ -72,8 +65,6 @@ def _stop(size: int) -> pygame.Surface:
 
 
 def _yield(size: int) -> pygame.Surface:
-    import pygame
-
     side = size * ICON_SUPERSAMPLING
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     middle = np.array([side / 2.0, 0.36 * side])
@@ -92,8 +83,6 @@ def pin_icon(text: str, radius: int, bearing: int) -> pygame.Surface:
         radius: radius of its head [px].
         bearing: direction of the tip, clockwise from the right.
     """
-    import pygame
-
     r = radius * ICON_SUPERSAMPLING
     side = round(4.2 * r)
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
@@ -119,8 +108,6 @@ def _regular(corners: int, middle: float, radius: float, turn: float) -> Array:
 
 def _smooth(fine: pygame.Surface) -> pygame.Surface:
     """Scales a supersampled surface down, with premultiplied colours for correct edges."""
-    import pygame
-
     width, height = fine.get_size()
     return pygame.transform.smoothscale(
         fine.premul_alpha(), (width // ICON_SUPERSAMPLING, height // ICON_SUPERSAMPLING)
@@ -129,7 +116,5 @@ def _smooth(fine: pygame.Surface) -> pygame.Surface:
 
 def stamp(picture: pygame.Surface, icon: pygame.Surface, centre: Array) -> None:
     """Draws an icon centred on a pixel."""
-    import pygame
-
     corner = (round(float(centre[0]) - icon.get_width() / 2.0), round(float(centre[1]) - icon.get_height() / 2.0))
     picture.blit(icon, corner, special_flags=pygame.BLEND_PREMULTIPLIED)

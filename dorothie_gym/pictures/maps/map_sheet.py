@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +18,7 @@ from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.markings import one_way_arrow, one_way_places, turn_arrow
 from dorothie_gym.pictures.maps.town_map import BAR_LENGTHS, GROUND, MapPainter
 from dorothie_gym.pictures.text import font, words
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 _ROWS = 4
 _HIGH = 1.9  # [units] height of a swatch
@@ -76,8 +73,6 @@ class Legend:
 
     def _swatch(self, *shapes: tuple[Array, palette.Colour], ground: palette.Colour = palette.ROAD) -> pygame.Surface:
         """Returns a swatch of map, `_METRES` wide, with its centre at (0, 0)."""
-        import pygame
-
         wide, high = round(_WIDEST_SHEET * self._unit), round(_HIGH * self._unit)
         fine = pygame.Surface((wide * ICON_SUPERSAMPLING, high * ICON_SUPERSAMPLING), pygame.SRCALPHA, 32)
         pygame.draw.rect(fine, ground, fine.get_rect(), border_radius=round(0.25 * self._unit * ICON_SUPERSAMPLING))
@@ -207,8 +202,6 @@ def town_picture(
         FileNotFoundError: the folder of `path` does not exist.
         ValueError: the size is too small for a title and a map.
     """
-    import pygame
-
     target = Path(path)
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist; make it first")
@@ -276,8 +269,6 @@ def _ranges(numbers: Sequence[int]) -> str:
 
 
 def _draw_sheet(surface: pygame.Surface, painter: MapPainter, fold: str | None) -> None:
-    import pygame
-
     width, height = painter.size
     unit, edge, strip = _measures(painter.town, painter.street_names, width)
     inner = pygame.Rect(edge, edge, width - 2 * edge, height - edge - strip)
@@ -317,8 +308,6 @@ def _draw_title(surface: pygame.Surface, town: Town, unit: float, left: float, t
 
 def _spaced(text: str, size: int, space: float) -> pygame.Surface:
     """Returns a line of text with extra space between the letters."""
-    import pygame
-
     letters = [words(letter, size, palette.INK, True) for letter in text]
     width = round(sum(letter.get_width() + space for letter in letters))
     line = pygame.Surface((max(1, width), letters[0].get_height() if letters else 1), pygame.SRCALPHA, 32)
@@ -331,8 +320,6 @@ def _spaced(text: str, size: int, space: float) -> pygame.Surface:
 
 def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float, top: float) -> float:
     """Draws north arrow and scale bar; returns their left end [px]."""
-    import pygame
-
     metres = max((n for n in BAR_LENGTHS if n * scale <= 22.0 * unit), default=BAR_LENGTHS[0])
     length = round(metres * scale)
     centre = right - 1.6 * unit

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,9 +21,7 @@ from dorothie_gym.pictures.maps.shapes import Shape, longer, strokes
 from dorothie_gym.pictures.maps.street_names import Label, LabelPlacer, covering
 from dorothie_gym.pictures.text import set_along, words
 from dorothie_gym.support import portable_arrays as pn
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 SUPERSAMPLING = 2
 GROUND = 14.0
@@ -150,8 +147,6 @@ class MapPainter:
 
         Lights show their colours at a time [s] if one is given.
         """
-        import pygame
-
         view = pygame.Surface(size)
         view.fill(palette.COUNTRY)
         corner = np.round(self.to_pixel(centre) - np.array(size) / 2.0).astype(int)
@@ -168,8 +163,6 @@ class MapPainter:
             time: simulated time [s].
             corner: pixel of the map at the upper left corner of the picture.
         """
-        import pygame
-
         shift = np.asarray(corner, dtype=float)
         reach = np.array(picture.get_size()) + 2.0 * self._signs
         for lane, kind in self.plan.ruled.items():
@@ -266,8 +259,6 @@ class MapPainter:
 
     @cached_property
     def _surface(self) -> pygame.Surface:
-        import pygame
-
         shapes = [*self._uncovered(), *self._one_way_arrows()]
         bounds = np.array([shape.bounds for shape in shapes])
         picture = pygame.Surface(self.size)
@@ -286,8 +277,6 @@ class MapPainter:
     def _paint_tile(
         self, shapes: Sequence[Shape], bounds: Array, left: int, top: int, size: tuple[int, int]
     ) -> pygame.Surface:
-        import pygame
-
         factor = SUPERSAMPLING
         tile = pygame.Surface((size[0] * factor, size[1] * factor))
         tile.fill(palette.COUNTRY)
@@ -309,8 +298,6 @@ class MapPainter:
 
 def _draw_name(tile: pygame.Surface, label: Label, corner: Array) -> None:
     """Draws a label on a tile with its corner at a pixel: light on plain road, or dark with a halo beside the road."""
-    import pygame
-
     size = label.size * SUPERSAMPLING
     for text, row in zip(label.rows, label.row_paths(), strict=True):
         line = (row - corner) * SUPERSAMPLING
@@ -333,8 +320,6 @@ def _sized(rule: tuple[float, int], scale: float, smallest: float) -> int:
 
 def draw_scale_bar(surface: pygame.Surface, scale: float, corner: tuple[int, int], longest: int) -> None:
     """Draws a scale bar for a `scale` [px/m] with its lower left corner at a pixel, and a north arrow."""
-    import pygame
-
     metres = max((n for n in BAR_LENGTHS if n * scale <= longest), default=BAR_LENGTHS[0])
     length = round(metres * scale)
     x, y = corner

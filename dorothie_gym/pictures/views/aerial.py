@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +28,7 @@ from dorothie_gym.pictures.views.sprites import (
     pin_direction,
 )
 from dorothie_gym.support import portable_arrays as pn
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 _NIGHT = (126, 138, 184)
 _OVERCAST = (226, 230, 236)
@@ -74,8 +71,6 @@ def apply_weather(picture: pygame.Surface, weather: Mapping[str, float], time: f
         weather: parameters by name; missing ones have their values of a clear noon.
         time: time that animates the rain [s].
     """
-    import pygame
-
     dark = darkness(weather)
     grey = _value(weather, WeatherParameter.CLOUDINESS) / 100.0
     factor = [255.0 + (n - 255.0) * dark for n in _NIGHT]
@@ -95,8 +90,6 @@ def apply_weather(picture: pygame.Surface, weather: Mapping[str, float], time: f
 
 
 def _draw_rain(picture: pygame.Surface, strength: float, wind: float, time: float) -> None:
-    import pygame
-
     width, height = picture.get_size()
     rng = np.random.default_rng(round(time * 30.0) & 0xFFFFFFFF)
     layer = pygame.Surface((width, height), pygame.SRCALPHA, 32)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,7 @@ from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.views.aerial import AerialView
 from dorothie_gym.pictures.views.panel import Panel
 from dorothie_gym.pictures.views.scene import Scene
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 PICTURE_SIZE = (1640, 900)
 """Width and height of the picture of a whole session with its transcript [px]."""
@@ -57,8 +54,6 @@ class SceneRenderer:
         Returns:
             Pixels (height, width, 3) in 0..255.
         """
-        import pygame
-
         pixels = pygame.surfarray.array3d(self._surface(scene, follow))  # (width, height, 3)
         return np.ascontiguousarray(pixels.swapaxes(0, 1))
 
@@ -68,16 +63,12 @@ class SceneRenderer:
         Raises:
             FileNotFoundError: the folder of `path` does not exist.
         """
-        import pygame
-
         target = Path(path)
         if not target.parent.is_dir():
             raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist; make it first")
         pygame.image.save(self._surface(scene, follow), str(target), ".png")
 
     def _surface(self, scene: Scene, follow: bool) -> pygame.Surface:
-        import pygame
-
         frame = pygame.Surface(self.size)
         view = self._aerial.draw(scene, follow)
         frame.blit(view, (0, 0))
@@ -99,8 +90,6 @@ class HumanWindow:
         Raises:
             RuntimeError: there is no display.
         """
-        import pygame
-
         try:
             pygame.display.init()
             self._screen = pygame.display.set_mode(size)
@@ -112,8 +101,6 @@ class HumanWindow:
 
     def show(self, frame: NDArray[np.uint8], frames_per_second: float = 0.0) -> None:
         """Shows a frame (height, width, 3), limited to a frame rate [1/s] (0: no limit)."""
-        import pygame
-
         if self.closed:
             return
         for event in pygame.event.get():
@@ -127,8 +114,6 @@ class HumanWindow:
 
     def close(self) -> None:
         """Closes the window; may be called more than once."""
-        import pygame
-
         if not self.closed:
             self.closed = True
             pygame.display.quit()

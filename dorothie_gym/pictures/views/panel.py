@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import shorten, words, wrap
 from dorothie_gym.pictures.views.aerial import weather_summary
 from dorothie_gym.pictures.views.scene import Scene, SpokenLine
-
-if TYPE_CHECKING:
-    import pygame
-
+from dorothie_gym.support.libraries import pygame
 
 _PANEL_FINE = 2  # supersampling factor
 _PAD = 20
@@ -44,8 +39,6 @@ class Panel:
 
     def draw(self, scene: Scene) -> pygame.Surface:
         """Returns a surface with the panel."""
-        import pygame
-
         key = (
             tuple(scene.subgoals),
             tuple(scene.notes),
@@ -176,8 +169,6 @@ class Pen:
     """Supersampled surface with coordinates in final pixels."""
 
     def __init__(self, size: tuple[int, int], ground: Colour = palette.PANEL) -> None:
-        import pygame
-
         self.surface = pygame.Surface((size[0] * _PANEL_FINE, size[1] * _PANEL_FINE))
         self.surface.fill(ground)
 
@@ -192,8 +183,6 @@ class Pen:
 
     def box(self, x: float, y: float, width: float, height: float, colour: Colour, radius: int) -> None:
         """Fills a rounded box."""
-        import pygame
-
         rect = pygame.Rect(
             round(x * _PANEL_FINE), round(y * _PANEL_FINE), round(width * _PANEL_FINE), round(height * _PANEL_FINE)
         )
@@ -201,8 +190,6 @@ class Pen:
 
     def line(self, left: float, y: float, right: float) -> None:
         """Draws a thin horizontal line."""
-        import pygame
-
         pygame.draw.rect(
             self.surface,
             palette.PANEL_EDGE,
@@ -211,16 +198,12 @@ class Pen:
 
     def strike(self, left: float, right: float, y: float, colour: Colour) -> None:
         """Strikes a line of text through."""
-        import pygame
-
         pygame.draw.rect(
             self.surface, colour, (left * _PANEL_FINE, y * _PANEL_FINE, (right - left) * _PANEL_FINE, _PANEL_FINE)
         )
 
     def tick_box(self, x: float, y: float, colour: Colour, state: str) -> None:
         """Draws the mark of a subgoal: a ring, filled with a tick once complete."""
-        import pygame
-
         centre = (x * _PANEL_FINE, y * _PANEL_FINE)
         if state in ("none", "pending", "abandoned"):
             pygame.draw.circle(self.surface, colour, centre, 8 * _PANEL_FINE, 2 * _PANEL_FINE)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,11 +11,8 @@ from dorothie_gym.pictures.views.frames import SceneRenderer
 from dorothie_gym.pictures.views.panel import Panel
 from dorothie_gym.pictures.views.scene import Scene
 from dorothie_gym.pictures.views.subtitles import Subtitles
+from dorothie_gym.support.libraries import pygame
 from dorothie_gym.support.render_view import RenderView
-
-if TYPE_CHECKING:
-    import pygame
-
 
 _SIZE = 1280, 720
 _WINDSCREEN = 832, 540  # of `RenderView.BOTH`; the subtitles are below
@@ -80,6 +75,4 @@ class SessionRenderer:
 
 def _pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
     """Returns the pixels of a surface (height, width, 3)."""
-    import pygame
-
     return np.asarray(pygame.surfarray.array3d(surface).swapaxes(0, 1), dtype=np.uint8)

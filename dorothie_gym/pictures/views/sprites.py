@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +15,7 @@ from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import words
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 _STROKE = 6  # segments
 
@@ -35,8 +32,6 @@ class Canvas:
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
-        import pygame
-
         self.size = size
         self.scale = 1.0
         self.origin: Array = np.zeros(2)
@@ -49,8 +44,6 @@ class Canvas:
 
     def blit_on(self, picture: pygame.Surface) -> None:
         """Draws the layer onto the picture."""
-        import pygame
-
         smooth = pygame.transform.smoothscale(self._layer, self.size)
         picture.blit(smooth, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
@@ -69,28 +62,20 @@ class Canvas:
 
     def pixel_polygon(self, points: Array, colour: Colour, alpha: float = 1.0) -> None:
         """Fills a polygon (n, 2) [px]; a translucent one replaces earlier drawings on this layer."""
-        import pygame
-
         ink = (*(round(c * alpha) for c in colour), round(255 * alpha))
         pygame.draw.polygon(self._layer, ink, (points * SUPERSAMPLING).tolist())
 
     def dot(self, centre: Array, radius: float, colour: Colour) -> None:
         """Fills a circle, all in pixels."""
-        import pygame
-
         pygame.draw.circle(self._layer, colour, (centre * SUPERSAMPLING).tolist(), radius * SUPERSAMPLING)
 
     def ring(self, centre: Array, radius: float, width: float, colour: Colour) -> None:
         """Draws a circle, all in pixels."""
-        import pygame
-
         pen = max(1, round(width * SUPERSAMPLING))
         pygame.draw.circle(self._layer, colour, (centre * SUPERSAMPLING).tolist(), radius * SUPERSAMPLING, pen)
 
     def line(self, points: Array, width: float, colour: Colour) -> None:
         """Draws a line (n, 2) with round joints, all in pixels."""
-        import pygame
-
         fine = points * SUPERSAMPLING
         pen = width * SUPERSAMPLING - 1.0  # a polygon's border adds half a pixel on either side
         # in short strokes: a polygon that crosses itself would have holes
@@ -102,16 +87,12 @@ class Canvas:
 
     def box(self, rect: tuple[float, float, float, float], colour: Colour, border: Colour, radius: float = 5) -> None:
         """Draws a filled rounded box (x, y, width, height) with a thin border, all in pixels."""
-        import pygame
-
         fine = pygame.Rect([round(v * SUPERSAMPLING) for v in rect])
         pygame.draw.rect(self._layer, colour, fine, border_radius=round(radius * SUPERSAMPLING))
         pygame.draw.rect(self._layer, border, fine, SUPERSAMPLING, border_radius=round(radius * SUPERSAMPLING))
 
     def text(self, text: str, left: float, middle: float, size: int, colour: Colour, bold: bool = False) -> None:
         """Writes a line of text, all in pixels."""
-        import pygame
-
         piece = words(text, size * SUPERSAMPLING, colour, bold)
         corner = (round(left * SUPERSAMPLING), round(middle * SUPERSAMPLING - piece.get_height() / 2))
         self._layer.blit(piece.premul_alpha(), corner, special_flags=pygame.BLEND_PREMULTIPLIED)

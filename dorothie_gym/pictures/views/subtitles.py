@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import shorten, wrap
 from dorothie_gym.pictures.views.panel import Pen
 from dorothie_gym.pictures.views.scene import Scene, SpokenLine
-
-if TYPE_CHECKING:
-    import pygame
+from dorothie_gym.support.libraries import pygame
 
 LINGER = 2.5
 """Time for which a line stays bright after it was heard [s]: long enough to read its end."""
@@ -43,8 +39,6 @@ class Subtitles:
 
     def draw(self, scene: Scene) -> pygame.Surface:
         """Returns a surface with the last lines that fit, the newest at the bottom."""
-        import pygame
-
         lines = shown_lines(scene)
         if self._held is None or self._held[0] != lines:
             pen = Pen(self.size, palette.SUBTITLE_GROUND)

@@ -177,8 +177,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 def _needs_switch(state: CoWizardState, view: CoWizardView, crossing: RouteJunction | None) -> bool:
     """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
-    progress = state.route.progress
-    assert progress is not None
+    progress = state.route.to_goal
     if crossing is None or progress.changes_before(crossing) or view.choice is None:
         return True
     if progress.needs_switch(state.town, view.lane, view.station, crossing):

@@ -246,13 +246,12 @@ def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     if fault is known:
         return
     state.dialogue = state.dialogue.with_view_fault(fault)
-    if fault is None:
-        assert known is not None
+    if fault is None and known is not None:
         state.intentions = state.intentions.with_speed(state.intentions.usual)
         if rng.random() < state.style.notices:
             state.say(fault_remark(known, over=True))
         return
-    if known is not None:
+    if fault is None or known is not None:
         return  # the picture changes, the fault stays
     effect = (view_remark(Limit.CAMERA, sight(view.raw), rng),) if rng.random() < state.style.rambles else ()
     failed = fault_remark(fault, joined=bool(effect))

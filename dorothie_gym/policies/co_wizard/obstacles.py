@@ -57,8 +57,7 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
 
 def _proposed_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> Proposition:
     """Returns a proposed detour: over a street, by a U-turn, or in no particular way."""
-    assert state.route.progress is not None
-    route = state.route.progress.replanned(state.town, view.here, state.route.blocked)
+    route = state.route.to_goal.replanned(state.town, view.here, state.route.blocked)
     street = first_new_street(view.raw, state.town, view.lane, route)
     if street is not None and rng.random() < state.config.detour_by_street:
         return act_builders.action(None, street=street)

@@ -147,10 +147,9 @@ def _update_route(state: CoWizardState, view: CoWizardView) -> None:
     if state.route.progress is None or view.manoeuvring:
         return
     before = state.route.progress.left(view.station)
-    state.route = state.route.with_progress(state.route.progress.followed(state.town, view.lane, view.station))
-    assert state.route.progress is not None
-    if state.route.progress.astray >= state.config.replan_after:
-        former = state.route.progress
+    former = state.route.progress.followed(state.town, view.lane, view.station)
+    state.route = state.route.with_progress(former)
+    if former.astray >= state.config.replan_after:
         state.route = state.route.replanned(state.town, view.here)
         if state.route.has_missed(before, view.station):
             state.route = state.route.after_miss(state.town, view.here, former)

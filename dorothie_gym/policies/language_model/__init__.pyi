@@ -1,5 +1,6 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
+from .config import URL_VARIABLE as URL_VARIABLE
 from .config import LanguageModelConfig as LanguageModelConfig
 from .config import SimulatedTime as SimulatedTime
 from .faults import Fault as Fault

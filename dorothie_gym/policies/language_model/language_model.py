@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, TypedDict
 
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
@@ -17,6 +17,17 @@ from dorothie_gym.support.copying import shared
 
 _LEAST_TIME: Final = 0.05
 """Time below which no further attempt is made [s]."""
+
+
+class ChatRequest(TypedDict):
+    """Body of a request to a chat endpoint, as its interface names the fields."""
+
+    model: str
+    messages: list[dict[str, object]]
+    response_format: dict[str, Any]
+    temperature: float
+    max_tokens: int
+    seed: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +48,7 @@ class Prompt:
     picture: str = ""
     seed: int = 0
 
-    def request(self, config: LanguageModelConfig) -> dict[str, object]:
+    def request(self, config: LanguageModelConfig) -> ChatRequest:
         """Returns the body of the request."""
         content: object = self.text
         if self.picture:
@@ -95,7 +106,7 @@ class LanguageModel:
             self._cassette.add(request, reply)
         return reply
 
-    def _call(self, request: Mapping[str, object], schema: AnswerSchema) -> Reply:
+    def _call(self, request: ChatRequest, schema: AnswerSchema) -> Reply:
         """Makes a call of at most two attempts, the second after a requested delay or with the model's error."""
         endpoint, begun = ChatEndpoint(self._config.url), self._clock()
         tokens, retried = (0, 0), False
@@ -130,9 +141,9 @@ def _added(first: tuple[int, int], second: tuple[int, int]) -> tuple[int, int]:
     return first[0] + second[0], first[1] + second[1]
 
 
-def _with_error(request: Mapping[str, object], text: str, error: CallError) -> dict[str, object]:
+def _with_error(request: ChatRequest, text: str, error: CallError) -> ChatRequest:
     """Returns the request of the second attempt: the conversation is continued by the answer and its error."""
-    messages = list(request["messages"])  # type: ignore[call-overload]
+    messages = list(request["messages"])
     if text:
         messages.append({"role": "assistant", "content": text[:2000]})
     messages.append(

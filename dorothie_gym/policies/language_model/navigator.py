@@ -99,10 +99,9 @@ class Navigator:
             return navigator
         former = route.progress
         before = former.left(view.station)
-        route = route.with_progress(former.followed(town, view.lane, view.station))
-        assert route.progress is not None
-        if route.progress.astray >= REPLAN_AFTER:
-            left = route.progress
+        left = former.followed(town, view.lane, view.station)
+        route = route.with_progress(left)
+        if left.astray >= REPLAN_AFTER:
             route = route.replanned(town, view.here)
             if route.has_missed(before, view.station):
                 route = route.after_miss(town, view.here, left)
@@ -178,8 +177,7 @@ class Navigator:
         )
 
     def _u_turn(self, town: Town, view: CoWizardView, distance: float) -> RouteStep:
-        progress = self.route.progress
-        assert progress is not None
+        progress = self.route.to_goal
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
         due = not view.manoeuvring and (distance <= slowing_distance(view.speed) or held_up)
         if due and town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
@@ -189,8 +187,7 @@ class Navigator:
 
     def _needs_switch(self, town: Town, view: CoWizardView, crossing: RouteJunction | None) -> bool:
         """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
-        progress = self.route.progress
-        assert progress is not None
+        progress = self.route.to_goal
         if crossing is None or progress.changes_before(crossing) or view.choice is None:
             return True
         if progress.needs_switch(town, view.lane, view.station, crossing):

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
@@ -189,6 +190,13 @@ class NavigationPolicyState:
     decided_at: float = -1.0
     speed: int
 
+    @property
+    def seen(self) -> ObservationMapping:
+        """Observation at the last decision; raises `PolicyStateError` before the first."""
+        if self.observation is None:
+            raise PolicyStateError("the driver has observed nothing yet: update the state with an observation first")
+        return self.observation
+
 
 class DriverInputs:
     """Conversion of Co-Wizard observations in a town to observations and masks of `Navigation-v0`.
@@ -223,15 +231,13 @@ class DriverInputs:
 
     def observe(self, state: NavigationPolicyState) -> tuple[Vector, NDArray[np.bool_]]:
         """Returns observation (161,) and mask (18,) of the driver."""
-        assert state.observation is not None
-        vector = self._encoder.observe(state.observation, state.instructions.heard, state.co_wizard.route.blocked)
-        return vector, self._mask.mask(driver_of(state.observation, self.exits))
+        vector = self._encoder.observe(state.seen, state.instructions.heard, state.co_wizard.route.blocked)
+        return vector, self._mask.mask(driver_of(state.seen, self.exits))
 
 
 def has_nothing_to_do(state: NavigationPolicyState) -> bool:
     """Returns whether the policy is not queried: no instruction was given yet, or the car stands as instructed."""
-    assert state.observation is not None
-    stopped = int(state.observation["motion"]) == Motion.STOPPED
+    stopped = int(state.seen["motion"]) == Motion.STOPPED
     return state.instructions.heard.instruction is None or (state.co_wizard.intentions.halted and stopped)
 
 
@@ -287,9 +293,8 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
     def _drive(self, inputs: DriverInputs, state: NavigationPolicyState) -> Physical | None:
         if has_nothing_to_do(state):
             return None
-        assert state.observation is not None
         action = NavigationAction(self._choose(*inputs.observe(state)))
-        return physical_of(action, driver_of(state.observation, inputs.exits))
+        return physical_of(action, driver_of(state.seen, inputs.exits))
 
     def _inputs_of(self, town: Town) -> DriverInputs:
         """Returns the conversion for a town; each is made once."""

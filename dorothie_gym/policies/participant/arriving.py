@@ -68,8 +68,7 @@ _SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0
 
 def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Guides the car on the last stretch; returns whether the car is on the last stretch."""
-    progress, config = state.route.progress, state.config
-    assert progress is not None
+    progress, config = state.route.to_goal, state.config
     if (
         progress.next_crossing(state.town, view.station) is not None
         or progress.next_manoeuvre(view.station) is not None
@@ -96,8 +95,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 
 def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
     """Repeats a stop instruction to a car that has not heeded it and drives past the place."""
-    progress, since = state.route.progress, view.time - state.guidance.stopped_at
-    assert progress is not None
+    progress, since = state.route.to_goal, view.time - state.guidance.stopped_at
     unheeded = _stop_repeat(state, view) < since < STOP_REPEAT and not view.standing
     if unheeded and -PASSED < progress.left(view.station) <= 0.0 and state.speech.idle and view.speaking <= 0.0:
         state.guidance = state.guidance.after_stopping(view.time)
@@ -227,7 +225,6 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     A car that does not move is asked why instead of being told a third time; then it is told to go straight on, in case
     it waits before a junction, and to start.
     """
-    assert state.route.progress is not None
     since = view.time if state.motion.standing_since is None else state.motion.standing_since
     state.guidance = state.guidance.after_nudging(view.time, since)
     again, attempt = divmod(state.guidance.nudges, IN_VAIN + 1)
@@ -237,7 +234,7 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
         return order(DialogueMove.INSTRUCT, ActionValue.START)
     if again:
         return straight_on()
-    left = state.route.progress.left(view.station)
+    left = state.route.to_goal.left(view.station)
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
     reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE

@@ -143,8 +143,7 @@ def _go_first(
     rng: np.random.Generator,
 ) -> None:
     """Interrupts the target for a subgoal that was just added."""
-    former = state.task.goal
-    assert former is not None
+    former = state.task.destination
     switch_target(state, view, subgoal, landmark)
     street = None if view.unique(landmark) else landmark.street
     now = act_builders.errand(landmark.name, GoalStatus.ONGOING, street)
@@ -303,15 +302,14 @@ def _aim_at(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal
 
 def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
     """Returns the target as an instruction, with its street where that helps."""
-    task = state.task
-    assert task.goal is not None
+    task, place = state.task, state.task.destination
     street = None
-    if not view.unique(task.goal) or rng.random() < state.style.names_street:
-        street = act_builders.named(task.goal.street)
+    if not view.unique(place) or rng.random() < state.style.names_street:
+        street = act_builders.named(place.street)
     if task.target in task.put_off:
-        resumed = act_builders.errand(task.goal.name, GoalStatus.ONGOING)
+        resumed = act_builders.errand(place.name, GoalStatus.ONGOING)
         return intend(Function.REQUEST, resumed, wording=Wording(topic="resume"))
-    goal = act_builders.destination(task.goal.name, street)
+    goal = act_builders.destination(place.name, street)
     more = sum(subgoal.open for subgoal in view.subgoals) > 2
     if street is None and more and rng.random() < 0.5:
         return intend(Function.REQUEST, goal, wording=Wording(topic="first"))
@@ -437,8 +435,7 @@ def announce_target(state: ParticipantState, view: ParticipantView, rng: np.rand
 
 def describe(state: ParticipantState, view: ParticipantView, function: Function, rng: np.random.Generator) -> None:
     """Describes the place of the target by street, a landmark nearby and an object; guidance follows now or later."""
-    goal = state.task.goal
-    assert goal is not None
+    goal = state.task.destination
     no_street = goal.street is StreetName.UNKNOWN
     state.set_guiding(bool(no_street or state.task.described or rng.random() < state.config.guides_at_once))
     state.task = state.task.after_describing()

@@ -73,12 +73,10 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         state.guidance = state.guidance.for_another_approach()
         if not drove_past:
             _point_out_wrong_turn(state, view, before)
-        assert state.route.progress is not None
         if drove_past and not state.guidance.guiding:
             # the car has not been told yet that it is there
-            state.guidance = state.guidance.for_new_route(state.route.progress.left(view.station))
-    assert state.route.progress is not None
-    state.guidance = state.guidance.with_distance(state.route.progress.left(view.station))
+            state.guidance = state.guidance.for_new_route(state.route.to_goal.left(view.station))
+    state.guidance = state.guidance.with_distance(state.route.to_goal.left(view.station))
 
 
 def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> bool:
@@ -91,13 +89,12 @@ def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> boo
 
 def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before: float) -> None:
     """Points out that the car has not taken the announced turn."""
-    guidance, progress = state.guidance, state.route.progress
-    assert progress is not None
-    turn_given = guidance.guiding and guidance.step is not None and guidance.step[0] == "turn"
+    guidance, progress = state.guidance, state.route.to_goal
     farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
-    if turn_given and farther:
-        state.feel(Happening.WRONG_WAY, view.time)
-    if turn_given and farther and not remark_on_wrong_turn(state, view):
+    if not guidance.guiding or guidance.step is None or guidance.step[0] != "turn" or not farther:
+        return
+    state.feel(Happening.WRONG_WAY, view.time)
+    if not remark_on_wrong_turn(state, view, guidance.step):
         expires = view.time + WRONG_WAY_EXPIRES
         state.say_only(_wrong_way(state, expires))
 
@@ -144,8 +141,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
     if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
         return
-    progress = state.route.progress
-    assert progress is not None
+    progress = state.route.to_goal
     waited = view.time - max(state.guidance.step_at, state.conversation.heard_at)
     on_its_lane = key[0] == "round" and progress.turns_round_on(view.lane)
     if on_its_lane and state.motion.standstill(view.time) > U_TURN_WAIT:
@@ -228,8 +224,7 @@ def _is_left_to_ask(
 
 def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Asks the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
-    progress, config = state.route.progress, state.config
-    assert progress is not None
+    progress, config = state.route.to_goal, state.config
     far = progress.left(view.station) > config.stop_distance
     if state.guidance.slowed_early or far or view.speed < config.slow_speed:
         return False
@@ -246,8 +241,7 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.ran
 
 def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether there is hardly time to stop between the next junction or lane change and the place."""
-    progress, step, config = state.route.progress, state.guidance.step, state.config
-    assert progress is not None
+    progress, step, config = state.route.to_goal, state.guidance.step, state.config
     left = progress.left(view.station)
     crossing = progress.next_crossing(state.town, view.station)
     if crossing is None:
@@ -259,17 +253,15 @@ def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
 
 def _u_turn_distance(state: ParticipantState, view: ParticipantView) -> float:
     """Returns the distance at which a U-turn is announced [m]: driven during the announcement and while braking."""
-    assert state.route.progress is not None
     announcing = ANNOUNCING_TIME * view.speed
-    if not state.route.progress.turns_round_on(view.lane):
+    if not state.route.to_goal.turns_round_on(view.lane):
         return announcing
     return announcing + slowing_distance(view.speed)
 
 
 def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether the U-turn is postponed: a car that turned round here could not stop at the place in time."""
-    progress, config = state.route.progress, state.config
-    assert progress is not None
+    progress, config = state.route.to_goal, state.config
     after = progress.run_up()
     crosses = progress.next_crossing(state.town, view.station) is not None
     if after is None or crosses or not progress.turns_round_on(view.lane):
@@ -287,8 +279,7 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
 
 def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:
     """Returns whether a U-turn `farther` metres ahead is possible as well and leaves more road before the place."""
-    progress = state.route.progress
-    assert progress is not None
+    progress = state.route.to_goal
     later = progress.replanned(state.town, (view.lane, view.station + farther), state.route.closed)
     now, then = progress.run_up(), later.run_up()
     return now is not None and then is not None and later.turns_round_on(view.lane) and then[0] > now[0] + farther / 2
@@ -352,9 +343,8 @@ def _is_ambiguous(state: ParticipantState, view: ParticipantView, crossing: Rout
     if crossing.lane in turn_lanes(state.town):
         return False
     choice = next_choice(state.town, view.lane, view.station)
-    own = choice is not None and choice.lane == crossing.lane
-    asked = choice if own else Choice(lane=crossing.lane, distance=0.0, exits=state.town.exits(crossing.lane))
-    assert asked is not None
-    meant = find_exit(state.town, asked, crossing.direction)
+    if choice is None or choice.lane != crossing.lane:
+        choice = Choice(lane=crossing.lane, distance=0.0, exits=state.town.exits(crossing.lane))
+    meant = find_exit(state.town, choice, crossing.direction)
     lanes = state.town.lanes
     return meant is not None and lanes[meant.lane].road_id != lanes[crossing.exit.lane].road_id

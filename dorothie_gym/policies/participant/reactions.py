@@ -129,8 +129,7 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
 
 def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[Place | None, PropKind | None]:
     """Returns the place of the first obstacle in sight on the next lanes of the route, and its kind."""
-    assert state.route.progress is not None
-    lanes = [leg.lane for leg in state.route.progress.legs[:6]]
+    lanes = [leg.lane for leg in state.route.to_goal.legs[:6]]
     for thing in view.objects:
         if thing.kind is ObjectClass.STATIC and thing.distance < state.config.roadblock_sight:
             found = place_on_lanes(state.town, lanes, thing.x, thing.y)
@@ -293,8 +292,7 @@ def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Gen
 
 def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """Returns the remarks that are possible now; equal ones count several times."""
-    goal = state.task.goal
-    assert goal is not None
+    goal = state.task.destination
     asks, asks_open = Function.PROPOSITIONAL_QUESTION, Function.SET_QUESTION
     found: list[tuple[Remark, ...]] = [
         *((intend(Function.OTHER),),) * 3,

@@ -161,8 +161,7 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 def _name_order(state: ParticipantState, landmarks: Collection[SlotValue], rng: np.random.Generator) -> None:
     """Answers the question about the order of two tasks: the target is finished first."""
-    goal = state.task.goal
-    assert goal is not None
+    goal = state.task.destination
     other = act_builders.first_name(name for name in landmarks if name is not goal.name)
     order = Proposition.of(Predicate.ORDER, place=goal.name, then=other)
     state.say_first(intend(Function.ANSWER, order, elided=("place", "then"), wording=Wording(topic="after")))

@@ -8,7 +8,7 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
@@ -44,10 +44,8 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
     _try_another_way(state, view, reason)
 
 
-def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView) -> bool:
+def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView, step: StepKey) -> bool:
     """Counts a turn that was announced and not taken; returns whether another route is tried because of it."""
-    step = state.guidance.step
-    assert step is not None
     state.guidance = state.guidance.after_wrong_turn(step)
     if state.guidance.wrong_turns.count(step) < IN_VAIN:
         return False
@@ -61,8 +59,7 @@ def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView) -> bool
 
 def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     """Chooses another route after U-turns or lane changes that brought no progress."""
-    progress, guidance = state.route.progress, state.guidance
-    assert progress is not None
+    progress, guidance = state.route.to_goal, state.guidance
     if any(item.act.move in _ANSWERS for item in state.speech.queue):
         return  # what the car has asked is answered first
     manoeuvre = progress.next_manoeuvre(view.station)
@@ -100,8 +97,7 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
 
 def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
     """Plans a route that avoids manoeuvres, and says why."""
-    progress = state.route.progress
-    assert progress is not None
+    progress = state.route.to_goal
     cost = state.config.way_round_cost
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
     state.route = state.route.with_progress(progress)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from dorothie_gym.dialogue.propositions import Proposition
+from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
@@ -140,6 +141,13 @@ class TaskProgress:
     put_off: frozenset[int] = frozenset()
     told: frozenset[Proposition] = frozenset()
     finished: tuple[LandmarkName | None, float] = (None, -math.inf)
+
+    @property
+    def destination(self) -> SeenLandmark:
+        """Landmark of the target, for what is done with one only; raises `PolicyStateError` without a target."""
+        if self.goal is None:
+            raise PolicyStateError("the participant has no target: none of its subgoals is open, allowed and known")
+        return self.goal
 
     def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...], listed: str) -> TaskProgress:
         """Sets the subgoals, and the text of their list, as observed."""

@@ -188,8 +188,7 @@ def _offered_subgoal(
 
 def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenSubgoal) -> None:
     """Accepts a subgoal that is nearer than the target, and insists on the target otherwise."""
-    goal, progress = state.task.goal, state.route.progress
-    assert goal is not None
+    goal, progress = state.task.destination, state.route.progress
     landmark = view.landmark(offered.landmark)
     left = progress.left(view.station) if progress is not None else math.inf
     if landmark is not None and route_length(state, view, landmark) < left:
@@ -243,8 +242,7 @@ def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
 
 def correct_arrival(state: ParticipantState, view: ParticipantView, said: Proposition | None = None) -> None:
     """Denies a question or statement (by default that it has arrived) of a car just before the target; sends it on."""
-    assert state.task.goal is not None
-    arrived = Proposition.of(Predicate.ARRIVED, place=state.task.goal.name)
+    arrived = Proposition.of(Predicate.ARRIVED, place=state.task.destination.name)
     state.say_only(denied(said or arrived), replace(creep_instruction(state, view), joined=True))
 
 

@@ -15,6 +15,7 @@ from .header import FORMAT_VERSION as FORMAT_VERSION
 from .header import LandmarkRow as LandmarkRow
 from .header import SessionHeader as SessionHeader
 from .header import SubgoalRow as SubgoalRow
+from .json_io import to_page as to_page
 from .seat_log import SeatEvent as SeatEvent
 from .seat_log import SeatEventKind as SeatEventKind
 from .seat_log import SeatLogWriter as SeatLogWriter
@@ -35,4 +36,5 @@ from .trajectory import Trajectory as Trajectory
 from .trajectory import rows_of as rows_of
 from .trajectory import trajectory_of as trajectory_of
 from .validation import ReadReport as ReadReport
+from .validation import report_lines as report_lines
 from .writer import SessionWriter as SessionWriter

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +39,7 @@ from dorothie_gym.session.recording.trajectory import (
 from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.input_files import ParquetLimits, raising, read_parquet
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
+from dorothie_gym.support.libraries import pa, pq
 
 _TABLES: Final = {"actors": ACTOR_DTYPE, "lights": LIGHT_DTYPE, "weather": WEATHER_DTYPE}
 _WORDS: Final = {
@@ -77,9 +74,6 @@ def write_frames(path: Path, trajectory: Trajectory, scene: Surroundings) -> Non
         SessionError: the scene has a frame that the trajectory lacks, or a column of another length.
         OSError: it cannot be written.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     columns: dict[str, pa.Array] = {}
     for name in TRAJECTORY_COLUMNS:
         columns[name] = pa.array(np.ascontiguousarray(trajectory[name]), from_pandas=name in OPEN_COLUMNS)
@@ -138,8 +132,6 @@ def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Surrounding
 
 @contextmanager
 def _parquet_errors(path: Path) -> Iterator[None]:
-    import pyarrow as pa
-
     try:
         yield
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:  # the last: names in a damaged footer
@@ -179,8 +171,6 @@ def _typed(
     Raises:
         SessionError: the column holds other types than numbers, or numbers out of range.
     """
-    import pyarrow as pa
-
     whole = wanted.kind in "iu"
     if not (pa.types.is_integer(column.type) or (pa.types.is_floating(column.type) and not whole)):
         expected = "whole numbers" if whole else "numbers"
@@ -195,8 +185,6 @@ def _typed(
 
 
 def _nested(name: str, table: SceneTable, frames: NDArray[np.int64]) -> pa.Array:
-    import pyarrow as pa
-
     places = np.searchsorted(frames, table.frames)
     if np.any(places >= len(frames)) or np.any(frames[np.minimum(places, len(frames) - 1)] != table.frames):
         raise SessionError(f"{name} are recorded at frames that the trajectory lacks")
@@ -213,15 +201,11 @@ def _nested(name: str, table: SceneTable, frames: NDArray[np.int64]) -> pa.Array
 
 
 def _struct(rows: Rows, mask: pa.Array | None) -> pa.StructArray:
-    import pyarrow as pa
-
     names = rows.dtype.names or ()
     return pa.StructArray.from_arrays([_field(rows, name) for name in names], list(names), mask=mask)
 
 
 def _field(rows: Rows, name: str) -> pa.Array:
-    import pyarrow as pa
-
     values = pa.array(np.ascontiguousarray(rows[name]))
     return pa.DictionaryArray.from_arrays(values, pa.array(_WORDS[name])) if name in _WORDS else values
 
@@ -234,8 +218,6 @@ def _table(
     path: Path,
     report: ReadReport,
 ) -> SceneTable:
-    import pyarrow as pa
-
     array = column.combine_chunks()
     if isinstance(array, pa.ChunkedArray):  # combine_chunks keeps an empty column chunked in some releases
         array = pa.concat_arrays(array.chunks) if array.num_chunks else pa.array([], type=column.type)
@@ -276,8 +258,6 @@ def _rows(values: pa.StructArray, name: str, dtype: np.dtype[np.void], path: Pat
 
 def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
     """Returns the numbers of the words of a column."""
-    import pyarrow as pa
-
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     words: Sequence[str] = column.dictionary.to_pylist()
@@ -293,8 +273,6 @@ def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
 
 def _further(column: pa.ChunkedArray) -> NDArray[np.generic]:
     """Returns an unknown column as an array."""
-    import pyarrow as pa
-
     if column.null_count == 0 and pa.types.is_primitive(column.type):
         values: NDArray[np.generic] = column.to_numpy()
         return values
@@ -305,7 +283,6 @@ def _further(column: pa.ChunkedArray) -> NDArray[np.generic]:
 
 def _leaves(schema: pa.Schema) -> list[str]:
     """Returns the paths of the leaf columns in the file."""
-    import pyarrow as pa
 
     def below(path: str, kind: pa.DataType) -> list[str]:
         if pa.types.is_struct(kind):

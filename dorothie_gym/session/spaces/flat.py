@@ -67,12 +67,17 @@ class FlatActions:
 
     def action(self, values: Flat) -> object:
         """Returns the action of the space for a flat vector (n,)."""
+        fields = self.fields(values)
+        return fields.get(_WHOLE, fields)
+
+    def fields(self, values: Flat) -> dict[str, object]:
+        """Returns the fields of the action of a `Dict` space for a flat vector (n,)."""
         fields: dict[str, object] = dict(self._rest)
         begin = 0
         for name, sizes in self.sizes.items():
             fields[name] = _value(self._parts[name], values[begin : begin + len(sizes)])
             begin += len(sizes)
-        return fields.get(_WHOLE, fields)
+        return fields
 
     def vector(self, action: Mapping[str, Any]) -> Flat:
         """Returns the flat vector (n,) of an action with fields, which `action` converts back."""
@@ -141,8 +146,7 @@ def _rest(part: AnySpace) -> object:
 def _value(part: AnySpace, entries: Flat) -> object:
     if isinstance(part, spaces.Discrete):
         return np.int64(entries[0] + part.start)
-    assert part.shape is not None
-    whole = entries.reshape(part.shape)
+    whole = entries.reshape(part.shape or ())
     return (whole + part.start if isinstance(part, spaces.MultiDiscrete) else whole).astype(part.dtype)
 
 

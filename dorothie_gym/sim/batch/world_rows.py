@@ -51,8 +51,7 @@ class WorldRows:
     def settle(self, row: int) -> None:
         """Moves a world back into its row if it got other arrays, with more room."""
         world = self._worlds[row]
-        assert world is not None  # of `put`
-        if world.actors.arrays is not self._views[row]:
+        if world is not None and world.actors.arrays is not self._views[row]:
             self._move_in(row, world)
 
     def _move_in(self, row: int, world: World) -> None:

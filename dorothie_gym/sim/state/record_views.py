@@ -8,6 +8,7 @@ way of NumPy's records.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -51,8 +52,8 @@ MEMORIES = {"f8": 0, "i4": 1, "b1": 2}
 
 def field_offset(dtype: np.dtype[np.void], name: str) -> int:
     """Returns the place of a field in its record [bytes]."""
-    assert dtype.fields is not None
-    return dtype.fields[name][1]
+    fields = dtype.fields or MappingProxyType({})
+    return fields[name][1]
 
 
 def float_field(dtype: np.dtype[np.void], name: str) -> Field[float]:

@@ -126,4 +126,4 @@ def _compile(function: F, **options: bool) -> F:
         return function
     dispatcher = CompiledFunction(function, targetoptions={"nopython": True, "fastmath": False, **options})
     dispatcher.enable_caching()
-    return dispatcher
+    return cast(F, dispatcher)

@@ -18,11 +18,21 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.datamodel import models
-from numba.core.imputils import lower_builtin, lower_getattr_generic
-from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import NativeValue, register_model, type_callable, typeof_impl, unbox
+from numba.core.datamodel.models import DataModel
+from numba.core.typing.templates import infer_getattr
+from numba.extending import NativeValue, register_model
 from numba.np.numpy_support import as_dtype
+
+from dorothie_gym.support.compilation.numba_classes import (
+    AttributeTemplate,
+    PrimitiveModel,
+    Type,
+    lower_builtin,
+    lower_getattr_generic,
+    type_callable,
+    typeof_impl,
+    unbox,
+)
 
 if TYPE_CHECKING:
     from llvmlite.ir import IRBuilder, Value
@@ -36,7 +46,7 @@ WORD = 8
 """Size of an entry of the table [bytes]: an address, a length, or a number."""
 
 
-class Reference(types.Type):  # type: ignore[misc]  # numba has no type information
+class Reference(Type):
     """numba's type of a named tuple that is passed by address.
 
     Attributes:
@@ -67,8 +77,8 @@ class Reference(types.Type):  # type: ignore[misc]  # numba has no type informat
 
 
 @register_model(Reference)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]  # numba has no type information
-    def __init__(self, dmm: models.DataModel, fe_type: Reference) -> None:
+class _Model(PrimitiveModel):
+    def __init__(self, dmm: DataModel, fe_type: Reference) -> None:
         super().__init__(dmm, fe_type, ir.IntType(8).as_pointer())
 
 
@@ -79,7 +89,7 @@ def by_reference(cls: T) -> T:
         TypeError: (when a function is called) an item is neither a contiguous array, nor a bool or a number.
     """
 
-    @typeof_impl.register(cls)  # type: ignore[untyped-decorator]  # numba has no type information
+    @typeof_impl.register(cls)
     def type_of(value: tuple[object, ...], context: object) -> Reference:
         names: tuple[str, ...] = vars(cls)["_fields"]
         members = tuple(
@@ -101,14 +111,14 @@ def _accepted(kind: types.Type | None, name: str) -> types.Type:
 
 
 @infer_getattr
-class _Items(AttributeTemplate):  # type: ignore[misc]  # numba has no type information
+class _Items(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Reference, item: str) -> types.Type | None:
         return kind.member(item)
 
 
-@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]  # numba has no type information
+@lower_getattr_generic(Reference)
 def _read(context: BaseContext, builder: IRBuilder, kind: Reference, table: Value, item: str) -> Value:
     member, offset = kind.member(item), kind.offsets[item]
     if not isinstance(member, types.Array):
@@ -164,7 +174,7 @@ def _finished(builder: IRBuilder, table: Value) -> Value:
     return builder.asm(ir.FunctionType(pointer, [pointer]), "", "=r,0,~{memory}", [table], side_effect=True)
 
 
-@unbox(Reference)  # type: ignore[untyped-decorator]  # numba has no type information
+@unbox(Reference)
 def _unbox(kind: Reference, value: Value, c: Any) -> NativeValue:
     """Writes the table of a tuple from Python."""
     builder, failed = c.builder, cgutils.alloca_once_value(c.builder, cgutils.false_bit)
@@ -198,11 +208,11 @@ def gives_row(function: F) -> F:
     that function returns or gets there again.
     """
 
-    @type_callable(function)  # type: ignore[untyped-decorator]  # numba has no type information
+    @type_callable(function)
     def typing(_context: object) -> Callable[[types.Type, types.Type], Reference | None]:
         return lambda batch, number: _row_type(batch) if isinstance(batch, Reference) else None
 
-    @lower_builtin(function, Reference, types.Integer)  # type: ignore[untyped-decorator]  # numba has no type information
+    @lower_builtin(function, Reference, types.Integer)
     def generate(context: BaseContext, builder: IRBuilder, signature: Signature, arguments: Sequence[Value]) -> Value:
         batch, row = signature.args[0], signature.return_type
         stacked, at = arguments[0], context.cast(builder, arguments[1], signature.args[1], types.intp)

@@ -19,10 +19,10 @@ import warnings
 from pathlib import Path
 from typing import Any, Final
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
 
 from dorothie_gym.support.compilation.fingerprint import Compilable, fingerprint
+from dorothie_gym.support.compilation.numba_classes import CompileResultCacheImpl, FunctionCache
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.user_cache import cache_folder, discard, is_private, mark_used, read_signed, write_signed
 
@@ -58,7 +58,7 @@ def compiled_folder() -> Path | None:
     return folder if is_private(folder) else None
 
 
-class _Impl(CompileResultCacheImpl):  # type: ignore[misc]  # numba has no type information
+class _Impl(CompileResultCacheImpl):
     """Conversion of results of the compiler."""
 
     def __init__(self) -> None:
@@ -113,7 +113,7 @@ class _Files:
         return self._folder / f"{self._base}.{digest[:16]}{ENDING}"
 
 
-class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type information
+class ContentCache(FunctionCache):
     """Cache of a compiled function. Files that cannot be read or written cost time, never the result."""
 
     def __init__(self, function: Compilable) -> None:
@@ -132,43 +132,44 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
 
     def is_empty(self) -> bool:
         """Returns whether there is no machine code of this version of the function that can be read."""
-        return not self._is_open() or not self._cache_file.has_any()
+        return self._open() is None or not self._cache_file.has_any()
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Returns the machine code for a signature, None if there is none that can be read."""
-        return super().load_overload(sig, target_context) if self._is_open() else None
+        return super().load_overload(sig, target_context) if self._open() is not None else None
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Writes the machine code for a signature, and deletes old versions of the function."""
-        if not self._is_open():
+        folder = self._open()
+        if folder is None:
             _warn_once("caching is turned off, or other users can write to the folder")
             return
         try:
             super().save_overload(sig, data)
-            self._delete_others()
+            self._delete_others(folder)
         except OSError as error:
-            _warn_once(f"{self._folder} cannot be written ({error.strerror or error})")
+            _warn_once(f"{folder} cannot be written ({error.strerror or error})")
 
-    def _is_open(self) -> bool:
+    def _open(self) -> Path | None:
+        """Returns the folder of the files, whose names are then known; None if caching is off."""
         folder = compiled_folder()
         if folder is None:
-            return False
+            return None
         if folder != self._folder:
             stamp = fingerprint(self._function)
             self._folder = folder
             self._base = f"{self._stem()}{stamp[:24]}.py{sys.version_info[0]}{sys.version_info[1]}"
             self._impl = _Impl()
             self._cache_file = _Files(folder, self._base)
-        return True
+        return folder
 
     def _stem(self) -> str:
         module = self._py_func.__module__.removeprefix("dorothie_gym.")
         return f"{module}.{self._py_func.__qualname__}-".replace("<", "").replace(">", "")
 
-    def _delete_others(self) -> None:
+    def _delete_others(self, folder: Path) -> None:
         """Deletes files of other versions of the function, and parts of files, that were not used for `KEPT`."""
-        assert self._folder is not None
-        for file in self._folder.glob(f"{self._stem()}*"):
+        for file in folder.glob(f"{self._stem()}*"):
             if file.suffix in (ENDING, _OLD_ENDING, PART) and not self._is_current(file):
                 with contextlib.suppress(OSError):  # another process deletes them, too
                     if time.time() - file.lstat().st_mtime > KEPT:

@@ -18,13 +18,17 @@ from typing import TYPE_CHECKING, Any
 from llvmlite import binding
 from numba import typeof, types
 from numba.core import event, typing
-from numba.core.codegen import CodeLibrary, JITCodeLibrary
-from numba.core.compiler import Compiler, Flags
+from numba.core.codegen import CodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]  # numba has no type information
-from numba.core.registry import CPUDispatcher
 
 from dorothie_gym.support.compilation.cache import ContentCache
+from dorothie_gym.support.compilation.numba_classes import (
+    Compiler,
+    CPUDispatcher,
+    Flags,
+    FunctionCompiler,
+    JITCodeLibrary,
+)
 from dorothie_gym.support.compilation.shortcuts import remembering, without_counts
 
 if TYPE_CHECKING:
@@ -32,7 +36,7 @@ if TYPE_CHECKING:
     from numba.core.compiler_machinery import PassManager
 
 
-class _Library(JITCodeLibrary):  # type: ignore[misc]  # numba has no type information
+class _Library(JITCodeLibrary):
     """Code of a function and of all that it calls, optimised once."""
 
     _linking_libraries: list[CodeLibrary]
@@ -100,7 +104,7 @@ def _others_of(library: _Library) -> list[CodeLibrary]:
     return [each for each in called if not isinstance(each, _Part)]
 
 
-class _Compiler(Compiler):  # type: ignore[misc]  # numba has no type information
+class _Compiler(Compiler):
     def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
         super().__init__(typingctx, targetctx, library, *others)
         if not self.state.flags.nrt:
@@ -124,7 +128,7 @@ class _PartCompiler(_Compiler):
         self.state.flags.no_compile = True
 
 
-class OwnFlags(Flags):  # type: ignore[misc]  # numba has no type information
+class OwnFlags(Flags):
     """Options of a compilation, equal to those of numba, that are compared by the values that were set.
 
     numba's caches have options in their keys. Comparing the values of all options took a tenth of the compiler's time.
@@ -146,7 +150,7 @@ class OwnFlags(Flags):  # type: ignore[misc]  # numba has no type information
 _FLAGS_HASH = hash(Flags())
 
 
-class _OwnFunctionCompiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no type information
+class _OwnFunctionCompiler(FunctionCompiler):
     def _customize_flags(self, flags: Flags) -> Flags:
         return OwnFlags(flags)
 
@@ -178,7 +182,7 @@ def _widest(kind: types.Type) -> types.Type:
     return types.int64 if isinstance(kind, types.Integer) and kind.bitwidth < types.int64.bitwidth else kind
 
 
-class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no type information
+class CompiledFunction(CPUDispatcher):
     """A function that is compiled when it is called from Python, and a part of those that call it."""
 
     def __init__(self, py_func: Callable[..., object], locals: Any = None, targetoptions: Any = None) -> None:

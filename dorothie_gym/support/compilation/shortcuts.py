@@ -16,30 +16,34 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.compiler import DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.compiler_machinery import register_pass
 from numba.core.ir_utils import build_definitions
-from numba.core.lowering import Lower
 from numba.core.rewrites import rewrite_registry
 from numba.core.ssa import reconstruct_ssa
 from numba.core.transforms import canonicalize_cfg
 from numba.core.typed_passes import (
     AnnotateTypes,
     InlineOverloads,
-    NativeLowering,
     NoPythonBackend,
     NoPythonSupportedFeatureValidation,
     NopythonTypeInference,
-    PreLowerStripPhis,
 )
-from numba.core.typing import Context
 from numba.core.untyped_passes import (
     DeadBranchPrune,
     FixupArgs,
-    GenericRewrites,
-    ReconstructSSA,
     RewriteDynamicRaises,
     RewriteSemanticConstants,
     TranslateByteCode,
+)
+
+from dorothie_gym.support.compilation.numba_classes import (
+    Context,
+    GenericRewrites,
+    Lower,
+    NativeLowering,
+    PassManager,
+    PreLowerStripPhis,
+    ReconstructSSA,
 )
 
 if TYPE_CHECKING:
@@ -47,7 +51,7 @@ if TYPE_CHECKING:
     from numba.core.typing.templates import Signature
 
 
-class RememberingContext(Context):  # type: ignore[misc]  # numba has no type information
+class RememberingContext(Context):
     """View on numba's typing context that remembers the signatures of operators and built-in functions."""
 
     def __new__(cls, context: Context) -> RememberingContext:
@@ -95,7 +99,7 @@ def remembering(context: Context) -> RememberingContext:
     return RememberingContext(context)
 
 
-class _Lower(Lower):  # type: ignore[misc]  # numba has no type information
+class _Lower(Lower):
     def alloca_lltype(self, name: str, lltype: ir.Type, datamodel: object = None) -> ir.Instruction:
         """Makes room for a variable, without its size for debuggers, for which numba compiles a module each time."""
         return cgutils.alloca_once(self.builder, lltype, name=name)
@@ -105,7 +109,7 @@ class _Lower(Lower):  # type: ignore[misc]  # numba has no type information
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _Lowering(NativeLowering):  # type: ignore[misc]  # numba has no type information
+class _Lowering(NativeLowering):
     _name = "lowering_without_counts"
 
     @property
@@ -114,7 +118,7 @@ class _Lowering(NativeLowering):  # type: ignore[misc]  # numba has no type info
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _Rewrites(GenericRewrites):  # type: ignore[misc]  # numba has no type information
+class _Rewrites(GenericRewrites):
     _name = "rewrites_without_counts"
 
     def run_pass(self, state: Any) -> bool:
@@ -129,7 +133,7 @@ class _Rewrites(GenericRewrites):  # type: ignore[misc]  # numba has no type inf
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
-class _ToSSA(ReconstructSSA):  # type: ignore[misc]  # numba has no type information
+class _ToSSA(ReconstructSSA):
     _name = "ssa_without_counts"
 
     def run_pass(self, state: Any) -> bool:
@@ -141,7 +145,7 @@ class _ToSSA(ReconstructSSA):  # type: ignore[misc]  # numba has no type informa
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
-class _FromSSA(PreLowerStripPhis):  # type: ignore[misc]  # numba has no type information
+class _FromSSA(PreLowerStripPhis):
     _name = "strip_phis_without_counts"
 
     def run_pass(self, state: Any) -> bool:
@@ -151,7 +155,7 @@ class _FromSSA(PreLowerStripPhis):  # type: ignore[misc]  # numba has no type in
         return True
 
 
-class _Passes(PassManager):  # type: ignore[misc]  # numba has no type information
+class _Passes(PassManager):
     """Passes one after the other, without events, times and lifetimes of variables between them."""
 
     def _runPass(self, _index: int, each: CompilerPass, state: Any) -> None:  # noqa: N802  # numba's name

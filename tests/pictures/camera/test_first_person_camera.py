@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import PictureError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.atlas import TextureAtlas
 from dorothie_gym.pictures.camera.cells import sorted_by_cell
-from dorothie_gym.pictures.camera.first_person_camera import CameraScene, FirstPersonCamera
+from dorothie_gym.pictures.camera.first_person_camera import CameraFrame, CameraScene, FirstPersonCamera
 from dorothie_gym.pictures.camera.ground.arrays import ground_arrays
 from dorothie_gym.pictures.camera.ground.cells import Painted
 from dorothie_gym.pictures.camera.ground.materials import Material
@@ -27,7 +28,7 @@ from dorothie_gym.pictures.camera.lighting import lamp_map
 from dorothie_gym.pictures.camera.mesh import MeshBuilder, Surface, empty_mesh
 from dorothie_gym.pictures.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.pictures.camera.models.vehicles import Lamps
-from dorothie_gym.pictures.camera.pose import CameraPose
+from dorothie_gym.pictures.camera.pose import CameraPose, view_from
 from dorothie_gym.pictures.camera.sky import sky_noise
 from dorothie_gym.pictures.maps.shapes import disc
 from dorothie_gym.session.camera_config import CameraConfig, CameraMount, CameraOutput
@@ -425,3 +426,12 @@ def test_landmarks_have_boxes_by_their_negative_keys() -> None:
     assert frame.instance is not None
     assert frame.boxes.keys.tolist() == [-3]
     assert frame.boxes.pixels.tolist() == [int((frame.instance == -3).sum())]
+
+
+@pytest.mark.parametrize(
+    ("part", "output"), [("colours", "rgb"), ("classes", "semantic"), ("keys", "instance"), ("bodies", "boxes")]
+)
+def test_a_part_that_the_configuration_leaves_out_is_named(part: str, output: str) -> None:
+    frame = CameraFrame(view_from(EYE, 8, 6, 60.0))
+    with pytest.raises(PictureError, match=f"the picture has no {output}: add it to the outputs"):
+        getattr(frame, part)

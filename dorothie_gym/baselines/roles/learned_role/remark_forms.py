@@ -8,6 +8,7 @@ in what the sources are at this moment. The grammar words the act, as for the sc
 
 from __future__ import annotations
 
+import enum
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
@@ -75,8 +76,8 @@ def _coded(value: object, available: Sources) -> Any:
     if named or isinstance(value, int | float):
         exact = [name for name, known in available.items() if type(known) is type(value) and known == value]
         return ["from", exact[0] if exact else _nearest(value, available)]
-    if type(value).__name__ in _ENUMS:
-        return [type(value).__name__, value.name]  # type: ignore[attr-defined]
+    if isinstance(value, enum.Enum) and type(value).__name__ in _ENUMS:
+        return [type(value).__name__, value.name]
     if isinstance(value, str) and " " not in value:
         return ["text", value]
     raise LookupError(value)

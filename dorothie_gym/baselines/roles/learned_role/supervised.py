@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
+from dorothie_gym.baselines.gradients import backpropagate
 from dorothie_gym.baselines.roles.learned_role.examples import UNKNOWN
 
 BATCH_SIZE: Final = 256
@@ -70,7 +71,7 @@ def fit(
         for rows in torch.split(torch.randperm(len(examples), generator=generator), BATCH_SIZE):
             optimiser.zero_grad()
             loss = loss_of(examples.rows(rows))
-            loss.backward()  # type: ignore[no-untyped-call]  # torch does not annotate it
+            backpropagate(loss)
             torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
             optimiser.step()
             schedule.step()

@@ -54,7 +54,8 @@ class SessionWorld:
     def row(self, time: float) -> np.void:
         """Returns the row of the trajectory at a time [s], the nearest within the session."""
         place = int(np.searchsorted(self._rows["frame"], round(time * FRAME_RATE)))
-        return self._rows[min(place, len(self._rows) - 1)]  # type: ignore[no-any-return]
+        row: np.void = self._rows[min(place, len(self._rows) - 1)]
+        return row
 
     @property
     def end(self) -> float:

@@ -199,7 +199,7 @@ class _Lanes:
         rows = np.flatnonzero(keep)
         follows = (np.diff(rows) == 1) & (np.diff(samples.lane[rows]) == 0)
         self._followed = np.append(follows, np.zeros(min(1, len(rows)), dtype=bool))
-        self._tree = cKDTree(self.centre[:, :2]) if self.count else None
+        self._tree = cKDTree(self.centre[:, :2])
 
     def strips(self, chosen: NDArray[np.bool_], margins: Array) -> NDArray[np.object_]:
         """Returns areas (m,) from one chosen sample (n,) to the next one, wider by margins (n,) [m]."""
@@ -211,7 +211,6 @@ class _Lanes:
 
     def near(self, places: Array) -> tuple[Array, Array, Array]:
         """Returns of the nearest samples (n, k): distance from the lane's edge, height at the places, distance [m]."""
-        assert self._tree is not None
         count = min(_NEAREST, self.count)
         away, index = (np.reshape(row, (len(places), count)) for row in self._tree.query(places, k=count))
         offset = places[:, None] - self.centre[index, :2]

@@ -1,0 +1,41 @@
+"""Libraries that most runs do not need: each is imported when something of it is first used.
+
+`lazy_loader.load` would enter them into `sys.modules` at once, where other packages look for what has been imported.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+
+class Library:
+    """Stands for a module until something of it is used.
+
+    Args:
+        name: name of the module.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, name: str) -> object:
+        """Returns something of the module, which is imported for it; raises `ImportError` if that is not possible."""
+        value = getattr(importlib.import_module(self._name), name)
+        self.__dict__[name] = value  # so that this method is not called for it again
+        return value
+
+    def __repr__(self) -> str:
+        return f"<library {self._name}>"
+
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
+    import pygame
+else:
+    pa, pc, pq = Library("pyarrow"), Library("pyarrow.compute"), Library("pyarrow.parquet")
+    pygame = Library("pygame")
+
+__all__ = ["Library", "pa", "pc", "pq", "pygame"]
