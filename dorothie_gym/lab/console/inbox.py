@@ -172,7 +172,7 @@ class SeatInbox:
                 m.Move: self._move,
                 m.Remove: self._remove,
                 m.Spawn: self._spawn,
-                m.Fault: self._fault,
+                m.SensorFault: self._fault,
                 m.Task: self._task,
                 m.Message: self._message,
             },
@@ -240,7 +240,7 @@ class SeatInbox:
         )
         _append(self._exceptions, command.n, action)
 
-    def _fault(self, command: m.Fault, after: DialogueMove | None) -> None:
+    def _fault(self, command: m.SensorFault, after: DialogueMove | None) -> None:
         sensor = parse_sensor(command.sensor)
         action = AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=sensor, on=command.on)
         _append(self._exceptions, command.n, action)

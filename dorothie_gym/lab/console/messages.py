@@ -170,7 +170,7 @@ class Spawn(_Command, frozen=True):
     extent: Annotated[int, Meta(ge=5, le=100)] = 40
 
 
-class Fault(_Command, frozen=True):
+class SensorFault(_Command, frozen=True, tag="fault"):
     """Sensor to disturb or to repair."""
 
     sensor: _Name
@@ -205,12 +205,26 @@ class Announce(_Message, frozen=True):
 
 Incoming: TypeAlias = (
     Join | Ping | View | Parse | Say | Correct | Drive | Plan | Goal | Status | Mark | Other | Weather | Prop | Move
-    | Remove | Spawn | Fault | Task | Message | Control | Announce
+    | Remove | Spawn | SensorFault | Task | Message | Control | Announce
 )  # fmt: skip
 """All messages of browsers."""
 
 Command: TypeAlias = (
-    Say | Drive | Plan | Goal | Status | Mark | Other | Weather | Prop | Move | Remove | Spawn | Fault | Task | Message
+    Say
+    | Drive
+    | Plan
+    | Goal
+    | Status
+    | Mark
+    | Other
+    | Weather
+    | Prop
+    | Move
+    | Remove
+    | Spawn
+    | SensorFault
+    | Task
+    | Message
 )
 """Messages that are carried out in the session."""
 

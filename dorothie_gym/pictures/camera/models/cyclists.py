@@ -10,7 +10,7 @@ import numpy as np
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.mesh import Mesh
-from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
+from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.sim.traffic.parameters import CYCLIST_LENGTH, CYCLIST_WIDTH
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
@@ -43,8 +43,8 @@ class Rider:
     def palette(self) -> Palette:
         """Colours of the parts."""
         return {
-            Slot.PAINT: self.frame, Slot.TOP: self.top, Slot.EXTRA: self.helmet, Slot.SKIN: self.skin,
-            Slot.TROUSERS: (46, 50, 64), Slot.SHOES: (36, 36, 38), Slot.TYRE: (28, 28, 30), Slot.TRIM: (40, 40, 42),
+            Part.PAINT: self.frame, Part.TOP: self.top, Part.EXTRA: self.helmet, Part.SKIN: self.skin,
+            Part.TROUSERS: (46, 50, 64), Part.SHOES: (36, 36, 38), Part.TYRE: (28, 28, 30), Part.TRIM: (40, 40, 42),
         }  # fmt: skip
 
 
@@ -76,10 +76,10 @@ def cyclist_form(phase: int) -> Mesh:
         (front, crown),
     ]
     for start, end in tubes:
-        model.limb(start, end, (0.022, 0.022), Slot.PAINT, sides=3)
+        model.limb(start, end, (0.022, 0.022), Part.PAINT, sides=3)
     grips = np.array([0.36, _GRIP, 0.98])
-    model.limb(grips * (1, -1, 1), grips, (0.02, 0.02), Slot.TRIM, sides=3)
-    model.box(_SADDLE - (0.13, 0.07, 0.05), _SADDLE + (0.12, 0.07, 0.0), Slot.TRIM)
+    model.limb(grips * (1, -1, 1), grips, (0.02, 0.02), Part.TRIM, sides=3)
+    model.box(_SADDLE - (0.13, 0.07, 0.05), _SADDLE + (0.12, 0.07, 0.0), Part.TRIM)
     _rider(model, 2.0 * math.pi * phase / PEDAL_PHASES)
     return model.build()
 
@@ -97,7 +97,7 @@ def _wheel(model: ModelBuilder, x: float) -> None:
         a, b = circle[k], circle[(k + 1) % _SPOKES]
         corners = centre + np.stack((0.82 * a, a, b, 0.82 * b)) * _WHEEL
         for side in (1.0, -1.0):
-            model.face(corners + (0.0, side * 0.015, 0.0), Slot.TYRE, centre)
+            model.face(corners + (0.0, side * 0.015, 0.0), Part.TYRE, centre)
 
 
 def _rider(model: ModelBuilder, turn: float) -> None:
@@ -106,15 +106,15 @@ def _rider(model: ModelBuilder, turn: float) -> None:
         pedal = np.array([-0.04 + _CRANK * pm.sin(angle), side * 0.11, _BRACKET + _CRANK * pm.cos(angle)])
         hip, ankle = _SADDLE + (0.0, side * 0.09, 0.02), pedal + (-0.05, 0.0, 0.09)
         knee = _joint(hip, ankle)
-        model.limb(hip, knee, (0.09, 0.07), Slot.TROUSERS)
-        model.limb(knee, ankle, (0.065, 0.045), Slot.TROUSERS, shade=0.92)
-        model.box(pedal - (0.11, 0.045, 0.0), pedal + (0.15, 0.045, 0.08), Slot.SHOES)
+        model.limb(hip, knee, (0.09, 0.07), Part.TROUSERS)
+        model.limb(knee, ankle, (0.065, 0.045), Part.TROUSERS, shade=0.92)
+        model.box(pedal - (0.11, 0.045, 0.0), pedal + (0.15, 0.045, 0.08), Part.SHOES)
         shoulder, hand = np.array([0.12, side * 0.19, 1.43]), np.array([0.35, side * 0.28, 1.0])
-        model.limb(shoulder, hand, (0.055, 0.038), Slot.TOP)
-    model.limb(_SADDLE, (0.13, 0.0, 1.46), (0.155, 0.19), Slot.TOP, sides=6, flat=0.7, closed=True)
-    model.limb((0.13, 0.0, 1.44), (0.2, 0.0, 1.56), (0.055, 0.055), Slot.SKIN)
-    model.ball((0.22, 0.0, 1.61), (0.1, 0.088, 0.12), Slot.SKIN)
-    model.ball((0.20, 0.0, 1.64), (0.125, 0.1, 0.12), Slot.EXTRA, rings=1, part=(0.0, 0.55))
+        model.limb(shoulder, hand, (0.055, 0.038), Part.TOP)
+    model.limb(_SADDLE, (0.13, 0.0, 1.46), (0.155, 0.19), Part.TOP, sides=6, flat=0.7, closed=True)
+    model.limb((0.13, 0.0, 1.44), (0.2, 0.0, 1.56), (0.055, 0.055), Part.SKIN)
+    model.ball((0.22, 0.0, 1.61), (0.1, 0.088, 0.12), Part.SKIN)
+    model.ball((0.20, 0.0, 1.64), (0.125, 0.1, 0.12), Part.EXTRA, rings=1, part=(0.0, 0.55))
 
 
 def _joint(hip: Array, ankle: Array) -> Array:

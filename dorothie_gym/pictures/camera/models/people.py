@@ -11,7 +11,7 @@ import numpy as np
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.mesh import Mesh
-from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
+from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.support import portable_math as pm
 
 PHASES = 8
@@ -54,12 +54,12 @@ class Look:
     def palette(self) -> Palette:
         """Colours of the parts."""
         return {
-            Slot.TOP: self.top,
-            Slot.TROUSERS: self.trousers,
-            Slot.SKIN: self.skin,
-            Slot.HAIR: self.hair,
-            Slot.EXTRA: self.extra,
-            Slot.SHOES: (42, 38, 36),
+            Part.TOP: self.top,
+            Part.TROUSERS: self.trousers,
+            Part.SKIN: self.skin,
+            Part.HAIR: self.hair,
+            Part.EXTRA: self.extra,
+            Part.SHOES: (42, 38, 36),
         }
 
 
@@ -97,14 +97,14 @@ def person_form(outfit: Outfit, pose: int, *, coarse: bool = False) -> Mesh:
     bare = outfit is Outfit.SKIRT
     for leg, side, front in zip(legs, (1.0, -1.0), (swing, -swing), strict=True):
         top, knee, foot = leg + (0.0, side * 0.09, hip)
-        slot = Slot.SKIN if bare else Slot.TROUSERS
+        slot = Part.SKIN if bare else Part.TROUSERS
         if coarse:
             model.limb(top, foot - (0.0, 0.0, _SOLE), (0.09, 0.06), slot, sides=3)
         else:
             model.limb(top, knee, (0.095, 0.07), slot, sides=sides)
             model.limb(knee, foot, (0.07, 0.05), slot, sides=sides, shade=0.94)
             x, y, z = foot.tolist()
-            model.box((x - 0.08, y - 0.045, z - _SOLE), (x + 0.17, y + 0.045, z + 0.02), Slot.SHOES)
+            model.box((x - 0.08, y - 0.045, z - _SOLE), (x + 0.17, y + 0.045, z + 0.02), Part.SHOES)
         _arm(model, side, -front, hip, sleeves=outfit is not Outfit.TROUSERS, coarse=coarse, standing=pose == STANDING)
     _torso(model, outfit, hip, coarse=coarse)
     return model.build()
@@ -133,29 +133,29 @@ def _arm(
     elbow = shoulder + (0.27 * pm.sin(angle), side * 0.02, -0.27 * pm.cos(angle))
     hand = elbow + (0.25 * pm.sin(angle + bend), -side * 0.01, -0.25 * pm.cos(angle + bend))
     if coarse:
-        model.limb(shoulder, hand, (0.05, 0.035), Slot.TOP, sides=3)
+        model.limb(shoulder, hand, (0.05, 0.035), Part.TOP, sides=3)
         return
-    model.limb(shoulder, elbow, (0.055, 0.048), Slot.TOP)
-    model.limb(elbow, hand, (0.045, 0.036), Slot.TOP if sleeves else Slot.SKIN, shade=0.95)
+    model.limb(shoulder, elbow, (0.055, 0.048), Part.TOP)
+    model.limb(elbow, hand, (0.045, 0.036), Part.TOP if sleeves else Part.SKIN, shade=0.95)
 
 
 def _torso(model: ModelBuilder, outfit: Outfit, hip: float, *, coarse: bool) -> None:
     sides = 4 if coarse else 6
     waist, shoulders, neck = hip + 0.18, hip + 0.56, hip + 0.66
     lower = {Outfit.SKIRT: (hip - 0.34, 0.22), Outfit.COAT: (hip - 0.30, 0.20)}.get(outfit, (hip - 0.05, 0.165))
-    slot = Slot.TROUSERS if outfit in (Outfit.SKIRT, Outfit.TROUSERS) else Slot.TOP
+    slot = Part.TROUSERS if outfit in (Outfit.SKIRT, Outfit.TROUSERS) else Part.TOP
     middle = (0.0, 0.0, waist)
     model.limb((0.0, 0.0, lower[0]), middle, (lower[1], 0.15), slot, sides=sides, flat=0.72, shade=0.93)
-    model.limb(middle, (0.0, 0.0, shoulders), (0.15, 0.215), Slot.TOP, sides=sides, flat=0.6)
+    model.limb(middle, (0.0, 0.0, shoulders), (0.15, 0.215), Part.TOP, sides=sides, flat=0.6)
     if coarse:
-        model.ball((0.01, 0.0, hip + 0.76), (0.10, 0.095, 0.14), Slot.SKIN, sides=4, rings=1)
-        model.ball((-0.02, 0.0, hip + 0.81), (0.10, 0.10, 0.11), Slot.HAIR, sides=4, rings=0, part=(0.0, 0.5))
+        model.ball((0.01, 0.0, hip + 0.76), (0.10, 0.095, 0.14), Part.SKIN, sides=4, rings=1)
+        model.ball((-0.02, 0.0, hip + 0.81), (0.10, 0.10, 0.11), Part.HAIR, sides=4, rings=0, part=(0.0, 0.5))
         return
-    model.limb((0.0, 0.0, shoulders), (0.0, 0.0, neck - 0.04), (0.21, 0.07), Slot.TOP, sides=sides, flat=0.6)
-    model.limb((0.0, 0.0, neck - 0.06), (0.0, 0.0, neck + 0.03), (0.055, 0.055), Slot.SKIN)
-    model.ball((0.012, 0.0, hip + 0.76), (0.105, 0.09, 0.125), Slot.SKIN)
-    model.ball((-0.018, 0.0, hip + 0.795), (0.108, 0.102, 0.115), Slot.HAIR, rings=1, part=(0.0, 0.62))
+    model.limb((0.0, 0.0, shoulders), (0.0, 0.0, neck - 0.04), (0.21, 0.07), Part.TOP, sides=sides, flat=0.6)
+    model.limb((0.0, 0.0, neck - 0.06), (0.0, 0.0, neck + 0.03), (0.055, 0.055), Part.SKIN)
+    model.ball((0.012, 0.0, hip + 0.76), (0.105, 0.09, 0.125), Part.SKIN)
+    model.ball((-0.018, 0.0, hip + 0.795), (0.108, 0.102, 0.115), Part.HAIR, rings=1, part=(0.0, 0.62))
     if outfit is Outfit.BACKPACK:
-        model.box((-0.30, -0.14, hip + 0.14), (-0.11, 0.14, hip + 0.54), Slot.EXTRA, bottom=True)
+        model.box((-0.30, -0.14, hip + 0.14), (-0.11, 0.14, hip + 0.54), Part.EXTRA, bottom=True)
     elif outfit is Outfit.SKIRT:
-        model.box((-0.09, 0.23, hip - 0.06), (0.13, 0.31, hip + 0.14), Slot.EXTRA, bottom=True)
+        model.box((-0.09, 0.23, hip - 0.06), (0.13, 0.31, hip + 0.14), Part.EXTRA, bottom=True)

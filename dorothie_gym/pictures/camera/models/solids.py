@@ -21,7 +21,7 @@ Point: TypeAlias = Sequence[float] | Array
 _SHADES = 200.0  # shades from 0 to 1.275 in the green channel of a model without colours
 
 
-class Slot(enum.IntEnum):
+class Part(enum.IntEnum):
     """Parts of models that share a colour."""
 
     PAINT = 0
@@ -45,7 +45,7 @@ class Slot(enum.IntEnum):
     WHITE = 16
 
 
-Palette: TypeAlias = Mapping[Slot, Rgb]
+Palette: TypeAlias = Mapping[Part, Rgb]
 
 
 class ModelBuilder:
@@ -73,7 +73,7 @@ class ModelBuilder:
         return self._builder.build()
 
     def panel(
-        self, corners: ArrayLike, slot: Slot, *, texture: int = PLAIN, repeats: tuple[float, float] = (1.0, 1.0),
+        self, corners: ArrayLike, slot: Part, *, texture: int = PLAIN, repeats: tuple[float, float] = (1.0, 1.0),
         shade: float = 1.0, two_sided: bool = False,
     ) -> None:  # fmt: skip
         """Adds a quadrilateral (4, 3): lower left, upper left, upper right, lower right, seen from its visible side."""
@@ -82,7 +82,7 @@ class ModelBuilder:
         )
 
     def face(
-        self, corners: ArrayLike, slot: Slot, inside: Point, *, shade: float = 1.0, surface: Surface = Surface.NONE
+        self, corners: ArrayLike, slot: Part, inside: Point, *, shade: float = 1.0, surface: Surface = Surface.NONE
     ) -> None:
         """Adds a flat convex polygon (n, 3) that is visible from the side away from a point inside the model."""
         points = np.asarray(corners, dtype=np.float64)
@@ -90,7 +90,7 @@ class ModelBuilder:
         self.hull(points[fan], slot, inside, shade=shade, surface=surface)
 
     def hull(
-        self, triangles: ArrayLike, slot: Slot, inside: Point, *, shade: float = 1.0, surface: Surface = Surface.NONE
+        self, triangles: ArrayLike, slot: Part, inside: Point, *, shade: float = 1.0, surface: Surface = Surface.NONE
     ) -> None:
         """Adds triangles (n, 3, 3), each visible from the side away from a point inside the model."""
         corners = np.asarray(triangles, dtype=np.float64).reshape(-1, 3, 3)
@@ -100,7 +100,7 @@ class ModelBuilder:
         self._codes.setdefault(surface, []).append(np.broadcast_to(np.array(_code(slot, shade)), shape))
 
     def limb(
-        self, start: Point, end: Point, radii: tuple[float, float], slot: Slot, *, sides: int = 4, shade: float = 1.0,
+        self, start: Point, end: Point, radii: tuple[float, float], slot: Part, *, sides: int = 4, shade: float = 1.0,
         closed: bool = False, flat: float = 1.0,
     ) -> None:  # fmt: skip
         """Adds a cone between two points.
@@ -133,7 +133,7 @@ class ModelBuilder:
                 self.face(points, slot, (first + last) / 2.0, shade=shade)
 
     def ball(
-        self, centre: Point, radii: Sequence[float], slot: Slot, *, sides: int = 6, rings: int = 2,
+        self, centre: Point, radii: Sequence[float], slot: Part, *, sides: int = 6, rings: int = 2,
         part: tuple[float, float] = (0.0, 1.0), shade: float = 1.0,
     ) -> None:  # fmt: skip
         """Adds an ellipsoid, or a part of it between two shares of the way from its top to its bottom."""
@@ -146,7 +146,7 @@ class ModelBuilder:
         )
         self._tube(middle + points * np.asarray(radii, dtype=np.float64), slot, middle, shade)
 
-    def box(self, low: Point, high: Point, slot: Slot, *, shade: float = 1.0, bottom: bool = False) -> None:
+    def box(self, low: Point, high: Point, slot: Part, *, shade: float = 1.0, bottom: bool = False) -> None:
         """Adds an upright box between two corners."""
         (x0, y0, z0), (x1, y1, z1) = np.asarray(low).tolist(), np.asarray(high).tolist()
         ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
@@ -157,7 +157,7 @@ class ModelBuilder:
         if bottom:
             self.face(rings[0], slot, middle, shade=shade)
 
-    def _tube(self, rings: Array, slot: Slot, inside: Array, shade: float) -> None:
+    def _tube(self, rings: Array, slot: Part, inside: Array, shade: float) -> None:
         """Adds the surface between successive rings (n, sides, 3)."""
         after = rings[:, [*range(1, rings.shape[1]), 0]]
         parts = (rings[:-1], after[:-1], after[1:], rings[1:])
@@ -172,9 +172,9 @@ def _turns(count: int) -> Array:
     return np.asarray(np.arange(count) * (2.0 * math.pi / count))
 
 
-def dressed(model: Mesh, palette: Palette, glowing: frozenset[Slot] = frozenset()) -> Mesh:
+def dressed(model: Mesh, palette: Palette, glowing: frozenset[Part] = frozenset()) -> Mesh:
     """Returns a model with the colours of a palette; slots that glow give off their own light."""
-    colours = np.zeros((len(Slot), 3))
+    colours = np.zeros((len(Part), 3))
     for slot, colour in palette.items():
         colours[slot] = colour
     slots = model.colours[:, 0].astype(np.int64)
@@ -185,5 +185,5 @@ def dressed(model: Mesh, palette: Palette, glowing: frozenset[Slot] = frozenset(
     return model._replace(colours=tinted, surfaces=surfaces)
 
 
-def _code(slot: Slot, shade: float) -> tuple[float, float, float]:
+def _code(slot: Part, shade: float) -> tuple[float, float, float]:
     return float(slot), shade * _SHADES, 0.0

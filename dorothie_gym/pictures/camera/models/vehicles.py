@@ -13,7 +13,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.atlas import Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
-from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
+from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
 from dorothie_gym.support import portable_arrays as pn
 
@@ -103,7 +103,7 @@ def vehicle_form(kind: VehicleType) -> Mesh:
     _cabin(model, form)
     if kind is VehicleType.PICKUP:
         inset = np.array([(-0.98, -0.82), (-2.36, -0.82), (-2.36, 0.82), (-0.98, 0.82)])
-        model.face(np.column_stack((inset, np.full(4, 1.075))), Slot.TRIM, (0.0, 0.0, 0.0), shade=0.8)
+        model.face(np.column_stack((inset, np.full(4, 1.075))), Part.TRIM, (0.0, 0.0, 0.0), shade=0.8)
     front, rear, radius = form.wheels
     for x in (front, rear):
         for side in (1.0, -1.0):
@@ -116,16 +116,16 @@ def painted_vehicle(form: Mesh, paint: Rgb, lamps: Lamps) -> Mesh:
     """Returns a car with a colour, and with some of its lamps on."""
     brakes, lights = Lamps.BRAKES in lamps, Lamps.LIGHTS in lamps
     palette: Palette = {
-        Slot.PAINT: paint,
-        Slot.TRIM: (46, 48, 52),
-        Slot.GLASS: (38, 46, 54),
-        Slot.TYRE: (28, 28, 30),
-        Slot.RIM: (156, 158, 162),
-        Slot.PLATE: (255, 255, 255),
-        Slot.HEAD_LAMP: (255, 250, 232) if lights else (222, 226, 228),
-        Slot.BRAKE_LAMP: (255, 44, 34) if brakes else (176, 22, 22) if lights else (112, 14, 16),
+        Part.PAINT: paint,
+        Part.TRIM: (46, 48, 52),
+        Part.GLASS: (38, 46, 54),
+        Part.TYRE: (28, 28, 30),
+        Part.RIM: (156, 158, 162),
+        Part.PLATE: (255, 255, 255),
+        Part.HEAD_LAMP: (255, 250, 232) if lights else (222, 226, 228),
+        Part.BRAKE_LAMP: (255, 44, 34) if brakes else (176, 22, 22) if lights else (112, 14, 16),
     }
-    on = {Slot.HEAD_LAMP: lights, Slot.BRAKE_LAMP: brakes or lights}
+    on = {Part.HEAD_LAMP: lights, Part.BRAKE_LAMP: brakes or lights}
     return dressed(form, palette, frozenset(slot for slot, glows in on.items() if glows))
 
 
@@ -142,14 +142,14 @@ def _body(model: ModelBuilder, form: _Form) -> None:
         middle = ((ahead[0] + behind[0]) / 2.0, 0.0, 0.5)
         for side in (1.0, -1.0):
             a, b = _ring(ahead, side), _ring(behind, side)
-            model.face([a[0], b[0], b[1], a[1]], Slot.PAINT, middle, shade=0.8)
-            model.face([a[1], b[1], b[2], a[2]], Slot.PAINT, middle)
+            model.face([a[0], b[0], b[1], a[1]], Part.PAINT, middle, shade=0.8)
+            model.face([a[1], b[1], b[2], a[2]], Part.PAINT, middle)
         tops = [_ring(station, side)[2] for station, side in ((ahead, 1), (behind, 1), (behind, -1), (ahead, -1))]
-        model.face(tops, Slot.PAINT, middle, shade=1.05)
+        model.face(tops, Part.PAINT, middle, shade=1.05)
     for station in (stations[0], stations[-1]):
         right, left = _ring(station, 1.0), _ring(station, -1.0)
-        model.face([left[0], right[0], right[1], left[1]], Slot.TRIM, (0.0, 0.0, 0.5))
-        model.face([left[1], right[1], right[2], left[2]], Slot.PAINT, (0.0, 0.0, 0.5), shade=0.92)
+        model.face([left[0], right[0], right[1], left[1]], Part.TRIM, (0.0, 0.0, 0.5))
+        model.face([left[1], right[1], right[2], left[2]], Part.PAINT, (0.0, 0.0, 0.5), shade=0.92)
 
 
 def _cabin(model: ModelBuilder, form: _Form) -> None:
@@ -163,17 +163,17 @@ def _cabin(model: ModelBuilder, form: _Form) -> None:
     glass = ((0, 3), True), ((1, 2), form.rear_pane)
     for (low, high), glazed in glass:
         corners = [left[low], left[high], right[high], right[low]]
-        slot, surface = (Slot.GLASS, Surface.GLASS) if glazed else (Slot.PAINT, Surface.NONE)
+        slot, surface = (Part.GLASS, Surface.GLASS) if glazed else (Part.PAINT, Surface.NONE)
         model.face(corners, slot, inside, shade=1.0 if glazed else 0.92, surface=surface)
-    model.face([left[3], left[2], right[2], right[3]], Slot.PAINT, inside, shade=1.05)
+    model.face([left[3], left[2], right[2], right[3]], Part.PAINT, inside, shade=1.05)
     for side, wall in ((1.0, right), (-1.0, left)):
-        model.face(wall, Slot.PAINT, inside, shade=0.95)
+        model.face(wall, Part.PAINT, inside, shade=0.95)
         foot, head = wall[[0, 1]], wall[[3, 2]]
         for shares in form.panes:
             share = np.array(shares)[:, None]
             low, high = foot[0] + share * (foot[1] - foot[0]), head[0] + share * (head[1] - head[0])
             pane = np.concatenate((low + 0.12 * (high - low), (low + 0.9 * (high - low))[::-1]))
-            model.face(pane + (0.0, side * _SKIN, 0.004), Slot.GLASS, inside, surface=Surface.GLASS)
+            model.face(pane + (0.0, side * _SKIN, 0.004), Part.GLASS, inside, surface=Surface.GLASS)
         _mirror(model, front - 0.35, side, front_height + 0.02)
 
 
@@ -182,7 +182,7 @@ def _mirror(model: ModelBuilder, x: float, side: float, z: float) -> None:
     inner, outer = side * (_CABIN_SIDE - 0.03), side * _SIDE
     corners = np.array([(x, inner, z), (x, inner, z + 0.14), (x, outer, z + 0.16), (x, outer, z + 0.02)])
     for end in (1.0, -1.0):
-        model.face(corners + (end * 0.01, 0.0, 0.0), Slot.TRIM, (x, inner, z))
+        model.face(corners + (end * 0.01, 0.0, 0.0), Part.TRIM, (x, inner, z))
 
 
 def _wheel(model: ModelBuilder, x: float, side: float, radius: float) -> None:
@@ -191,22 +191,22 @@ def _wheel(model: ModelBuilder, x: float, side: float, radius: float) -> None:
     circle = np.stack((pn.cos(angles), pn.sin(angles)), axis=-1) * radius / pn.cos(np.pi / _WHEEL_SIDES)
     outer = np.column_stack((x + circle[:, 0], np.full(_WHEEL_SIDES, side * (_SIDE - _SKIN)), radius + circle[:, 1]))
     hub = (x, 0.0, radius)
-    model.face(outer, Slot.TYRE, hub)
+    model.face(outer, Part.TYRE, hub)
     rim = np.array(hub) + (outer - np.array(hub)) * (0.6, 1.0, 0.6)
     rim[:, 1] = side * _SIDE
-    model.face(rim, Slot.RIM, hub)
+    model.face(rim, Part.RIM, hub)
     inner = outer - (0.0, side * 0.2, 0.0)
     for k in (4, 5, 6):  # the sides of the tread that show below the body
         after = (k + 1) % _WHEEL_SIDES
-        model.face([outer[k], outer[after], inner[after], inner[k]], Slot.TYRE, (x, side * 0.9, radius), shade=0.9)
+        model.face([outer[k], outer[after], inner[after], inner[k]], Part.TYRE, (x, side * 0.9, radius), shade=0.9)
 
 
 def _lamps(model: ModelBuilder, form: _Form) -> None:
     low, tail, inside = form.stations[0][1] - 0.15, form.tail, (0.0, 0.0, 0.5)
     head_lamp, brake_lamp = (0.48, 0.78, low, low + 0.12), (0.52, 0.84, tail - 0.12, tail + 0.08)
     for x, slot, (inner, outer, bottom, top) in (
-        (_FRONT, Slot.HEAD_LAMP, head_lamp),
-        (-_FRONT, Slot.BRAKE_LAMP, brake_lamp),
+        (_FRONT, Part.HEAD_LAMP, head_lamp),
+        (-_FRONT, Part.BRAKE_LAMP, brake_lamp),
     ):
         for side in (1.0, -1.0):
             near, far = side * inner, side * outer
@@ -219,8 +219,8 @@ def _lamps(model: ModelBuilder, form: _Form) -> None:
         (x - 0.01, 0.16, z - 0.01),
         (x - 0.01, -0.16, z - 0.01),
     ]
-    model.face(bar, Slot.BRAKE_LAMP, inside)
+    model.face(bar, Part.BRAKE_LAMP, inside)
     for x, bottom in ((_FRONT, 0.36), (-_FRONT, 0.40)):
         left, top = math.copysign(_PLATE[0] / 2.0, x), bottom + _PLATE[1]  # left for somebody who looks at this end
         corners = [(x, left, bottom), (x, left, top), (x, -left, top), (x, -left, bottom)]
-        model.panel(corners, Slot.PLATE, texture=Texture.PLATE)
+        model.panel(corners, Part.PLATE, texture=Texture.PLATE)

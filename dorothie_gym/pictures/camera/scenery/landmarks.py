@@ -16,7 +16,7 @@ from dorothie_gym.pictures.camera import atlas
 from dorothie_gym.pictures.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented
 from dorothie_gym.pictures.camera.models.people import STANDING, Look, Outfit, person_form
-from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Rgb, Slot, dressed
+from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Part, Rgb, dressed
 from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.pictures.maps.shapes import disc
@@ -328,8 +328,8 @@ def _person_sign(works: _Works) -> Mesh:
 def _waiting_person(lot: Lot, ground: Heights) -> Mesh:
     """Returns a person who waves to the street, at the place of the site."""
     arm = ModelBuilder(ObjectClass.PEDESTRIAN)
-    arm.limb((0.0, 0.22, 1.42), (0.08, 0.42, 1.68), (0.055, 0.05), Slot.TOP)
-    arm.limb((0.08, 0.42, 1.68), (0.06, 0.40, 2.0), (0.048, 0.04), Slot.SKIN, closed=True)
+    arm.limb((0.0, 0.22, 1.42), (0.08, 0.42, 1.68), (0.055, 0.05), Part.TOP)
+    arm.limb((0.08, 0.42, 1.68), (0.06, 0.40, 2.0), (0.048, 0.04), Part.SKIN, closed=True)
     body = joined([dressed(part, _PERSON.palette) for part in (person_form(_PERSON.outfit, STANDING), arm.build())])
     place = np.array([lot.place])
     foot = np.column_stack((place, feet_on(ground, place)))
