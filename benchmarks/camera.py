@@ -25,8 +25,7 @@ from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.policies import make_policy
-from dorothie_gym.session.camera_config import CameraConfig, CameraMount, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraMount, CameraOutput, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.state.world_arrays import WorldArrays

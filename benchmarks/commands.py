@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from benchmarks.report import Report
     from benchmarks.timing import Figures, Progress
-    from dorothie_gym.session.camera_config import CameraOutput
+    from dorothie_gym.session.config import CameraOutput
 
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
@@ -165,7 +165,7 @@ def _size(text: str) -> tuple[int, int]:
     width, separator, height = text.partition("x")
     if not (separator and width.isdecimal() and height.isdecimal()):
         fail(f"--size {text}: give it as WIDTHxHEIGHT in pixels, for instance 480x320")
-    from dorothie_gym.session.camera_config import CameraConfig
+    from dorothie_gym.session.config import CameraConfig
 
     try:
         config = CameraConfig(width=int(width), height=int(height))
@@ -176,7 +176,7 @@ def _size(text: str) -> tuple[int, int]:
 
 def _outputs(text: str) -> tuple[CameraOutput, ...]:
     """Returns the outputs of a list of names; exits with code 2 for another name."""
-    from dorothie_gym.session.camera_config import CameraOutput
+    from dorothie_gym.session.config import CameraOutput
 
     if text == "all":
         return tuple(CameraOutput)

@@ -19,7 +19,7 @@ from dorothie_gym.errors import one_line
 from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.pictures.camera.pose import CameraPose, view_from
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 
 SAMPLES: Final = 4
 """Samples in a pixel."""

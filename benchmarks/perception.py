@@ -35,8 +35,7 @@ from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA, is_body_seen
 from dorothie_gym.pictures.charts import INK, SHEET, SOFT, empty_figure
 from dorothie_gym.policies import make_policy
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.state.codes import Group

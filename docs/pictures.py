@@ -45,8 +45,7 @@ from dorothie_gym.pictures.views.playback import Playback
 from dorothie_gym.pictures.views.session_views import SessionRenderer
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.recording import Session
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig

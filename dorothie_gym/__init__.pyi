@@ -18,9 +18,9 @@ from .ontology import Role as Role
 from .policies import Policy as Policy
 from .policies import make_policy as make_policy
 from .policies.navigation import NavigationAction as NavigationAction
-from .session.camera_config import CameraConfig as CameraConfig
-from .session.camera_config import CameraMount as CameraMount
-from .session.camera_config import CameraOutput as CameraOutput
+from .session.config import CameraConfig as CameraConfig
+from .session.config import CameraMount as CameraMount
+from .session.config import CameraOutput as CameraOutput
 from .session.config import EnvConfig as EnvConfig
 from .session.recording import Session as Session
 from .session.rewards import NavigationWeights as NavigationWeights

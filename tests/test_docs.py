@@ -17,8 +17,7 @@ import yaml
 
 from dorothie_gym.archive import Task
 from dorothie_gym.dialogue.grammar import parse_grammar
-from dorothie_gym.dialogue.phrases import Register
-from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.dialogue.phrases import Register, read_talk_files
 from dorothie_gym.evaluation.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.evaluation.teacher_forced import metrics_of, read_predictions
 from dorothie_gym.evaluation.teacher_forced.features import Batch
@@ -30,9 +29,8 @@ from dorothie_gym.lab.studies.study_file import read_study
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, town_names
 from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
-from dorothie_gym.session.cabin import CabinState, signal_to_noise
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
+from dorothie_gym.session.providers import CabinState, signal_to_noise
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.tasks import bind, load_template, template_names

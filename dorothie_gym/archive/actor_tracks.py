@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, Rows, SceneTable
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support import portable_arrays as pn
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 
 class Moment(NamedTuple):

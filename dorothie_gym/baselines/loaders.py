@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.benchmark_co_wizard.policy import BenchmarkCoWizard

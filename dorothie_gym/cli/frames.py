@@ -25,7 +25,7 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import rollout as rollouts
-from dorothie_gym.support.processors import available_processors
+from dorothie_gym.support.files import available_processors
 
 
 def frames(
@@ -74,7 +74,7 @@ def _export(rate: float, size: str, outputs: str | None, layout: str) -> rollout
         fail(f"--size is {size!r}; it must be like 480x320")
     if layout not in [each.value for each in rollouts.FrameLayout]:
         fail(f"--layout is {layout!r}; it must be one of {', '.join(rollouts.FrameLayout)}")
-    from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+    from dorothie_gym.session.config import CameraConfig, CameraOutput
 
     known = [output.value for output in CameraOutput]
     named = known if outputs is None else outputs.split(",")

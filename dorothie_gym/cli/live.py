@@ -22,7 +22,7 @@ from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.recording.events import Event, EventType, move_record
 from dorothie_gym.session.recording.json_io import Fields
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.film import Film

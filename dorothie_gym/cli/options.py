@@ -16,7 +16,7 @@ from dorothie_gym.cli.output import exit_interrupted, fail
 from dorothie_gym.errors import PolicyLoadError, SpeechError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session import spaces
-from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.config import PerceptionModel
 from dorothie_gym.support.interruption import message, raising_interrupts
 from dorothie_gym.support.optional_modules import check_installed
 from dorothie_gym.support.render_view import RenderView
@@ -145,9 +145,7 @@ def env_config(
         speech: whether they speak; a word error rate is then refused.
         pictures: whether they observe the picture of the car's camera.
     """
-    from dorothie_gym.session.camera_config import CameraConfig
-    from dorothie_gym.session.channel_kind import ChannelKind
-    from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.session.config import CameraConfig, ChannelKind, EnvConfig
 
     if speech and word_errors is not None:
         fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")

@@ -51,7 +51,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
-from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.config import PerceptionModel
 from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:

@@ -28,7 +28,7 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.pictures import camera
-from dorothie_gym.support.processors import available_processors
+from dorothie_gym.support.files import available_processors
 from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
@@ -234,7 +234,7 @@ def _film(path: Path, sources: rollouts.ReplaySources, out: Path, view: RenderVi
         count, first = playback.count(fps), playback.first_frame
     else:
         compile_first(pictures=True)
-        from dorothie_gym.session.camera_config import CameraConfig
+        from dorothie_gym.session.config import CameraConfig
 
         pictures = camera.RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
         frames = (renderer.draw(playback.scene(frame), taken.rgb) for frame, taken in pictures.pictures(fps))

@@ -19,13 +19,13 @@ from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
+from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.dialogue.recognition_errors import (
     Loudness,
     measured_errors,
     proper_words,
     word_class,
 )
-from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.support.copying import shared

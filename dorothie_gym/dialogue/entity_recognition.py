@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from rapidfuzz import fuzz, process
 
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
-from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.ontology.slots import Slot, SlotValue
 
 # Spelling to sound, in order: silent letters, letter groups with one sound. A strong simplification of Metaphone

@@ -11,13 +11,16 @@ from dorothie_gym.dialogue.phrases import (
     WEIGHT,
     Alternative,
     Phrase,
+    TalkSection,
+    alternatives_of,
     choice,
     parse_alternatives,
     parse_phrase,
+    parse_talk_files,
+    read_talk_files,
     split_alternatives,
 )
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.talk_files import TalkSection, alternatives_of, parse_talk_files, read_talk_files
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role

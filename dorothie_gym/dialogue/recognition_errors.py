@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Final, Self
 
 from dorothie_gym.dialogue.lexicon import load_lexicon
-from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import Slot
 from dorothie_gym.support.copying import shared

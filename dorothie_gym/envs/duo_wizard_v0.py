@@ -33,7 +33,7 @@ from dorothie_gym.session.scenario import ResetOptions, Scenario, scenario_optio
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
-from dorothie_gym.session.spaces.limits import UNBOUNDED, SpaceLimits
+from dorothie_gym.session.spaces.fields import UNBOUNDED, SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.tasks.storyboard import StoryboardTemplate

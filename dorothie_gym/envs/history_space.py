@@ -22,8 +22,18 @@ from dorothie_gym.ontology.spellings import parse_landmark, parse_street
 from dorothie_gym.session.recording.events import MoveRecord
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.spaces.actions import NO_MOVE, ActionMapping
-from dorothie_gym.session.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
-from dorothie_gym.session.spaces.limits import TEXT_CHARACTERS, SpaceLimits
+from dorothie_gym.session.spaces.fields import (
+    TEXT_CHARACTERS,
+    Column,
+    FieldSpec,
+    SpaceLimits,
+    choice,
+    choices,
+    dict_space,
+    flags,
+    real,
+    text,
+)
 from dorothie_gym.session.spaces.observations import MAX_UTTERANCE, LandmarkColumn, Observation
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.action_values import as_array

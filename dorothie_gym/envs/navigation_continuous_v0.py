@@ -17,7 +17,7 @@ from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import StepInfo

@@ -16,7 +16,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, navigation_space
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import StepInfo

@@ -37,7 +37,7 @@ from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.rewards import ACT_TERMS, DECISION_TERMS, act_terms, decision_terms
 from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import Restorable
 from dorothie_gym.support.input_files import settings_of

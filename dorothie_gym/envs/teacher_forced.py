@@ -36,7 +36,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.scenario import ResetOptions, check_options
 from dorothie_gym.session.spaces.actions import ActionMapping, StepInfo
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.copying import CachedViews
 
 DEFAULT: Final = "default"

@@ -21,7 +21,7 @@ from .model import Signal as Signal
 from .model import SignalKind as SignalKind
 from .model import Site as Site
 from .model import Street as Street
+from .town import LightColour as LightColour
+from .town import LightPhase as LightPhase
+from .town import LightProgramme as LightProgramme
 from .town import Town as Town
-from .traffic_lights import LightColour as LightColour
-from .traffic_lights import LightPhase as LightPhase
-from .traffic_lights import LightProgramme as LightProgramme

@@ -35,9 +35,8 @@ from dorothie_gym.maps.model import (
     Site,
     Street,
 )
-from dorothie_gym.maps.town import MAX_EXTENT, Town
-from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
-from dorothie_gym.support import angles, portable_arrays, portable_math
+from dorothie_gym.maps.town import MAX_EXTENT, LightPhase, LightProgramme, Town
+from dorothie_gym.support import portable_arrays, portable_math
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
 from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, remove, write_signed
@@ -308,7 +307,7 @@ def compiler_digest() -> str | None:
 
 def arithmetic_sources() -> list[tuple[str, bytes]]:
     """Returns names and contents of the modules that compute elementary functions for this and other packages."""
-    own = {f"{module.__name__}.py": module.__file__ for module in (angles, portable_arrays, portable_math)}
+    own = {f"{module.__name__}.py": module.__file__ for module in (portable_arrays, portable_math)}
     found = [(name, Path(file).read_bytes()) for name, file in own.items() if file is not None]
     return found + package_sources("dorothie_gym.support.compilation")
 

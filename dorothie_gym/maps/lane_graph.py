@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import NO_JUNCTION, NO_STREET, Array, Junction, Lane, LaneLink, LinkType, Street
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 FEATURES = (
     *("start_x", "start_y", "start_z", "start_pitch", "start_yaw", "start_roll"),

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import Array, LinkType
-from dorothie_gym.maps.polyline import (
+from dorothie_gym.maps.model import (
     HEADING,
     HEIGHT,
     STATION,
+    Array,
     IntArray,
     LaneTable,
+    LinkType,
     X,
     Y,
     local_coordinates,

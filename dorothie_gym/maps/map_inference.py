@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, LaneLink, Site, Street
 from dorothie_gym.support import portable_arrays as pn
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 # Largest change of direction at which a street continues across a junction [degrees].
 STREET_BEND = 35.0

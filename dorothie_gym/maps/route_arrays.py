@@ -10,8 +10,15 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing_graph import RoutingEdge, RoutingGraph
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import Float, Int32, RecordArray, argument, empty_records, filled_records
+from dorothie_gym.support.compilation.records import (
+    Float,
+    Int32,
+    RecordArray,
+    argument,
+    by_reference,
+    empty_records,
+    filled_records,
+)
 
 
 class PlaceRecord:

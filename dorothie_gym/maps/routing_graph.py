@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import across, oncoming_lanes
-from dorothie_gym.maps.model import Array, LinkType
-from dorothie_gym.maps.polyline import IntArray, LaneTable
+from dorothie_gym.maps.model import Array, IntArray, LaneTable, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.support.compilation import compiled
-from dorothie_gym.support.compilation.by_reference import by_reference
 from dorothie_gym.support.compilation.records import (
     Flag,
     Float,
     Int32,
     RecordArray,
     argument,
+    by_reference,
     empty_records,
     record_dtype,
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, Signal, SignalKind
 from dorothie_gym.maps.right_of_way import FACING, LEFTWARD, opposition, turn_into
-from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
+from dorothie_gym.maps.town import LightPhase, LightProgramme
 from dorothie_gym.support import portable_arrays as pn
 
 THROUGH_GREEN = 20.0

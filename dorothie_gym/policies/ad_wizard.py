@@ -19,7 +19,7 @@ from dorothie_gym.policies.observation_parser import place_on_path, read_landmar
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
 from dorothie_gym.session.spaces.actions import ActionDict, AdWizardAction, LanePosition
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping, PropColumn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import Rows

@@ -15,8 +15,7 @@ from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.route_legs import SWITCH_ROOM
 from dorothie_gym.policies.route_progress import U_TURN_SPEED_SQUARED
-from dorothie_gym.sim.ego.feasibility import u_turn_braking
-from dorothie_gym.sim.ego.limits import EGO_MOVING, LEAD
+from dorothie_gym.sim.ego.limits import EGO_MOVING, LEAD, u_turn_braking
 
 
 def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:

@@ -23,7 +23,7 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import DENSE, FAR_SIGHT, Limit
 from dorothie_gym.session.spaces.observations import ObservationMapping
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 
 def _turned(azimuth: float) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 if TYPE_CHECKING:

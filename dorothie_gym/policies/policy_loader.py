@@ -23,7 +23,7 @@ from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
 
 POLICY_NAMES = ("scripted", "silent", "random")

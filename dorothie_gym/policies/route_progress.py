@@ -13,8 +13,7 @@ from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, place_records
 from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
 from dorothie_gym.maps.routing_graph import LANE_ENTRIES
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
@@ -29,8 +28,8 @@ from dorothie_gym.policies.route_legs import (
 from dorothie_gym.policies.route_tables import default_successor, is_choice, route_tables
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
-from dorothie_gym.support.angles import wrap_degrees
 from dorothie_gym.support.compilation.records import RecordArray
+from dorothie_gym.support.portable_math import wrap_degrees
 
 ASTRAY = 3
 """Number of decisions off the route after which it has been left."""

@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.polyline import IntArray
+from dorothie_gym.maps.model import IntArray
 from dorothie_gym.maps.routing_graph import NONE, RoutingLane, routing_graph
 from dorothie_gym.maps.town import Town
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import Int32, RecordArray, argument, filled_records
+from dorothie_gym.support.compilation.records import Int32, RecordArray, argument, by_reference, filled_records
 from dorothie_gym.support.copying import shared
 
 

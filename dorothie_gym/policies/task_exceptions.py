@@ -10,7 +10,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal, read_landmarks, read_subgoals
 from dorothie_gym.session.spaces.actions import AdWizardAction
-from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.parsing import is_shipped_story

@@ -7,8 +7,7 @@ import statistics
 from typing import Final
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.route_progress import RouteProgress
 

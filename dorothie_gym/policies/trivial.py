@@ -12,7 +12,7 @@ from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical, action_space, noop
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
 

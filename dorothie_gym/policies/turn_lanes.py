@@ -13,7 +13,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, RouteProgress, lanes_beside
 from dorothie_gym.policies.route_tables import default_successor, is_choice
-from dorothie_gym.sim.network.lane_exits import side_by_side, ways_part
+from dorothie_gym.sim.network.network import side_by_side, ways_part
 
 
 @lru_cache(maxsize=16)

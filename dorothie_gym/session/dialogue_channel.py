@@ -15,13 +15,11 @@ from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
-from dorothie_gym.session.cabin import CabinState, signal_to_noise
-from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.providers import SpokenChannel, speak_aloud
+from dorothie_gym.session.config import ChannelKind, EnvConfig
+from dorothie_gym.session.providers import CabinState, SpokenChannel, signal_to_noise, speak_aloud
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import Speech
-from dorothie_gym.session.spaces.limits import UTTERANCE_LENGTH, plain_text
+from dorothie_gym.session.spaces.fields import UTTERANCE_LENGTH, plain_text
 
 if TYPE_CHECKING:
     from dorothie_gym.support.audio import Samples

@@ -9,6 +9,7 @@ import numpy as np
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
+from dorothie_gym.maps.routing import crowds, cuts_off
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind
@@ -18,10 +19,9 @@ from dorothie_gym.sim.bodies import Prop
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.sim.population import kerb
-from dorothie_gym.sim.roadblocks import crowds, cuts_off
 from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import TaskState
 
 PROP_FROM_START = 30.0
 """Least distance of a prop from the start of its lane [m]; it leaves room for a U-turn in front of the prop."""

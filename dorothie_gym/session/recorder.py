@@ -12,8 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
+from dorothie_gym.maps.town import LightColour, LightProgramme, Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.recording.action_log import Decision
 from dorothie_gym.session.recording.events import Event
@@ -21,7 +20,7 @@ from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind
 from dorothie_gym.session.recording.writer import SessionWriter
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, action_space, noop
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.world import World

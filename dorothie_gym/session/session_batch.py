@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.pictures import FIELDS, picture_spaces
+from dorothie_gym.session.providers import FIELDS, picture_spaces
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.session_engine import SessionEngine, StepOutcome
 from dorothie_gym.session.spaces.actions import ActionMapping, RoleAction
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.view_arrays import RoleArrays, turn_options
 from dorothie_gym.session.view_steps import EVERYTHING, observe_share
 from dorothie_gym.sim.batch.world_rows import WorldRows

@@ -20,23 +20,20 @@ from numpy.typing import NDArray
 from dorothie_gym import maps  # lazy: a town that is given needs no reader
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.live_session import LiveSession, StepBegun
-from dorothie_gym.session.masks import RoleMask
-from dorothie_gym.session.observations import LazyObservations
-from dorothie_gym.session.perception_model import PerceptionModel
-from dorothie_gym.session.pictures import OBSERVERS, picture_spaces
+from dorothie_gym.session.observations import LazyObservations, RoleMask
+from dorothie_gym.session.providers import OBSERVERS, picture_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
 from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.rewards import RewardTerms, term_names
 from dorothie_gym.session.scenario import Scenario, draw_scenario, header_of, template_option
 from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDecoder, ActionMapping, RoleAction, StepInfo
-from dorothie_gym.session.spaces.fields import dict_space
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits, dict_space
 from dorothie_gym.session.spaces.observations import camera_perception_fields, observation_space
-from dorothie_gym.sim.infractions import WorldEvent
 from dorothie_gym.sim.network.network import network_of
+from dorothie_gym.sim.traffic_rules import WorldEvent
 from dorothie_gym.support.copying import Restorable
 from dorothie_gym.support.input_files import settings_of
 from dorothie_gym.tasks.storyboard import StoryboardTemplate

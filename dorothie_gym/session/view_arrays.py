@@ -14,10 +14,9 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.actions import action_space
-from dorothie_gym.session.spaces.fields import AnySpace, Arrays, FieldBuffer, Shape
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import AnySpace, Arrays, FieldBuffer, Shape, SpaceLimits
 from dorothie_gym.session.spaces.observations import ExitColumn, Observation, observation_space
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import CachedViews, shared
 
 Integers: TypeAlias = NDArray[np.int64]

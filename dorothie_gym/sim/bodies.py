@@ -24,8 +24,8 @@ from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
-from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.record_views import (
     ArrayHolder,
     BodyView,
@@ -41,8 +41,7 @@ from dorothie_gym.sim.state.record_views import (
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED
-from dorothie_gym.sim.traffic.route import extend, take
-from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle
+from dorothie_gym.sim.traffic.vehicle_models import extend, slip_of, steering_angle, take
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import record_dtype
 

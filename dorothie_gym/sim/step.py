@@ -16,15 +16,14 @@ from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.sensing.localizer import localize
-from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import NO_SPACE, Kind, Refusal, Wait
+from dorothie_gym.sim.state.ego_records import VehicleRecord
 from dorothie_gym.sim.state.world_arrays import note_pose, trace, world_of
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
 from dorothie_gym.sim.traffic.respawn import tow
-from dorothie_gym.sim.traffic.route import locate
-from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
+from dorothie_gym.sim.traffic.vehicle_models import locate, move, slip_of
 from dorothie_gym.sim.traffic_rules import watch
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, concurrent, inlined

@@ -25,10 +25,8 @@ from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.batch.worlds import alone
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.decision_setup import note_props
-from dorothie_gym.sim.ego.ego_controller import EgoController, LocalPlanner
+from dorothie_gym.sim.ego.ego_controller import Car, CarRecord, EgoController, LocalPlanner
 from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
-from dorothie_gym.sim.ego.vehicle import Car, CarRecord
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.sensing.localizer import Localizer
@@ -39,6 +37,7 @@ from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 from dorothie_gym.sim.step import step_share
 from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
+from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventLog
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
 from dorothie_gym.support.compilation import direct

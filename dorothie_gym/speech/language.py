@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.dialogue.lexicon import read_data
-from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.speech.grammar_sentences import grammar_sentences, known_words, transcripts, with_names_exchanged
 from dorothie_gym.speech.pronunciation import dictionary_text, pronunciations, read_dictionary
 from dorothie_gym.speech.punctuation import PunctuationModel

@@ -17,7 +17,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, overload
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.support.compilation import portable
 
@@ -285,3 +288,24 @@ def power(base: float, exponent: float) -> float:
 def dist(first: Sequence[float], second: Sequence[float]) -> float:
     """Returns the distance of two points of equal dimension, as `math.dist`; in Python only."""
     return math.sqrt(sum([(a - b) * (a - b) for a, b in zip(first, second, strict=True)]))
+
+
+# --- Angles on the circle ---------------------------------------------------------------------------------------------
+
+
+@overload
+def wrap_degrees(angle: float) -> float: ...
+@overload
+def wrap_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def wrap_degrees(angle: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    """Returns the equivalent angle, or array of angles, in [-180, 180) [degrees]."""
+    return (angle + 180.0) % 360.0 - 180.0
+
+
+@overload
+def wrap_radians(angle: float) -> float: ...
+@overload
+def wrap_radians(angle: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def wrap_radians(angle: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    """Returns the equivalent angle, or array of angles, in [-pi, pi) [rad]."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi

@@ -9,7 +9,6 @@ from .parsing import is_shipped_story as is_shipped_story
 from .parsing import load_template as load_template
 from .parsing import parse_template as parse_template
 from .parsing import template_names as template_names
-from .state import TaskState as TaskState
 from .storyboard import Channel as Channel
 from .storyboard import Dependent as Dependent
 from .storyboard import Landmark as Landmark
@@ -20,5 +19,6 @@ from .storyboard import Subgoal as Subgoal
 from .storyboard import SubgoalTemplate as SubgoalTemplate
 from .storyboard import TaskMessage as TaskMessage
 from .storyboard import TaskMessages as TaskMessages
+from .storyboard import TaskState as TaskState
 from .storyboard import Variable as Variable
 from .storyboard import with_reason as with_reason

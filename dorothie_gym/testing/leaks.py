@@ -14,10 +14,8 @@ from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.session_pictures import camera_of
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.perception_model import PerceptionModel
-from dorothie_gym.session.pictures import FIELDS, OBSERVERS
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, PerceptionModel
+from dorothie_gym.session.providers import FIELDS, OBSERVERS
 from dorothie_gym.session.scenario import Scenario, draw_scenario
 from dorothie_gym.session.spaces.actions import noop
 from dorothie_gym.tasks.storyboard import TaskMessages

@@ -18,7 +18,7 @@ from dorothie_gym.pictures.camera.pose import pose_on_car
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.session_engine import SessionEngine
 
 SMALL = ["--town", "brookside", "--vehicles", "3", "--pedestrians", "2", "--seconds", "2", "--repeats", "1"]

@@ -67,7 +67,7 @@ assert understand("take me to the library").landmarks == (LandmarkName.LIBRARY,)
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.session_engine import SessionEngine
 
 engine = SessionEngine("brookside")

@@ -45,7 +45,7 @@ import warnings
 from dorothie_gym.dialogue.grammar import load_grammar
 from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.pictures.camera import camera_of
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig

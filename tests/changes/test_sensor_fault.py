@@ -64,7 +64,7 @@ assert engine.observations["ad_wizard"]["sensors"].tolist() == [0, 0, 0, 1]
 
 from dorothie_gym.lab.console.vocabulary import vocabulary
 from dorothie_gym.pictures.camera import camera_of
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 camera = camera_of(engine.town, engine.scenario, CameraConfig(width=160, height=96))
 assert camera.render(world).rgb.min() >= 128
 assert vocabulary()["sensors"][-1] == "glare"

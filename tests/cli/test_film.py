@@ -21,8 +21,7 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.policies import make_policy
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig
 from dorothie_gym.session.recording import Session
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig

@@ -19,7 +19,7 @@ from dorothie_gym.dialogue import (
     word_acts,
 )
 from dorothie_gym.dialogue.grammar import VOICES, parse_grammar
-from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import (
     LABELS,

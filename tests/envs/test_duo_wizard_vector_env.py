@@ -20,8 +20,7 @@ from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.spaces import noop
 from dorothie_gym.sim.config import WorldConfig
 from tests.envs.test_navigation_vector_env import check_equal

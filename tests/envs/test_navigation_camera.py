@@ -17,7 +17,7 @@ from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.policies.navigation import NavigationAction
-from dorothie_gym.session.camera_config import CameraOutput
+from dorothie_gym.session.config import CameraOutput
 from tests.envs.dashboard_reader import instruction_on, obey_picture, planned_on, speed_on
 from tests.envs.navigation_drivers import drive
 from tests.envs.test_navigation_vector_env import CONTINUOUS, NAVIGATION, check_equal, pedals, play_both

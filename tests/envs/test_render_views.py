@@ -16,7 +16,7 @@ from dorothie_gym import EnvConfig, WorldConfig, make_policy
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.palette import Colour
-from dorothie_gym.session.camera_config import CameraConfig, CameraMount
+from dorothie_gym.session.config import CameraConfig, CameraMount
 from dorothie_gym.session.scenario import Scenario, draw_scenario
 from dorothie_gym.session.spaces import ParticipantAction, Speech, noop
 from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_tasks

@@ -11,7 +11,7 @@ import numpy as np
 
 from dorothie_gym.maps import Lane, LaneLink, LinkType, Town
 from dorothie_gym.maps.model import Array, Junction, Signal, SignalKind
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 WIDTH = 3.5
 LIGHT, STOP, YIELD = SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD

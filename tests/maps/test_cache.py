@@ -113,7 +113,7 @@ def test_the_compiler_s_digest_covers_all_of_our_modules_that_compile() -> None:
     without_effect = {f"dorothie_gym.{name}" for name in names}
     covered = ("dorothie_gym.maps", "dorothie_gym.support.compilation")
     others = {m for m in loaded if not m.startswith(covered)} - without_effect
-    assert others == {f"dorothie_gym.support.{name}" for name in ("angles", "portable_arrays", "portable_math")}
+    assert others == {f"dorothie_gym.support.{name}" for name in ("portable_arrays", "portable_math")}
 
 
 def test_the_compiler_s_digest_follows_its_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps import LinkType
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 from tests.sim.driving import network
 
 

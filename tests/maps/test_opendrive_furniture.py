@@ -7,8 +7,7 @@ import pytest
 
 from dorothie_gym.maps.model import Signal, SignalKind
 from dorothie_gym.maps.opendrive import read_opendrive
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section, shared_map
 

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from dorothie_gym.maps import Lane, LinkType, Town, load_town
 from dorothie_gym.maps.model import Signal, SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
+from dorothie_gym.maps.town import LightColour, LightPhase, LightProgramme
 from dorothie_gym.maps.traffic_light_programs import (
     ALL_RED,
     LEFT_GREEN,
@@ -25,8 +26,7 @@ from dorothie_gym.maps.traffic_light_programs import (
     derive_programmes,
     yellow_time,
 )
-from dorothie_gym.maps.traffic_lights import LightColour, LightPhase, LightProgramme
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 from tests.maps.crossings import LIGHT, STOP, Arm, Crossing, meeting, town_of
 from tests.maps.opendrive_text import shared_map
 

@@ -9,9 +9,8 @@ from scipy.sparse.csgraph import connected_components
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lint import check_town
 from dorothie_gym.maps.model import LinkType, SignalKind
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.maps.town import LightColour, Town
+from dorothie_gym.support.portable_math import wrap_degrees
 from tests.maps.yaml_plans import AVENUES, CIRCUS, INTERCHANGE, PAIR, compiled, street_of, ways
 
 PLANS = {"avenues": AVENUES, "circus": CIRCUS, "pair": PAIR, "interchange": INTERCHANGE}

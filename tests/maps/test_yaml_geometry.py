@@ -16,7 +16,7 @@ from dorothie_gym.maps.yaml.geometry import (
     line,
     rounded,
 )
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 RIGHT_ARC = CurveSegment(0.0, 0.0, 0.0, 10.0 * math.pi / 2.0, 0.1)
 HOOK = rounded([(0.0, 0.0), (60.0, 0.0), (60.0, 50.0), (0.0, 50.0)], [20.0, 10.0])

@@ -9,7 +9,7 @@ import pytest
 from dorothie_gym.maps.model import LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml import read_yaml_town, schema
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 VILLAGE = """\
 name: village

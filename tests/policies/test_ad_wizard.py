@@ -13,7 +13,7 @@ from dorothie_gym.policies.task_exceptions import task_message
 from dorothie_gym.session.recording import EventType, Session
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import AdWizardAction, SpaceLimits, noop, plain_text
-from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH
 from dorothie_gym.tasks import TaskState, bind, load_template, parse_template, template_names
 from tests.policies.walk import play
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology import ActionValue, Role, Slot
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.participant.config import ParticipantStyle

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, understand, word_act
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Role, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest

@@ -3,7 +3,7 @@ import pytest
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps import LinkType, load_town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.policies.participant.state import TaskProgress
 from dorothie_gym.policies.route_progress import (
     RouteProgress,

@@ -20,12 +20,9 @@ from dorothie_gym.evaluation.rollout.role_episodes import role_episodes
 from dorothie_gym.maps import Town, load_town, town_names
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.pretrained import pretrained_card, pretrained_names
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.config import CameraConfig, ChannelKind, EnvConfig, PerceptionModel
 from dorothie_gym.session.recording import Session
-from dorothie_gym.session.recording.file_names import AUDIO_FOLDER
+from dorothie_gym.session.recording.json_io import AUDIO_FOLDER
 from dorothie_gym.session.session_engine import SessionEngine
 from tests.lab.console.people import Table
 from tests.maps.opendrive_text import MAPS

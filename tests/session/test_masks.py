@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, PropKind, Role
-from dorothie_gym.session.masks import ActionMasks
+from dorothie_gym.session.observations import ActionMasks
 from dorothie_gym.session.scenario import draw_scenario
-from dorothie_gym.session.session_views import SessionViews
 from dorothie_gym.session.spaces import SpaceLimits, action_space
 from dorothie_gym.session.view_arrays import RoleArrays
+from dorothie_gym.session.view_steps import SessionViews
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World
 from dorothie_gym.tasks import TaskState

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym import DuoWizardEnv, EnvConfig
 from dorothie_gym.ontology import Sensor
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)  # of PettingZoo's own environments

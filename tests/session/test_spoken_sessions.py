@@ -19,7 +19,7 @@ from dorothie_gym.evaluation.rollout.replay import resimulate
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED
-from dorothie_gym.session.channel_kind import ChannelKind
+from dorothie_gym.session.config import ChannelKind
 from dorothie_gym.session.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.session.recording import Session, SessionWriter
 from dorothie_gym.session.session_engine import SessionEngine

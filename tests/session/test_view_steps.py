@@ -5,9 +5,9 @@ import pytest
 
 from dorothie_gym.maps import Exit
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.session.session_views import SessionViews
 from dorothie_gym.session.spaces import ExitColumn, SpaceLimits
 from dorothie_gym.session.view_arrays import RoleArrays
+from dorothie_gym.session.view_steps import SessionViews
 from dorothie_gym.sim.world import World
 from tests.sim.driving import network, world_at
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from dorothie_gym.maps import Junction, Lane, LaneLink, LinkType, Town
 from dorothie_gym.maps.model import Signal, SignalKind
-from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
+from dorothie_gym.maps.town import LightPhase, LightProgramme
 from tests.sim.network.towns import bend, lane
 
 GREEN, YELLOW, ALL_RED = 15.0, 3.0, 1.0

@@ -14,10 +14,9 @@ import pytest
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.sim.ego.ego_controller import LocalPlanner
-from dorothie_gym.sim.ego.vehicle import Car
-from dorothie_gym.sim.infractions import WorldEvent
+from dorothie_gym.sim.ego.ego_controller import Car, LocalPlanner
 from dorothie_gym.sim.network.network import TownNetwork, network_of
+from dorothie_gym.sim.traffic_rules import WorldEvent
 from dorothie_gym.sim.world import World
 
 MAPS = Path(__file__).resolve().parents[2] / "../shared/maps"

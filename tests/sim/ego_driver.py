@@ -11,8 +11,7 @@ from dorothie_gym.maps.routing import LaneEntry, Leg, router
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, PhysicalAction
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import GoalAhead, LocalPlanner
-from dorothie_gym.sim.ego.feasibility import u_turn_braking
-from dorothie_gym.sim.ego.limits import LEAD
+from dorothie_gym.sim.ego.limits import LEAD, u_turn_braking
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from tests.sim.driving import Trip, on_lane

@@ -10,12 +10,12 @@ from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.sim.infractions import (
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.traffic_rules import (
     INFRACTION_KINDS,
     WorldEvent,
     WorldEventKind,
 )
-from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.world import World
 from tests.sim.crossings import across, crossing, lit_crossing, way_in, way_out
 from tests.sim.driving import ALONE, long_lane, network, run, world_at

@@ -12,17 +12,17 @@ import pytest
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
-from dorothie_gym.maps.traffic_lights import LightPhase
+from dorothie_gym.maps.town import LightPhase
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.population import add_vehicle
-from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Wait
+from dorothie_gym.sim.state.ego_records import VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
+from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventKind
 from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation.records import RecordArray
 from tests.sim.crossings import ARMS, across, crossing, lit, lit_crossing, way_in, way_out

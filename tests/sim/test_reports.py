@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dorothie_gym.ontology import ObjectClass, PropKind
-from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
+from dorothie_gym.sim.traffic_rules import INFRACTION_KINDS, WorldEventKind
 from tests.sim.crossings import lit_crossing, way_out
 from tests.sim.driving import long_lane, network, run, world_at
 from tests.sim.forcing import blind, park

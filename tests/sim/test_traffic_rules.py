@@ -10,9 +10,9 @@ import pytest
 
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array, SignalKind
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
+from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventKind
 from tests.sim.crossings import crossing, way_in
 from tests.sim.driving import network
 from tests.sim.state.plain_rules import LENGTH, PlainWatch, lawless_way

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
-from dorothie_gym.sim.infractions import WorldEventKind
 from dorothie_gym.sim.population import add_pedestrian
 from dorothie_gym.sim.state.codes import Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import grown
+from dorothie_gym.sim.traffic_rules import WorldEventKind
 from tests.sim.driving import network, world_at
 
 

@@ -11,10 +11,10 @@ from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.ontology import ObjectClass, PhysicalAction, PropKind, Sensor, WeatherParameter
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.sim.infractions import WorldEventKind
 from dorothie_gym.sim.population import free_places
 from dorothie_gym.sim.state.codes import Footway, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.traffic_rules import WorldEventKind
 from dorothie_gym.sim.world import World
 from tests.sim.driving import PROPS, long_lane, network, run, world_at
 from tests.sim.forcing import park

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dorothie_gym.support.compilation import compiled
-from dorothie_gym.support.compilation.by_reference import by_reference, gives_row
+from dorothie_gym.support.compilation.records import by_reference, gives_row
 
 
 @by_reference

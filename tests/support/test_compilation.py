@@ -13,10 +13,9 @@ from numba.core import event
 from numba.core.compiler import Flags
 
 from dorothie_gym.support.compilation import allocating, cache, compiled, direct, fixed, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
 from dorothie_gym.support.compilation.cache import compiled_folder
 from dorothie_gym.support.compilation.dispatcher import OwnFlags
-from dorothie_gym.support.compilation.records import Float, empty_records
+from dorothie_gym.support.compilation.records import Float, by_reference, empty_records
 from tests.support.cache_damage import DAMAGES
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dorothie_gym.session.spaces.limits import STORY_LENGTH, plain_text
+from dorothie_gym.session.spaces.fields import STORY_LENGTH, plain_text
 from dorothie_gym.tasks import Channel, TaskState, bind, load_template, parse_template, template_names
 from dorothie_gym.tasks.purposes import (
     find_items,

@@ -3,7 +3,7 @@ import pytest
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps import load_town
-from dorothie_gym.session.spaces.limits import STORY_LENGTH, plain_text
+from dorothie_gym.session.spaces.fields import STORY_LENGTH, plain_text
 from dorothie_gym.tasks import bind, is_shipped_story, load_template, template_names
 
 from .builders import parse, plain

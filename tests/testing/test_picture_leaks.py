@@ -11,9 +11,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 from dorothie_gym.pictures.camera.camera_perception import CameraPerception
 from dorothie_gym.pictures.camera.scenery import landmarks as landmark_models
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, PerceptionModel
 from dorothie_gym.session.scenario import draw_scenario
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.testing.leaks import check_hidden_landmarks, check_observations_do_not_leak

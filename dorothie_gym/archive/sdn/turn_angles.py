@@ -11,8 +11,8 @@ import numpy as np
 from dorothie_gym.archive.sdn.trajectory import CarPoses, SdnMap
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
+from dorothie_gym.support.portable_math import wrap_degrees
 
 MIN_CLEAR_TURN: Final = 30.0
 """Angles and turns from here to `MAX_CLEAR_TURN` distinguish left from right [degrees]."""

@@ -15,7 +15,7 @@ from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import Choice, direction_of, lanes_beside
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 AT_END: Final = 6.0
 """Distance to a junction below which a standing car has no room to drive up to it [m]."""

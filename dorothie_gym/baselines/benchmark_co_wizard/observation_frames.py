@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.teacher_forced.features.incremental import ObservedFrame
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.session.recorder import LightStates

@@ -26,7 +26,7 @@ from dorothie_gym.policies.navigation.demonstrations import Demonstration, Demon
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.spaces.actions import CoWizardAction
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 
 NOTHING: Final = int(NavigationAction.NOTHING)
 """Number of the action "nothing" in every action space."""

@@ -25,7 +25,7 @@ from dorothie_gym.errors import ModelFileError, SettingsError, short_repr
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.policies.policy_loader import find_player
-from dorothie_gym.session.spaces.limits import UNBOUNDED, SpaceLimits
+from dorothie_gym.session.spaces.fields import UNBOUNDED, SpaceLimits
 
 ENVIRONMENTS_OF_MODELS: Final = frozenset(
     f"dorothie_gym/{name}-v0"

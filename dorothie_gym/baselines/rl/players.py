@@ -19,8 +19,8 @@ from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.policies.policy import AnyPolicy, Policy
 from dorothie_gym.session.spaces.actions import ActionDict, action_space, noop
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.flat import FlatActions, FlatObservations
-from dorothie_gym.session.spaces.limits import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping, observation_space
 
 

@@ -32,12 +32,12 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
+from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind, Rows, SceneTable
-from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.support.angles import wrap_radians
 from dorothie_gym.support.files import replacing
+from dorothie_gym.support.portable_math import wrap_radians
 
 CYCLIST_WIDTH: Final = 1.0
 """Width below which a vehicle counts as a cyclist: the detector does not distinguish them [m]."""

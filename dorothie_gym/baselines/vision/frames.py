@@ -32,14 +32,14 @@ from dorothie_gym.pictures.camera.array_cache import builder_digest
 from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.recording.events import EventType
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.world import CLARITY
-from dorothie_gym.support.angles import wrap_radians
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import MIB
+from dorothie_gym.support.portable_math import wrap_radians
 from dorothie_gym.support.user_cache import (
     cache_folder,
     discard,

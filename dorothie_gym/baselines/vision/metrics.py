@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.baselines.vision.frames import CLASSES
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dorothie_gym.baselines.vision.frames import SPACE_COLUMNS
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.session.config import CameraConfig
+from dorothie_gym.support.portable_math import wrap_radians
 
 SOLID: Final = 8
 """Number of columns of a solid."""

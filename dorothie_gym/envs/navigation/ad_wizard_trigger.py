@@ -32,15 +32,15 @@ from dorothie_gym.policies.policy import policy_seed, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import ActionDecoder, RoleAction
-from dorothie_gym.session.spaces.limits import STORY_LENGTH, SpaceLimits, plain_text
+from dorothie_gym.session.spaces.fields import STORY_LENGTH, SpaceLimits, plain_text
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.session.view_steps import write_lanes
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.ego.path_search import last_point_before
+from dorothie_gym.sim.ego.path_builder import last_point_before
 from dorothie_gym.sim.randomness import POOL, draw_share, seed_stream
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
-from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.ad_wizard_trigger import PlansRecord
 from dorothie_gym.maps.model import Array
-from dorothie_gym.support.compilation.by_reference import by_reference, gives_row
-from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray, by_reference, gives_row
 
 CRUISE_LIMIT: Final = 100
 """Refusal of a cruise speed out of its range; the other codes are those of `codes.Refusal`."""

@@ -28,7 +28,7 @@ from dorothie_gym.sim.state.world_arrays import lengthened
 from dorothie_gym.sim.world_start import WorldSeeds, start_world
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import plain
-from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import TaskState
 
 _WAITS, _NEAR, _LOST, _TOLD = map(int, Event)
 _act_share, _guide_share = direct(act_share), direct(guide_share)

@@ -17,8 +17,8 @@ from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.pictures import camera  # lazy: most environments have no camera
 from dorothie_gym.policies.navigation.junction_exits import nearest_sector
 from dorothie_gym.policies.navigation.observation_vector import SPEED_UNIT, Vector, layout
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.pictures import FIELDS, picture_spaces
+from dorothie_gym.session.config import CameraConfig, CameraOutput
+from dorothie_gym.session.providers import FIELDS, picture_spaces
 from dorothie_gym.sim.batch.threads import ThreadPool
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.limits import KMH

@@ -14,8 +14,7 @@ from dorothie_gym.session.rewards import NAVIGATION_TERMS, write_navigation_term
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import COLLISION
 from dorothie_gym.support.compilation import compiled
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, empty_records
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, by_reference, empty_records
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

@@ -33,14 +33,14 @@ from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.observations import LazyObservations
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import Mental
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL, REASONS
-from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, with_room_of
+from dorothie_gym.sim.traffic_rules import INFRACTION_KINDS
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, taken
 from dorothie_gym.tasks.storyboard import StoryboardTemplate

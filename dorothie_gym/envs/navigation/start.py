@@ -22,7 +22,7 @@ from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
 from dorothie_gym.policies.navigation.observation_vector import FIELDS
 from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown, with_room_of

@@ -42,11 +42,9 @@ from dorothie_gym.policies.route_tables import RouteTables
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.decision_setup import note_props
-from dorothie_gym.sim.ego.feasibility import may_change_cruise
-from dorothie_gym.sim.ego.limits import EGO_STANDING
+from dorothie_gym.sim.ego.limits import EGO_STANDING, may_change_cruise
 from dorothie_gym.sim.ego.manoeuvres import command
-from dorothie_gym.sim.ego.path_builder import point_before
-from dorothie_gym.sim.network.centre_lines import position_on
+from dorothie_gym.sim.ego.path_builder import point_before, position_on
 from dorothie_gym.sim.sensing.perception import switch_lamps
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.step import step

@@ -21,7 +21,7 @@ from dorothie_gym.policies.policy_loader import (
 )
 from dorothie_gym.policies.pretrained import is_pretrained
 from dorothie_gym.session.recording.json_io import same_json
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 
 
 class Claim(enum.StrEnum):

@@ -18,10 +18,8 @@ from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
-from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.recording.file_names import safe_name
-from dorothie_gym.session.recording.json_io import to_page
+from dorothie_gym.session.config import ChannelKind, EnvConfig
+from dorothie_gym.session.recording.json_io import safe_name, to_page
 from dorothie_gym.support.files import write_atomically
 
 SESSIONS_FOLDER: Final = "sessions"

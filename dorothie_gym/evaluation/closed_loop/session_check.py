@@ -24,19 +24,18 @@ from dorothie_gym.evaluation.rollout.recorded_policy import RecordedPolicy, reco
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed
 from dorothie_gym.policies.policy_loader import Player
-from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recording.events import EndReason, EventType
-from dorothie_gym.session.recording.file_names import (
+from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.recording.json_io import (
     ACTIONS_FILE,
     AUDIO_FOLDER,
     EVENTS_FILE,
     FRAMES_FILE,
     HEADER_FILE,
     SessionState,
+    same_json,
 )
-from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.recording.json_io import same_json
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 

@@ -16,9 +16,8 @@ from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.header import LandmarkRow
+from dorothie_gym.session.recording.header import NO_LANE, LandmarkRow
 from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.recording.trajectory import NO_LANE
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 

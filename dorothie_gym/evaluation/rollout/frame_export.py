@@ -28,7 +28,7 @@ from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared

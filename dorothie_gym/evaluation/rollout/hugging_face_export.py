@@ -20,7 +20,7 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.rollout.role_episodes import RoleEpisode, distinct_ids
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.spaces.actions import action_fields
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import observation_fields
 from dorothie_gym.support.files import new_folder, write_atomically
 

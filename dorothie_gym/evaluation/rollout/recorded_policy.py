@@ -12,7 +12,7 @@ from dorothie_gym.policies.policy import Policy
 from dorothie_gym.session.recorder import expand, idle_actions
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 

@@ -19,8 +19,7 @@ from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.maps.catalogue import find_town, load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.session.recording.events import EndReason, EventType
 from dorothie_gym.session.recording.header import SessionHeader

@@ -17,10 +17,10 @@ from dorothie_gym.archive.corpus import CorpusEntry
 from dorothie_gym.evaluation.rollout.replay import ReplaySources, begin_replay, recorded_actions
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.masks import RoleMask
+from dorothie_gym.session.observations import RoleMask
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, action_space
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import digest_of
 

@@ -146,7 +146,7 @@ class SessionPage:
             SessionError: the session has no frames or no surroundings, or its town is not known.
         """
         from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
-        from dorothie_gym.session.camera_config import CameraConfig
+        from dorothie_gym.session.config import CameraConfig
 
         if self.town is None:
             raise SessionError(f"{self.session.name}: its town {self.session.header.town!r} is not known; give --maps")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig
 
 
 class WhileAway(enum.StrEnum):

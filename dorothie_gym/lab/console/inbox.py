@@ -34,7 +34,7 @@ from dorothie_gym.session.spaces.actions import (
     RoleAction,
     Speech,
 )
-from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH, SpaceLimits, plain_text
+from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH, SpaceLimits, plain_text
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 MOST_WAITING: Final = 24

@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from dorothie_gym.errors import DorothieGymError
-from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH
 
 MAX_BYTES: Final = 8192
 """Largest message [bytes]: a typed turn with its acts takes up to 2 kB."""

@@ -17,7 +17,7 @@ from dorothie_gym.lab.console.vocabulary import vocabulary
 from dorothie_gym.lab.console.windscreen import Windscreen
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.recording.events import EndReason
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING

@@ -12,7 +12,7 @@ from dorothie_gym.errors import OntologyError
 from dorothie_gym.lab.console.messages import MessageError, Say, TypedSpan
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.spellings import parse_act
-from dorothie_gym.session.spaces.limits import UTTERANCE_LENGTH, plain_text
+from dorothie_gym.session.spaces.fields import UTTERANCE_LENGTH, plain_text
 
 
 class ActSource(enum.StrEnum):

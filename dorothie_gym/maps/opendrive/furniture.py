@@ -19,7 +19,7 @@ from dorothie_gym.maps.opendrive.records import (
 )
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, runs_forward
 from dorothie_gym.support import portable_arrays as pn
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 # Signal types in CARLA's maps: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
 SIGNAL_TYPES = {

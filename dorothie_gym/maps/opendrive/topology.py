@@ -18,7 +18,7 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 from dorothie_gym.support import portable_arrays as pn
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 # Lane sections shorter than this are contracted [m].
 JOINT_LENGTH = 1e-3

@@ -11,7 +11,7 @@ from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
 from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 POCKET = -1
 """Number of a left-turn lane in the median."""

@@ -15,7 +15,7 @@ import numpy as np
 from dorothie_gym.maps.model import Array
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 Point: TypeAlias = tuple[float, float]
 Pose: TypeAlias = tuple[float, float, float]

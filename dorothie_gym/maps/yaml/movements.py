@@ -20,7 +20,7 @@ from dorothie_gym.maps.yaml.arms import (
 from dorothie_gym.maps.yaml.geometry import Curve, connect
 from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.portable_math import wrap_radians
 
 STRAIGHT_BELOW = math.radians(35.0)
 """Largest change of heading of a straight movement [rad]."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.pictures.camera import patterns
 from dorothie_gym.pictures.camera.lettering import Ink, Picture, lettered
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 SIGN_SIZE = 256, 64

@@ -13,7 +13,7 @@ from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import NEAR, VisibilityBuffer, collect_triangles, draw_collected
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 CELL = 24.0

@@ -39,7 +39,7 @@ from dorothie_gym.pictures.camera.samples import (
 from dorothie_gym.pictures.camera.shadows import TEXEL
 from dorothie_gym.pictures.camera.texturing import Textures, sample_texture
 from dorothie_gym.support.compilation import compiled, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference, gives_row
+from dorothie_gym.support.compilation.records import by_reference, gives_row
 
 FACES: Final = 64
 """Number of triangles whose faces are kept; a power of two."""

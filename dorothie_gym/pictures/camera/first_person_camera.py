@@ -30,7 +30,7 @@ from dorothie_gym.pictures.camera.sensor_faults import apply_faults
 from dorothie_gym.pictures.camera.shading import shade
 from dorothie_gym.pictures.camera.shadows import new_shadow_maps, turn_sun
 from dorothie_gym.pictures.camera.texturing import textures_of
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.compilation import direct, fixed
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records, plain

@@ -17,8 +17,7 @@ from dorothie_gym.pictures.camera.models.vehicles import Lamps
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import concurrent, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import RecordArray
+from dorothie_gym.support.compilation.records import RecordArray, by_reference
 
 SQUARES = 128
 """Squares along each side of the map."""

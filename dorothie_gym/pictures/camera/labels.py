@@ -14,7 +14,7 @@ from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import SKY, VisibilityBuffer
 from dorothie_gym.pictures.camera.samples import FIRST, ROOM, Samples, X, Y
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 
 _SKY_CLASS = int(ObjectClass.SKY.value)
 _GROUND = int(Surface.GROUND)

@@ -13,7 +13,7 @@ from dorothie_gym.pictures.camera.optics import Optics
 from dorothie_gym.sim.sensing.visibility import transmission
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import concurrent, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 LAMP_REACH = 20.0

@@ -17,7 +17,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 PLAIN = 0

@@ -9,7 +9,7 @@ from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.shadows import ShadowMaps
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 
 
 @by_reference

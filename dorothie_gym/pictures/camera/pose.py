@@ -13,10 +13,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.session.camera_config import CameraMount
+from dorothie_gym.session.config import CameraMount
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 

@@ -17,7 +17,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.mesh import PADDING, Mesh
 from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 
 SKY = -1
 """Triangle of samples that see none."""

@@ -12,7 +12,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.maps.shapes import TownSamples
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.compilation import compiled
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 _CELL = 5.0  # [m]; samples as far away count

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.support.compilation import inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 
 ROOM: Final = 192
 """Largest number of samples that are shaded together: their quantities fit into the processor's nearest cache."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
+from dorothie_gym.maps.town import LightColour, LightPhase
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.cells import is_in_view
 from dorothie_gym.pictures.camera.first_person_camera import CameraFrame, FirstPersonCamera
@@ -21,9 +21,9 @@ from dorothie_gym.pictures.camera.pose import CameraPose, View, pose_on_car
 from dorothie_gym.pictures.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
+from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.sim.state.codes import Colour
+from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.world_arrays import CAR_KEY
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World

@@ -12,9 +12,8 @@ from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.pictures import FIELDS, OBSERVERS
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
+from dorothie_gym.session.providers import FIELDS, OBSERVERS
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.sim.world import World

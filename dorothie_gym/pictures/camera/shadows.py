@@ -23,8 +23,7 @@ from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
 from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import RecordArray
+from dorothie_gym.support.compilation.records import RecordArray, by_reference
 
 TEXEL = 0.2
 """Width of a square of the plane [m]."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.pictures.camera.atlas import AtlasArrays
 from dorothie_gym.support.compilation import inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 
 _LANES = 0x00FF00FF00FF00FF  # the four channels of a texel, 16 bits apart
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from dorothie_gym.maps.traffic_lights import LightProgramme
+from dorothie_gym.maps.town import LightProgramme
 from dorothie_gym.pictures.camera.assets import camera_assets
 from dorothie_gym.pictures.camera.atlas import STREET_NAMES, with_street_names
 from dorothie_gym.pictures.camera.cells import CellTable

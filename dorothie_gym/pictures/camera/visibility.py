@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 
 PERCEPTION_CAMERA: Final = CameraConfig(outputs=(CameraOutput.BOXES,), antialiasing=False, shadows=False)
 """Camera of the perception, with the usual size and mount; it does not depend on `EnvConfig.camera`."""

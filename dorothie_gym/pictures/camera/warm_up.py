@@ -8,8 +8,7 @@ from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.shading import shade
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.warm_up import TOWN, Progress, reporting
 from dorothie_gym.sim.config import WorldConfig

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from dorothie_gym.maps.model import Array, SignalKind
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import font

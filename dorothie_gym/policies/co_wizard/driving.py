@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.intentions import Wish
@@ -30,7 +30,7 @@ from dorothie_gym.policies.route_progress import (
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 CRUISE_TOLERANCE = 2.6
 """Difference between actual and target cruise speed that is not corrected [km/h]; half a speed step of 5 km/h."""

@@ -25,7 +25,7 @@ from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Mental, Physical
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
 

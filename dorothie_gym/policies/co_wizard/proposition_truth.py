@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor

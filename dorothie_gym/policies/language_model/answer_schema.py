@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from dorothie_gym.errors import InputFileError, short_repr
 from dorothie_gym.policies.language_model.faults import CallError, Fault
-from dorothie_gym.session.spaces.limits import plain_text
+from dorothie_gym.session.spaces.fields import plain_text
 from dorothie_gym.support.input_files import parse_json
 
 MAX_ANSWER: Final = 20_000

@@ -30,7 +30,7 @@ from dorothie_gym.policies.language_model.role_interface import (
 from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.session.spaces.observations import ExitColumn
-from dorothie_gym.sim.ego.feasibility import may_change_cruise
+from dorothie_gym.sim.ego.limits import may_change_cruise
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support import portable_math as pm
 

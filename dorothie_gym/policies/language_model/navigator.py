@@ -27,7 +27,7 @@ from dorothie_gym.policies.route_progress import (
     stopping_distance,
 )
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 TURN_LEAD = 85.0
 """Distance to a junction from which on its turn is due [m]; as the scripted Co-Wizard commands it."""

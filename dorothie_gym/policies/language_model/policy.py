@@ -24,7 +24,7 @@ from dorothie_gym.policies.language_model.usage import ModelUsage
 from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 _LOG = logging.getLogger(__name__)

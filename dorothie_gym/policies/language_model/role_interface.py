@@ -26,7 +26,7 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.session.spaces.actions import ActionDict, Speech
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 KEEP: Final = "keep"

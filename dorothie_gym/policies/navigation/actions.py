@@ -15,8 +15,15 @@ from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u
 from dorothie_gym.policies.navigation.driver_view import DriverArrays
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays
 from dorothie_gym.session.spaces.actions import Physical
-from dorothie_gym.sim.ego.feasibility import is_past_stopping
-from dorothie_gym.sim.ego.limits import HALF_LENGTH, LEAD, MAX_CRUISE, MIN_CRUISE, MIN_SWITCH, U_TURN_SPEED
+from dorothie_gym.sim.ego.limits import (
+    HALF_LENGTH,
+    LEAD,
+    MAX_CRUISE,
+    MIN_CRUISE,
+    MIN_SWITCH,
+    U_TURN_SPEED,
+    is_past_stopping,
+)
 from dorothie_gym.sim.ego.manoeuvres import find_feasible
 from dorothie_gym.sim.state.codes import J_TURN, LANE_FOLLOW, LANE_SWITCH, START, STOP, U_TURN, Feasible, Motion
 from dorothie_gym.support.compilation import compiled, direct

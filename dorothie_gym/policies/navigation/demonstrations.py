@@ -27,7 +27,7 @@ from dorothie_gym.policies.route_progress import lanes_beside
 from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 STOP_FOR_GOAL = 30.0
 """Distance to the destination within which a stop is attributed to it [m]."""

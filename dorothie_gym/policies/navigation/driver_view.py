@@ -13,21 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import LinkType
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays, JunctionExits
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.session.spaces.observations import ExitColumn, ObjectColumn, ObservationMapping
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.motion_control import motion_of
-from dorothie_gym.sim.ego.path_search import SEARCH, progress_on_path
+from dorothie_gym.sim.ego.path_builder import SEARCH, progress_on_path
 from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.traffic.junctions import colour_at
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray, empty_records, plain
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray, by_reference, empty_records, plain
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.polyline import closest_on_segment
+from dorothie_gym.maps.model import closest_on_segment
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.route_search import find_route
 from dorothie_gym.maps.routing_graph import CHANGE_LEFT, NONE, U_TURN, RoutingGraph
@@ -27,8 +27,7 @@ from dorothie_gym.policies.route_legs import (
 from dorothie_gym.policies.route_progress import ASTRAY, CELL_BEHIND, SAME_ROADBLOCK
 from dorothie_gym.policies.route_tables import RouteTables
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.ego.feasibility import u_turn_braking
-from dorothie_gym.sim.ego.limits import EGO_STANDING, U_TURN_SPEED
+from dorothie_gym.sim.ego.limits import EGO_STANDING, U_TURN_SPEED, u_turn_braking
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC
 from dorothie_gym.support import portable_math as pm

@@ -10,8 +10,15 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.route_arrays import LegRecord, PlaceRecord
 from dorothie_gym.maps.routing_graph import NONE
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray, argument, empty_records
+from dorothie_gym.support.compilation.records import (
+    Flag,
+    Float,
+    Int32,
+    RecordArray,
+    argument,
+    by_reference,
+    empty_records,
+)
 
 CLOSED_PLACES = 64
 """Most places closed by roadblocks that an instructor remembers; every roadblock closes two."""

@@ -13,11 +13,11 @@ from dorothie_gym.maps.model import Exit
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.route_progress import lanes_beside, next_choice
 from dorothie_gym.policies.route_tables import is_choice, route_tables
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
-from dorothie_gym.support.angles import wrap_degrees
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
+from dorothie_gym.support.portable_math import wrap_degrees
 
 SECTORS = tuple(range(-180, 180, 45))
 """Middles of the sectors [degrees, positive left]: back, sharp right, right, half right, straight, ..."""

@@ -38,7 +38,7 @@ from dorothie_gym.policies.navigation.observation_vector import (
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.session.spaces.actions import ActionDict, Physical
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
 

@@ -39,7 +39,7 @@ from dorothie_gym.session.spaces.fields import share, signal, sizes
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.sim.ego.manoeuvres import find_oncoming
-from dorothie_gym.sim.network.centre_lines import position_on, project_on
+from dorothie_gym.sim.ego.path_builder import position_on, project_on
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.sim.state.town_arrays import town_arrays

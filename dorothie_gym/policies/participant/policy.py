@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from dorothie_gym.dialogue.speaker_style import draw_style
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
@@ -23,7 +22,7 @@ from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 LONG_RED = 10.0

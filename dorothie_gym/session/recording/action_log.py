@@ -10,8 +10,16 @@ from typing import Final
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.file_names import ACTIONS_FILE, MAX_EVENTS, MAX_FRAME
-from dorothie_gym.session.recording.json_io import Fields, canonical, from_line, read_lines, to_line
+from dorothie_gym.session.recording.json_io import (
+    ACTIONS_FILE,
+    MAX_EVENTS,
+    MAX_FRAME,
+    Fields,
+    canonical,
+    from_line,
+    read_lines,
+    to_line,
+)
 
 _ROLES: Final = {role.value: role for role in AGENT_ROLES}
 

@@ -16,8 +16,16 @@ from typing import Final, Self
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.file_names import MAX_EVENTS, MAX_FRAME, SEATS_FILE
-from dorothie_gym.session.recording.json_io import Fields, canonical_object, from_line, read_lines, to_line
+from dorothie_gym.session.recording.json_io import (
+    MAX_EVENTS,
+    MAX_FRAME,
+    SEATS_FILE,
+    Fields,
+    canonical_object,
+    from_line,
+    read_lines,
+    to_line,
+)
 
 
 class SeatEventKind(enum.StrEnum):

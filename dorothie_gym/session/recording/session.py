@@ -33,7 +33,9 @@ from dorothie_gym.session.recording.events import (
     move_record,
     utterance_records,
 )
-from dorothie_gym.session.recording.file_names import (
+from dorothie_gym.session.recording.frames import read_frames, read_journal, write_frames
+from dorothie_gym.session.recording.header import TRAJECTORY_DTYPE, SessionHeader, Trajectory, check_rising
+from dorothie_gym.session.recording.json_io import (
     ACTIONS_FILE,
     AUDIO_FOLDER,
     EVENTS_FILE,
@@ -44,21 +46,16 @@ from dorothie_gym.session.recording.file_names import (
     MAX_EXCEPTIONS,
     MAX_MOVES,
     PICTURES_FOLDER,
-    SessionState,
-    safe_name,
-)
-from dorothie_gym.session.recording.frames import read_frames, read_journal, write_frames
-from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.recording.json_io import (
     Fields,
+    SessionState,
     canonical,
     read_lines,
     read_object,
+    safe_name,
     to_line,
     to_page,
 )
 from dorothie_gym.session.recording.surroundings import Surroundings
-from dorothie_gym.session.recording.trajectory import TRAJECTORY_DTYPE, Trajectory, check_rising
 from dorothie_gym.session.recording.validation import ReadReport, faults_of
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared

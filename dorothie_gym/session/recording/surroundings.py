@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 
 Rows: TypeAlias = NDArray[np.void]

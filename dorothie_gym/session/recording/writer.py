@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import OutputFolderError, SessionError
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.session.recording.action_log import Decision, encode_decision
 from dorothie_gym.session.recording.events import Event, encode_event
-from dorothie_gym.session.recording.file_names import (
+from dorothie_gym.session.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
+from dorothie_gym.session.recording.header import SessionHeader, check_rising, checked_rows
+from dorothie_gym.session.recording.json_io import (
     ACTIONS_FILE,
     AUDIO_FOLDER,
     EVENTS_FILE,
@@ -28,14 +30,11 @@ from dorothie_gym.session.recording.file_names import (
     MAX_FRAME,
     PICTURES_FOLDER,
     SESSION_FILES,
+    canonical_object,
     safe_name,
 )
-from dorothie_gym.session.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
-from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.recording.json_io import canonical_object
 from dorothie_gym.session.recording.session import SessionFile, picture_name
 from dorothie_gym.session.recording.surroundings import ActorColumns, Rows, actor_rows, light_rows, weather_rows
-from dorothie_gym.session.recording.trajectory import check_rising, checked_rows
 from dorothie_gym.support.files import PART, make_folder, sync, write_atomically
 
 

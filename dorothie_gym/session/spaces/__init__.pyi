@@ -21,9 +21,9 @@ from .fields import AnySpace as AnySpace
 from .fields import Column as Column
 from .fields import FieldKind as FieldKind
 from .fields import FieldSpec as FieldSpec
+from .fields import SpaceLimits as SpaceLimits
 from .fields import dict_space as dict_space
-from .limits import SpaceLimits as SpaceLimits
-from .limits import plain_text as plain_text
+from .fields import plain_text as plain_text
 from .observations import ExitColumn as ExitColumn
 from .observations import GuessColumn as GuessColumn
 from .observations import LandmarkColumn as LandmarkColumn

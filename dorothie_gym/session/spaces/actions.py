@@ -21,14 +21,19 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.session.spaces.action_reader import ActionFieldTable, ActionReader
-from dorothie_gym.session.spaces.fields import FieldSpec, choice, choices, dict_space, flags, text
-from dorothie_gym.session.spaces.limits import (
+from dorothie_gym.session.spaces.fields import (
     LANE_METRES,
     MEANING_LENGTH,
     MESSAGE_LENGTH,
     PERCENT,
     UTTERANCE_LENGTH,
+    FieldSpec,
     SpaceLimits,
+    choice,
+    choices,
+    dict_space,
+    flags,
+    text,
 )
 from dorothie_gym.support.copying import shared
 

@@ -3,19 +3,243 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping, Sequence
+import multiprocessing
+import string
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any, ClassVar, Self, TypeAlias
+from multiprocessing.sharedctypes import SynchronizedArray
+from types import MappingProxyType, ModuleType
+from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector.utils import (
+    batch_differing_spaces,
+    create_shared_memory,
+    read_from_shared_memory,
+    write_to_shared_memory,
+)
 from numpy.typing import DTypeLike, NDArray
 
-from dorothie_gym.session.spaces.limits import TEXT_CHARACTERS, UNBOUNDED
-from dorothie_gym.session.spaces.shared_text import SharedText
-from dorothie_gym.support.copying import CachedViews
+from dorothie_gym.errors import short_repr
+from dorothie_gym.maps.town import Town
+from dorothie_gym.support.copying import CachedViews, shared
+from dorothie_gym.tasks.storyboard import MESSAGE_LENGTH as MESSAGE_LENGTH
+
+
+class SharedText(spaces.Text):
+    """`gymnasium.spaces.Text` with values that `AsyncVectorEnv` sees in shared memory; equal to a `Text` of its values.
+
+    A row of the memory has the length of the text, then the code points of its characters.
+    """
+
+
+class SharedTexts(tuple[str, ...]):
+    """Texts of several environments in shared memory: a tuple of their present values.
+
+    Like the arrays, it changes with the next step if `AsyncVectorEnv` was made with `copy=False`. Copies are
+    plain tuples. The object itself is an empty tuple: code that ignored its methods would fail, not see old texts.
+    """
+
+    _rows: NDArray[np.int32]
+
+    def __new__(cls, rows: NDArray[np.int32]) -> SharedTexts:
+        """Returns a view on the rows of the memory (environments, 1 + greatest length)."""
+        texts = super().__new__(cls)
+        texts._rows = rows
+        return texts
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([_text_of(row) for row in self._rows])
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, place: SupportsIndex | slice) -> Any:
+        return tuple(self)[place]
+
+    def __contains__(self, text: object) -> bool:
+        return text in tuple(self)
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+    def __eq__(self, other: object) -> bool:
+        return tuple(self) == (tuple(other) if isinstance(other, tuple) else other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = None  # type: ignore[assignment]  # its value changes
+
+    def __lt__(self, other: tuple[str, ...]) -> bool:
+        return tuple(self) < tuple(other)
+
+    def __le__(self, other: tuple[str, ...]) -> bool:
+        return tuple(self) <= tuple(other)
+
+    def __gt__(self, other: tuple[str, ...]) -> bool:
+        return tuple(self) > tuple(other)
+
+    def __ge__(self, other: tuple[str, ...]) -> bool:
+        return tuple(self) >= tuple(other)
+
+    def __add__(self, other: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(self) + tuple(other)
+
+    def __radd__(self, other: tuple[Any, ...]) -> tuple[Any, ...]:
+        return other + tuple(self)
+
+    def __mul__(self, times: SupportsIndex) -> tuple[str, ...]:
+        return tuple(self) * times
+
+    __rmul__ = __mul__
+
+    def index(self, text: object, *bounds: SupportsIndex) -> int:
+        """Returns the place of a text, as `tuple.index`."""
+        return tuple(self).index(text, *bounds)
+
+    def count(self, text: object) -> int:
+        """Returns how many environments have a text."""
+        return tuple(self).count(text)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> tuple[str, ...]:
+        return tuple(self)
+
+    def __reduce__(self) -> tuple[type, tuple[list[str]]]:
+        return tuple, ([*self],)
+
+
+def _text_of(row: NDArray[np.int32]) -> str:
+    """Returns the text of a row of the memory."""
+    return "".join(map(chr, row[1 : 1 + row[0]].tolist()))
+
+
+def _rows_of(space: SharedText, memory: SynchronizedArray[int]) -> NDArray[np.int32]:
+    """Returns the memory as rows (environments, 1 + greatest length)."""
+    buffer: Any = memory.get_obj()  # typeshed does not know that ctypes arrays are buffers
+    return np.frombuffer(buffer, dtype=np.int32).reshape(-1, 1 + space.max_length)
+
+
+@create_shared_memory.register(SharedText)
+def _create(space: SharedText, n: int = 1, ctx: ModuleType = multiprocessing) -> SynchronizedArray[int]:
+    memory: SynchronizedArray[int] = ctx.Array(np.dtype(np.int32).char, n * (1 + space.max_length))
+    return memory
+
+
+@read_from_shared_memory.register(SharedText)
+def _read(space: SharedText, shared_memory: SynchronizedArray[int], n: int = 1) -> SharedTexts:
+    return SharedTexts(_rows_of(space, shared_memory))
+
+
+@write_to_shared_memory.register(SharedText)
+def _write(space: SharedText, index: int, value: str, shared_memory: SynchronizedArray[int]) -> None:
+    if len(value) > space.max_length:
+        raise ValueError(
+            f"a text has {len(value)} characters, and its space at most {space.max_length}: {short_repr(value)}"
+        )
+    row = _rows_of(space, shared_memory)[index]
+    row[1 : 1 + len(value)] = [*map(ord, value)]
+    row[0] = len(value)
+
+
+# looked up by the exact type of a space, not by its base classes
+batch_differing_spaces.register(SharedText, batch_differing_spaces.dispatch(spaces.Text))
+
+
+TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
+"""Permitted characters of utterances, messages and stories."""
+
+UTTERANCE_LENGTH = 160
+"""Greatest length of one span of an utterance [characters]."""
+
+MEANING_LENGTH = 640
+"""Greatest length of the propositions of one span, as JSON [characters]."""
+
+STORY_LENGTH = 2400
+"""Greatest length of a story [characters]."""
+
+LANE_METRES = 1024
+"""Number of positions on a lane, in whole metres; no lane of a known town is longer [m]."""
+
+UNBOUNDED = 1e6
+"""Bound of quantities without a natural bound; far beyond all positions [m], speeds [m/s] and times [s]."""
+
+PERCENT = 101
+"""Number of steps of a share in percent, 0 to 100."""
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class SpaceLimits:
+    """Numbers of rows and ids in observation and action spaces.
+
+    The defaults cover the four towns of the paper (at most 486 lanes, 33 junctions, 14 streets; appendix C) and ours:
+    a policy trained in one town can act in another.
+
+    Attributes:
+        lanes: number of lane ids.
+        junctions: number of junction indices.
+        streets: number of street indices.
+        landmarks: rows of `landmarks`.
+        subgoals: rows of `subgoals`.
+        objects: rows of `objects`.
+        exits: rows of `exits`.
+        waypoints: rows of `waypoints`.
+        spans: spans of an utterance.
+        plan: junctions of a plan, and lanes of a path.
+        props: rows of `props`.
+
+    Raises:
+        ValueError: if a size is below 1; names the field.
+    """
+
+    lanes: int = 640
+    junctions: int = 64
+    streets: int = 32
+    landmarks: int = 16
+    subgoals: int = 8
+    objects: int = 16
+    exits: int = 8
+    waypoints: int = 20
+    spans: int = 4
+    plan: int = 12
+    props: int = 16
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if value < 1:
+                raise ValueError(f"SpaceLimits.{name} is {value}; it must be at least 1")
+
+    @classmethod
+    def for_town(cls, town: Town) -> SpaceLimits:
+        """Returns the default sizes, enlarged where the town needs it."""
+        return cls.for_towns((town,))
+
+    @classmethod
+    def for_towns(cls, towns: Iterable[Town]) -> SpaceLimits:
+        """Returns the default sizes, enlarged where one of the towns needs it."""
+        towns = tuple(towns)
+        return cls(
+            lanes=max(cls.lanes, *(len(town.lanes) for town in towns)),
+            junctions=max(cls.junctions, *(len(town.junctions) for town in towns)),
+            streets=max(cls.streets, *(len(town.streets) for town in towns)),
+        )
+
+
+_PLAIN = str.maketrans({"‘": "'", "’": "'", "“": '"', "”": '"', "–": "-", "—": "-", "…": "..."})
+_KNOWN = frozenset(TEXT_CHARACTERS)
+
+
+def plain_text(text: str, length: int) -> str:
+    """Returns text in `TEXT_CHARACTERS`, truncated to `length`; accents are removed, typographic marks replaced."""
+    if text.isascii() and text.isprintable():
+        return text[:length]
+    spelt = unicodedata.normalize("NFKD", text.translate(_PLAIN))
+    return "".join(c for c in spelt if c in _KNOWN)[:length]
+
 
 AnySpace: TypeAlias = spaces.Space[Any]
 """Space whose kind of values is not known statically."""

@@ -9,8 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.session.spaces.fields import AnySpace
-from dorothie_gym.session.spaces.limits import UNBOUNDED
+from dorothie_gym.session.spaces.fields import UNBOUNDED, AnySpace
 from dorothie_gym.session.spaces.observations import Observation
 
 Flat: TypeAlias = NDArray[np.int64]

@@ -21,8 +21,20 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.session.spaces.actions import NO_MOVE
-from dorothie_gym.session.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
-from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, UTTERANCE_LENGTH, SpaceLimits
+from dorothie_gym.session.spaces.fields import (
+    MESSAGE_LENGTH,
+    STORY_LENGTH,
+    UTTERANCE_LENGTH,
+    Column,
+    FieldSpec,
+    SpaceLimits,
+    choice,
+    choices,
+    dict_space,
+    flags,
+    real,
+    text,
+)
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.tasks.storyboard import TaskMessages

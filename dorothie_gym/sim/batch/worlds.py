@@ -17,7 +17,7 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_ro
 from dorothie_gym.sim.step import step_share
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.copying import CachedViews
-from dorothie_gym.support.processors import available_processors
+from dorothie_gym.support.files import available_processors
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.ego.manoeuvres import extend
 from dorothie_gym.sim.ego.path import find_sweeps
-from dorothie_gym.sim.ego.path_builder import find_end, point_before
-from dorothie_gym.sim.network.centre_lines import position_on, project_on
+from dorothie_gym.sim.ego.path_builder import find_end, point_before, position_on, project_on
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, Refusal
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH

@@ -1,4 +1,4 @@
-"""Limits and tunables of the ego car: pedals, speeds, decelerations and the room that manoeuvres take."""
+"""Limits and tunables of the ego car, and the feasibility of its physical actions."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from dorothie_gym.ontology.actions import SPEED_STEP
 from dorothie_gym.support import portable_math as pm
 
 # --- Pedals and steering ----------------------------------------------------------------------------------------------
@@ -139,3 +140,51 @@ LANDING = 6.0
 MANOEUVRE_PROP_GAP = 16.5
 """Least distance of the ego's middle to that of a prop at the end of a lane switch or U-turn, less the way to stop [m]:
 `obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""
+
+
+# --- Feasibility of physical actions ----------------------------------------------------------------------------------
+
+
+class FeasibleManoeuvres(NamedTuple):
+    """Navigation actions that change the path and that the ego would carry out now.
+
+    Attributes:
+        lane_follow: a plan other than the lane's own course can still be given up. (A held ego in the middle of a
+            manoeuvre accepts LaneFollow as Start; this is not listed.)
+        switch_left: lane switch with a positive angle.
+        switch_right: lane switch with a negative angle.
+        u_turn: U-turn.
+        j_turn: a turn at the next junction with a choice, if the path comes to one; refused for the turn that is
+            planned already, see `LocalPlanner.turn_ahead`.
+    """
+
+    lane_follow: bool
+    switch_left: bool
+    switch_right: bool
+    u_turn: bool
+    j_turn: bool
+
+
+def may_change_cruise(cruise: float, up: bool) -> bool:
+    """Returns whether one step more or less leaves the cruise speed [km/h] in its range."""
+    return MIN_CRUISE <= cruise + (SPEED_STEP if up else -SPEED_STEP) <= MAX_CRUISE
+
+
+def is_past_stopping(speed: float, room: float) -> bool:
+    """Returns whether a moving ego cannot stop within some room [m] any more, at a speed [m/s]."""
+    return speed > EGO_MOVING and speed * speed / (2 * HARD_STOP) > room
+
+
+def has_room_to_switch(room: float) -> bool:
+    """Returns whether a lane that is left to its end for so long [m] has room for a lane switch."""
+    return room >= MIN_SWITCH + LEAD
+
+
+def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED * U_TURN_SPEED) -> float:
+    """Returns the distance over which the ego brakes to the speed of a U-turn [m].
+
+    Args:
+        speed: speed of the ego [m/s].
+        squared_speed: square of the speed of a U-turn [m^2/s^2]; the scripted roles count on 12.0.
+    """
+    return max(0.0, speed * speed - squared_speed) / (2 * PLANNED_BRAKING)

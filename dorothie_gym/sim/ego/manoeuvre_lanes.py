@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
 from dorothie_gym.sim.ego.path_builder import follow, keep, switch, u_turn
-from dorothie_gym.sim.network.lane_exits import ANOTHER_WAY
+from dorothie_gym.sim.network.network import ANOTHER_WAY
 from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.support.compilation import compiled
 

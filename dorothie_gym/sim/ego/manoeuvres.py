@@ -6,9 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.lane_neighbours import opposite_gap
-from dorothie_gym.maps.model import LEVEL_HEIGHT
-from dorothie_gym.maps.polyline import HEADING, HEIGHT, WIDTH, X, Y
-from dorothie_gym.sim.ego.feasibility import has_room_to_switch, is_past_stopping, u_turn_braking
+from dorothie_gym.maps.model import HEADING, HEIGHT, LEVEL_HEIGHT, WIDTH, X, Y
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
     HALF_LENGTH,
@@ -20,6 +18,9 @@ from dorothie_gym.sim.ego.limits import (
     SWITCH_TIME,
     U_TURN_REACH,
     U_TURN_SPEED,
+    has_room_to_switch,
+    is_past_stopping,
+    u_turn_braking,
 )
 from dorothie_gym.sim.ego.manoeuvre_lanes import (
     LEAST_PATH,
@@ -32,8 +33,18 @@ from dorothie_gym.sim.ego.manoeuvre_lanes import (
     lay_pieces,
     take_course,
 )
-from dorothie_gym.sim.ego.path_builder import enter, finish, follow, height_at_point, place_of_ego, point_before
-from dorothie_gym.sim.network.centre_lines import position_on, project_on, segment_at, value_on
+from dorothie_gym.sim.ego.path_builder import (
+    enter,
+    finish,
+    follow,
+    height_at_point,
+    place_of_ego,
+    point_before,
+    position_on,
+    project_on,
+    segment_at,
+    value_on,
+)
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.state.codes import (
     J_TURN,

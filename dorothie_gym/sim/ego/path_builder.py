@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.polyline import HEADING, HEIGHT, STATION, X, Y
+from dorothie_gym.maps.model import HEADING, HEIGHT, STATION, Array, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
-from dorothie_gym.sim.ego.path_search import foot_on_segment
-from dorothie_gym.sim.network.centre_lines import interpolated, position_on, project_on, segment_at, value_on
-from dorothie_gym.sim.network.lane_lookup import wrap_radians
+from dorothie_gym.sim.network.lane_lookup import closest_segment, stretch_near, wrap_radians
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
+from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
@@ -22,6 +21,122 @@ from dorothie_gym.support.compilation.records import RecordArray
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+@inlined
+def segment_at(points: Array, lane: LaneRecord, station: float) -> int:
+    """Returns the row of the point of a lane at or before a station [m]."""
+    low, high = int(lane.first), int(lane.last) + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if points[middle, STATION] <= station:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@inlined
+def interpolated(points: Array, lane: LaneRecord, segment: int, column: int, station: float) -> float:
+    """Interpolates a column of a lane's points as `np.interp`; `segment` is the row at or before the station [m]."""
+    start = points[segment, STATION]
+    if segment == lane.last or station <= start:
+        return float(points[segment, column])
+    slope = (points[segment + 1, column] - points[segment, column]) / (points[segment + 1, STATION] - start)
+    return float(slope * (station - start) + points[segment, column])
+
+
+@compiled
+def value_on(points: Array, lane: LaneRecord, column: int, station: float) -> float:
+    """Interpolates a column of a lane's points as `np.interp`, as `Lane.heading_at` and its like."""
+    return interpolated(points, lane, segment_at(points, lane, station), column, station)
+
+
+@compiled
+def position_on(points: Array, lane: LaneRecord, station: float) -> tuple[float, float]:
+    """Returns a point of the centre line [m], straight beyond its ends, as `Lane.position`."""
+    s = min(max(station, 0.0), points[lane.last, STATION])
+    segment, over = segment_at(points, lane, s), station - s
+    x, y = interpolated(points, lane, segment, X, s), interpolated(points, lane, segment, Y, s)
+    if over == 0.0:
+        return x, y
+    heading = interpolated(points, lane, segment, HEADING, s)
+    return x + over * pm.cos(heading), y + over * pm.sin(heading)
+
+
+@compiled
+def project_on(town: TownArrays, number: int, x: float, y: float) -> tuple[float, float]:
+    """Returns station and lateral distance [m] of the closest point of a lane, as `Lane.project`."""
+    points = town.points
+    first, last = stretch_near(town, number, x, y)
+    at, share, _ = closest_segment(points, first, last, x, y)
+    dx, dy = points[at + 1, X] - points[at, X], points[at + 1, Y] - points[at, Y]
+    aside_x, aside_y = x - (points[at, X] + share * dx), y - (points[at, Y] + share * dy)
+    distance = float(pm.hypot(aside_x, aside_y))
+    station = points[at, STATION] + share * (points[at + 1, STATION] - points[at, STATION])
+    return station, distance if dx * aside_y - dy * aside_x >= 0.0 else -distance
+
+
+SEARCH = 6.0
+"""Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""
+
+
+@compiled
+def last_point_before(course: RecordArray[CoursePointRecord], count: int, at: float) -> int:
+    """Returns the number of the point at or before a distance along a path of so many points."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if at < course[middle].s:
+            high = middle
+        else:
+            low = middle + 1
+    return max(low - 1, 0)
+
+
+@inlined
+def foot_on_segment(
+    one: CoursePointRecord, other: CoursePointRecord, x: float, y: float, is_first: bool, is_last: bool
+) -> float:
+    """Returns where a segment of a path is closest to a position [m], from 0 to 1 between its points.
+
+    Before the first and after the last point the path continues straight: there it is less than 0, or more than 1.
+    """
+    dx, dy = other.x - one.x, other.y - one.y
+    t = ((x - one.x) * dx + (y - one.y) * dy) / (dx * dx + dy * dy)
+    if (t < 0.0 and not is_first) or (t > 1.0 and not is_last):
+        t = 0.0 if t < 0.0 else 1.0
+    return t
+
+
+@compiled
+def progress_on_path(
+    course: RecordArray[CoursePointRecord], count: int, x: float, y: float, near: float, window: float
+) -> float:
+    """Returns the distance along a path [m] of its point closest to a position, searched around a known distance.
+
+    The path is extended straight before its first and after its last point.
+
+    Args:
+        course: points of the path.
+        count: number of points.
+        x: position [m].
+        y: position [m].
+        near: centre of the search along the path [m].
+        window: half width of the search [m].
+    """
+    end = count - 1
+    best, answer = math.inf, near
+    first, last = last_point_before(course, count, near - window), last_point_before(course, count, near + window)
+    for k in range(first, min(last + 1, end)):
+        one, other = course[k], course[k + 1]
+        t = foot_on_segment(one, other, x, y, k == 0, k == end - 1)
+        ox, oy = x - one.x - t * (other.x - one.x), y - one.y - t * (other.y - one.y)
+        distance = ox * ox + oy * oy
+        if distance < best:
+            best, answer = distance, one.s + t * (other.s - one.s)
+    return answer
+
 
 PATH_SPACING = 1.0
 """Distance between points of a path [m]."""

@@ -11,8 +11,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
-from dorothie_gym.maps.polyline import WIDTH, IntArray, LaneTable, local_coordinates, value_at
+from dorothie_gym.maps.model import LEVEL_HEIGHT, WIDTH, Array, IntArray, LaneTable, local_coordinates, value_at
 from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 from dorothie_gym.support.compilation import allocating
 

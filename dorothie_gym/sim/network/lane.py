@@ -11,9 +11,8 @@ from highway_env.road.lane import AbstractLane, LineType
 from highway_env.utils import get_class_path
 from numpy.typing import NDArray
 
-from dorothie_gym.maps import polyline
-from dorothie_gym.maps.model import Array, Lane
-from dorothie_gym.maps.polyline import LaneTable
+from dorothie_gym.maps import model
+from dorothie_gym.maps.model import Array, Lane, LaneTable
 from dorothie_gym.support.copying import shared
 
 
@@ -97,10 +96,10 @@ class PolylineLane(AbstractLane):
         self._points, self._offsets, self._ends = table.points, table.offsets, table.ends
         shape = self._points, self._offsets, self._ends, row
         # Bound once: highway-env calls these for every lane and stripe that it draws.
-        self._local = functools.partial(polyline.local_coordinates, *shape)
-        self._place = functools.partial(polyline.position, *shape)
-        self._value = functools.partial(polyline.value_at, self._points, self._offsets, row)
-        self._distance = functools.partial(polyline.distance, *shape)
+        self._local = functools.partial(model.local_coordinates, *shape)
+        self._place = functools.partial(model.position, *shape)
+        self._value = functools.partial(model.value_at, self._points, self._offsets, row)
+        self._distance = functools.partial(model.distance, *shape)
 
     def position(self, longitudinal: float, lateral: float = 0.0) -> Array:
         """Returns the world position (2,) [m] at a station and a distance to the right."""
@@ -108,15 +107,15 @@ class PolylineLane(AbstractLane):
 
     def heading_at(self, longitudinal: float) -> float:
         """Returns the direction of the lane [rad], beyond its ends that of the end."""
-        return float(self._value(polyline.HEADING, float(longitudinal)))
+        return float(self._value(model.HEADING, float(longitudinal)))
 
     def width_at(self, longitudinal: float) -> float:
         """Returns the width of the lane [m]."""
-        return float(self._value(polyline.WIDTH, float(longitudinal)))
+        return float(self._value(model.WIDTH, float(longitudinal)))
 
     def height_at(self, longitudinal: float) -> float:
         """Returns the height of the lane [m]."""
-        return float(self._value(polyline.HEIGHT, float(longitudinal)))
+        return float(self._value(model.HEIGHT, float(longitudinal)))
 
     def local_coordinates(self, position: Array) -> tuple[float, float]:
         """Returns the station and signed distance to the right [m] of a world position (2,)."""
@@ -137,12 +136,12 @@ class PolylineLane(AbstractLane):
     def positions(self, stations: Array, lateral: float = 0.0) -> Array:
         """Returns the world positions (n, 2) [m] at many stations (n,), equal to those of `position`."""
         wanted = np.ascontiguousarray(stations, dtype=np.float64)
-        return polyline.positions(self._points, self._offsets, self._ends, self.row, wanted, float(lateral))
+        return model.positions(self._points, self._offsets, self._ends, self.row, wanted, float(lateral))
 
     def local_coordinates_many(self, points: NDArray[np.float64]) -> Array:
         """Stations and lateral distances (n, 2) [m] of world positions (n, 2), as `local_coordinates` gives them."""
         places = np.ascontiguousarray(points, dtype=np.float64)
-        return polyline.local_coordinates_many(self._points, self._offsets, self._ends, self.row, places)
+        return model.local_coordinates_many(self._points, self._offsets, self._ends, self.row, places)
 
     @classmethod
     def from_config(cls, config: PolylineLaneConfig) -> PolylineLane:

@@ -6,19 +6,24 @@ import itertools
 from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from highway_env.road.lane import LineType
 from highway_env.road.road import RoadNetwork
+from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Lane, LinkType
-from dorothie_gym.maps.polyline import HEIGHT, LaneTable
+from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.maps.model import HEIGHT, Array, Exit, Lane, LaneTable, LinkType
 from dorothie_gym.maps.town import Town, check_extent
-from dorothie_gym.sim.network.grid import GridIndex
 from dorothie_gym.sim.network.lane import PolylineLane
+from dorothie_gym.sim.network.lane_lookup import GridIndex
+from dorothie_gym.sim.state.codes import NOBODY
+from dorothie_gym.sim.state.town_records import ExitRecord, LaneExitsRecord, LaneRecord
 from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.records import RecordArray, empty_records
 from dorothie_gym.support.copying import shared
+from dorothie_gym.support.portable_math import wrap_degrees
 
 LEVEL_ENDS = 3.0
 """Lanes side by side end together when their ends are no farther apart than this along the road [m]."""
@@ -331,3 +336,71 @@ def _line_types(town: Town, lane: Lane) -> list[int]:
 def network_of(town: Town) -> TownNetwork:
     """Returns the network of a town; built once for each town."""
     return TownNetwork(town)
+
+
+# --- Ways on from each lane -------------------------------------------------------------------------------------------
+
+ANOTHER_WAY = 15.0
+"""Difference of angle from which on exits are different turns [degrees]."""
+
+SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+
+
+class LaneExits(NamedTuple):
+    """The tables.
+
+    Attributes:
+        ways: ways on from each lane, by the lanes' ids.
+        exits: exits, those of a lane in the order of `Town.exits`.
+        lists: int32 lanes beside each lane, and lanes that may be oncoming.
+    """
+
+    ways: RecordArray[LaneExitsRecord]
+    exits: RecordArray[ExitRecord]
+    lists: NDArray[np.int32]
+
+
+def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
+    """Builds the tables of a town; `lanes` are its lanes with their junctions."""
+    ways = empty_records(LaneExitsRecord, len(town.lanes))
+    exits: list[tuple[int, int, int, int]] = []
+    lists: list[int] = []
+    oncoming = oncoming_lanes(town)
+    for lane in town.lanes:
+        record, found = ways[lane.id], town.exits(lane.id)
+        record.exit, record.exits = len(exits), len(found)
+        exits += [(way.connector, way.lane, way.angle, lanes[way.connector].junction) for way in found]
+        record.chooses = _is_choice(found)
+        record.onward = NOBODY
+        if found and not record.chooses:
+            record.onward = min(found, key=lambda way: (abs(way.angle), way.connector)).connector
+        beside, candidates = side_by_side(town, lane.id), oncoming.candidates(lane.id).tolist()
+        record.offers = record.chooses or (bool(found) and ways_part(town, beside))
+        record.beside, record.besides = len(lists), len(beside)
+        record.oncoming, record.oncomings = len(lists) + len(beside), len(candidates)
+        lists += beside + candidates
+    table = empty_records(ExitRecord, len(exits))
+    for name, column in zip(("connector", "lane", "angle", "junction"), zip(*exits, strict=True), strict=False):
+        table[name] = column
+    return LaneExits(ways, table, np.array(lists, dtype=np.int32))
+
+
+def side_by_side(town: Town, lane: int) -> list[int]:
+    """Returns a lane and all that are reached from it by lane changes."""
+    found = [lane]
+    for known in found:
+        for side in SIDES:
+            beside = town.neighbour(known, side)
+            if beside is not None and beside not in found:
+                found.append(beside)
+    return found
+
+
+def _is_choice(exits: tuple[Exit, ...]) -> bool:
+    return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
+
+
+def ways_part(town: Town, beside: list[int]) -> bool:
+    """Returns whether the exits of lanes that lie side by side lead different ways."""
+    turns = [way.angle for lane in beside for way in town.exits(lane) if way.junction_id >= 0]
+    return max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0) > ANOTHER_WAY

@@ -23,9 +23,15 @@ from dorothie_gym.sim.sensing.visibility import (
     sight_in,
     signal,
 )
-from dorothie_gym.sim.state.body_records import PedestrianRecord, PlacedBody, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, Group, Kind, Walk
-from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
+from dorothie_gym.sim.state.ego_records import (
+    EyeRecord,
+    PedestrianRecord,
+    PlacedBody,
+    PropRecord,
+    SeenRecord,
+    VehicleRecord,
+)
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray

@@ -10,14 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
-from dorothie_gym.maps.polyline import WIDTH, LaneTable
+from dorothie_gym.maps.model import WIDTH, Array, Lane, LaneTable, LinkType, SignalKind
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
 from dorothie_gym.maps.town import Town
-from dorothie_gym.sim.network.grid import CELL_REACH, SLACK
-from dorothie_gym.sim.network.lane_exits import build_exits
-from dorothie_gym.sim.network.lane_lookup import build_cells
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.network.lane_lookup import CELL_REACH, SLACK, build_cells
+from dorothie_gym.sim.network.network import TownNetwork, build_exits
 from dorothie_gym.sim.pedestrians.walkways import build_walkways
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Relation, TrafficControl
 from dorothie_gym.sim.state.town_records import (
@@ -35,8 +32,7 @@ from dorothie_gym.sim.state.town_records import (
 )
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.compilation.by_reference import by_reference
-from dorothie_gym.support.compilation.records import RecordArray, empty_records, filled_records
+from dorothie_gym.support.compilation.records import RecordArray, by_reference, empty_records, filled_records
 from dorothie_gym.support.copying import shared
 
 PASSING_WIDTH = 2.5

@@ -10,40 +10,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.state.body_records import (
-    ClockRecord,
-    LampRecord,
-    NodeRecord,
-    PedestrianRecord,
-    PropRecord,
-    VehicleRecord,
-)
 from dorothie_gym.sim.state.codes import NOBODY, U_TURN
 from dorothie_gym.sim.state.ego_records import (
     POSE,
     TRACE,
+    BreachRecord,
+    ClockRecord,
     CoursePointRecord,
     EgoRecord,
     EventRecord,
-    GoalRecord,
-    LaneStepRecord,
-    PlanRecord,
-    SweepRecord,
-)
-from dorothie_gym.sim.state.sensing_records import (
-    BreachRecord,
     EyeRecord,
+    GoalRecord,
+    LampRecord,
+    LaneStepRecord,
     LineMarkRecord,
     LocalizerRecord,
+    NodeRecord,
+    PedestrianRecord,
+    PlanRecord,
+    PropRecord,
     SeenRecord,
+    SweepRecord,
+    VehicleRecord,
     WatchRecord,
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, GOALS, MAX_SUBSTEPS, POINTS, STEPS
 from dorothie_gym.support.compilation import compiled, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference, gives_row
-from dorothie_gym.support.compilation.records import Record, RecordArray, empty_records, plain, record_dtype
+from dorothie_gym.support.compilation.records import (
+    Record,
+    RecordArray,
+    by_reference,
+    empty_records,
+    gives_row,
+    plain,
+    record_dtype,
+)
 
 PROPS = 16
 """Most props in a world."""

@@ -9,9 +9,9 @@ from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.ego.limits import U_TURN_SAMPLES
 from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
-from dorothie_gym.sim.pedestrians.jaywalking import give_way_to_strayers
-from dorothie_gym.sim.state.body_records import VehicleRecord
+from dorothie_gym.sim.pedestrians.walking import give_way_to_strayers
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Wait, Walk
+from dorothie_gym.sim.state.ego_records import VehicleRecord
 from dorothie_gym.sim.state.town_records import LaneRecord, PassageRecord
 from dorothie_gym.sim.traffic.junctions import announce, forget, note, request
 from dorothie_gym.sim.traffic.lane_index import around, next_on_lane
@@ -27,10 +27,11 @@ from dorothie_gym.sim.traffic.parameters import (
     LINE_GAP,
     STOP_BRAKING,
 )
-from dorothie_gym.sim.traffic.route import extend, follow_road
 from dorothie_gym.sim.traffic.vehicle_models import (
     brake_to,
     change_lanes,
+    extend,
+    follow_road,
     following_acceleration,
     free_acceleration,
     slip_towards_lane,

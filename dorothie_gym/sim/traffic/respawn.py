@@ -10,8 +10,8 @@ from dorothie_gym.sim.network.lane_lookup import value_near
 from dorothie_gym.sim.pedestrians.footways import place_beside
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import choose, draw
-from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
+from dorothie_gym.sim.state.ego_records import VehicleRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import (
     CAR_LENGTH,
@@ -27,7 +27,7 @@ from dorothie_gym.sim.traffic.parameters import (
     TOW_STUCK,
     TRAFFIC_STANDING,
 )
-from dorothie_gym.sim.traffic.route import keep_side, take
+from dorothie_gym.sim.traffic.vehicle_models import keep_side, take
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 

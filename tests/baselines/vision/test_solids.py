@@ -17,7 +17,7 @@ from dorothie_gym.baselines.vision.solids import (
     spaces_of,
 )
 from dorothie_gym.pictures.camera.pose import CameraPose, view_from
-from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import CameraConfig
 
 CONFIG = CameraConfig(width=320, height=192)
 FOCALS = Focals.of(CONFIG)

@@ -9,8 +9,7 @@ from PIL import Image
 
 from dorothie_gym.lab.console.config import ConsoleConfig
 from dorothie_gym.lab.console.windscreen import Windscreen
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from tests.lab.console.people import Table
 

@@ -31,7 +31,7 @@ from dorothie_gym.pictures.camera.models.vehicles import Lamps
 from dorothie_gym.pictures.camera.pose import CameraPose, view_from
 from dorothie_gym.pictures.camera.sky import sky_noise
 from dorothie_gym.pictures.maps.shapes import disc
-from dorothie_gym.session.camera_config import CameraConfig, CameraMount, CameraOutput
+from dorothie_gym.session.config import CameraConfig, CameraMount, CameraOutput
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.compilation.records import RecordArray, empty_records
 

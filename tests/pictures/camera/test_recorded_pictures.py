@@ -20,8 +20,7 @@ from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.pose import pose_on_car
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.recording import EventType, Session, Surroundings
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping

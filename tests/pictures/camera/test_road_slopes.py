@@ -15,8 +15,7 @@ from dorothie_gym.pictures.camera.road_slopes import rise_at, road_slopes
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.support.compilation.records import plain

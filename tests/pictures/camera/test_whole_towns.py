@@ -36,8 +36,7 @@ from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.pictures.maps.levels import stretches
 from dorothie_gym.pictures.maps.shapes import TownSamples
-from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather

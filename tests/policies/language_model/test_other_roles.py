@@ -11,8 +11,7 @@ from PIL import Image
 
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import LanguageModelConfig, SimulatedTime
-from dorothie_gym.session.camera_config import CameraConfig
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig
 from dorothie_gym.session.recording import Event, EventType
 from dorothie_gym.session.session_engine import SessionEngine
 from tests.policies.language_model.fake_server import serving

@@ -4,7 +4,7 @@ import pytest
 
 from dorothie_gym.maps import load_town
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, nearest_sector
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 TOWNS = ("brookside", "millbrook", "midtown", "northgate")
 

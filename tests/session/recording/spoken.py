@@ -6,8 +6,7 @@ from pathlib import Path
 
 from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.policies import ALL_SCRIPTED
-from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 

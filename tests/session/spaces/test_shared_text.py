@@ -13,8 +13,7 @@ import pytest
 from gymnasium import spaces
 from gymnasium.vector.utils import batch_space, create_shared_memory, read_from_shared_memory, write_to_shared_memory
 
-from dorothie_gym.session.spaces.fields import text
-from dorothie_gym.session.spaces.shared_text import SharedText
+from dorothie_gym.session.spaces.fields import SharedText, text
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import pytest
 from highway_env.road.road import RoadNetwork
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.polyline import distance, value_at
-from dorothie_gym.sim.network.grid import GRID_CELL, SAME_LEVEL
+from dorothie_gym.maps.model import distance, value_at
+from dorothie_gym.sim.network.lane_lookup import GRID_CELL, SAME_LEVEL
 from dorothie_gym.sim.network.network import TownNetwork
 
 from .towns import EVERY_TOWN, find_town

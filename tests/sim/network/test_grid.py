@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from highway_env.road.road import RoadNetwork
 
-from dorothie_gym.sim.network.grid import SAME_LEVEL
+from dorothie_gym.sim.network.lane_lookup import SAME_LEVEL
 from dorothie_gym.sim.network.network import TownNetwork
 
 from .towns import EVERY_TOWN, find_town, lane, overpass_town, places, straight_town, town

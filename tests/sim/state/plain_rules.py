@@ -9,15 +9,14 @@ import numpy as np
 
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Signal, SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.town_arrays import OFF_ROAD_MARGIN
 from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
-from dorothie_gym.sim.traffic_rules import AGAINST, BREACH_PAUSE, FORGET, NEARBY
+from dorothie_gym.sim.traffic_rules import AGAINST, BREACH_PAUSE, FORGET, NEARBY, WorldEvent, WorldEventKind
 
 LENGTH = 5.0
 NOT_YET = -(10**9)

@@ -15,7 +15,7 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.route import take
+from dorothie_gym.sim.traffic.vehicle_models import take
 
 DT = 1.0 / 30.0
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, MAX_SUBSTEPS
-from dorothie_gym.sim.traffic_rules import watch
+from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventLog, watch
 
 
 class TrajectoryWatch(WorldEventLog):

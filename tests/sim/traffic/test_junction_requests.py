@@ -9,7 +9,7 @@ import pytest
 
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
-from dorothie_gym.maps.traffic_lights import LightPhase
+from dorothie_gym.maps.town import LightPhase
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.codes import Kind, Wait
 from dorothie_gym.sim.traffic.junctions import announce, close, note, request

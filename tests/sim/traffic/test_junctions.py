@@ -8,7 +8,7 @@ import pytest
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
-from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
+from dorothie_gym.maps.town import LightColour, LightPhase
 from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate

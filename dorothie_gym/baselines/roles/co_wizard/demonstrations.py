@@ -37,7 +37,7 @@ from dorothie_gym.policies.speech import Remark
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CO_WIZARD: Final = Role.CO_WIZARD

@@ -35,7 +35,7 @@ from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TEMPERATURE: Final = 0.7

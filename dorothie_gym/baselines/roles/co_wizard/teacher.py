@@ -33,7 +33,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CALM = CoWizardStyle(

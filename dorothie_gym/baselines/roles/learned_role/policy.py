@@ -13,7 +13,7 @@ from torch import nn
 from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 
 State = TypeVar("State")
 Network = TypeVar("Network", bound=nn.Module)

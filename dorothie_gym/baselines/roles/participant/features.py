@@ -21,7 +21,7 @@ from dorothie_gym.baselines.roles.participant.records import next_step
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import router
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour
 from dorothie_gym.maps.whereabouts import is_on_right
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName

@@ -38,7 +38,7 @@ from dorothie_gym.policies.participant.reactions import scene_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction, Speech
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TEMPERATURE: Final = 0.5

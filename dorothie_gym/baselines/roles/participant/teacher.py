@@ -17,7 +17,7 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 

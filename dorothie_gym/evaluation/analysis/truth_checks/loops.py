@@ -17,7 +17,7 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
 from dorothie_gym.session.recording.events import MoveRecord
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 SAME_ORDERS: Final = 3
 """Number of equal orders that make a loop."""

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.routing import Place, router
-from dorothie_gym.maps.town import Town
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -26,7 +25,7 @@ from dorothie_gym.session.recording.surroundings import ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import CLARITY, FAULT_SECONDS
-from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.portable_math import wrap_degrees
 
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})

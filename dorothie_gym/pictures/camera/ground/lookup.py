@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.support.compilation import compiled, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 GROUND_SHEET = 0
