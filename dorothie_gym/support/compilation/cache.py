@@ -34,7 +34,7 @@ from dorothie_gym.support.user_cache import cache_folder, discard, is_private, m
 
 PACKAGE: Final = "dorothie_gym"
 
-COMPILER: Final = ("__init__.py", "by_reference.py", "dispatcher.py", "shortcuts.py")
+COMPILER: Final = ("__init__.py", "dispatcher.py", "numba_classes.py", "records.py")
 """Files of this package that decide about machine code."""
 
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
