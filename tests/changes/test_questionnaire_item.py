@@ -88,7 +88,7 @@ def field_error(copy: WorkingCopy) -> str:
     """Returns the message of the page's form for an item of the new kind."""
     static = copy.folder / "static"
     shutil.copytree(copy.folder / "dorothie_gym/lab/studies/static", static, dirs_exist_ok=True)
-    shutil.copytree(copy.folder / "dorothie_gym/lab/console/static", static, dirs_exist_ok=True)
+    shutil.copytree(copy.folder / "dorothie_gym/lab/static", static, dirs_exist_ok=True)
     forms = static / "forms.js"
     forms.write_text(forms.read_text(encoding="utf-8").replace("'/static/", "'./"), encoding="utf-8")
     (static / "package.json").write_text('{"type": "module"}', encoding="utf-8")
