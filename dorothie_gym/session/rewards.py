@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.input_files import settings_of
 
@@ -189,7 +188,6 @@ def weights_of(reward: str | NavigationWeights | Mapping[str, object]) -> Naviga
     return NAVIGATION_WEIGHTS[reward]
 
 
-@compiled
 def write_navigation_terms(
     terms: NDArray[np.float64],
     weights: NDArray[np.float64],
@@ -204,6 +202,8 @@ def write_navigation_terms(
     refusals: int,
 ) -> float:
     """Writes the terms of one decision in the order of `NAVIGATION_TERMS`, and returns their sum.
+
+    `envs.navigation.episode` compiles it. This module imports no compiler, so that settings are read without one.
 
     Args:
         terms: receives the terms, shape (9,).

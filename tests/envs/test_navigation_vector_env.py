@@ -293,7 +293,7 @@ def test_session_that_is_looked_up_late_is_the_one_that_was_played() -> None:
         late = alone.batches[0].catch_up(number)
         assert (late.world.time, late.beliefs.goals) == (session.world.time, session.beliefs.goals)
         assert late.world.ego.goals == session.world.ego.goals
-        assert late.infractions == session.infractions
+        assert late.log.infractions == session.log.infractions
         np.testing.assert_array_equal(late.world.localizer.pose, session.world.localizer.pose)
         np.testing.assert_array_equal(late.world.seen(), session.world.seen())
     assert any(session.beliefs.goals for session in sessions)

@@ -92,10 +92,10 @@ def test_the_message_is_the_real_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("heading", "keys"),
     [
-        ("Of the town", schema.TOWN_KEYS),
-        ("Of a junction", schema.JUNCTION_KEYS),
-        ("Of a street", streets.STREET_KEYS),
-        ("Of lights and their phases", signs.LIGHTS_KEYS + signs.PHASE_KEYS),
+        ("Keys of the town", schema.TOWN_KEYS),
+        ("Keys of a junction", schema.JUNCTION_KEYS),
+        ("Keys of a street", streets.STREET_KEYS),
+        ("Keys of lights and phases", signs.LIGHTS_KEYS + signs.PHASE_KEYS),
     ],
 )
 def test_the_tables_list_every_key(heading: str, keys: tuple[str, ...]) -> None:
@@ -108,20 +108,20 @@ DEFAULTS = streets.StreetDefaults()
 @pytest.mark.parametrize(
     ("heading", "key", "limits", "default"),
     [
-        ("Of the town", "speed", streets.SPEED_RANGE, f"{DEFAULTS.speed:g}"),
-        ("Of the town", "width", streets.WIDTH_RANGE, f"{DEFAULTS.width:g}"),
-        ("Of the town", "sidewalk", streets.SIDEWALK_RANGE, f"{DEFAULTS.sidewalk:g}"),
-        ("Of a junction", "roundabout", schema.ROUNDABOUT_RADIUS, "a plain junction"),
-        ("Of a junction", "lanes", schema.ROUNDABOUT_LANES, "1"),
-        ("Of a junction", "speed", streets.SPEED_RANGE, f"{schema.ROUNDABOUT_SPEED:g}, or the town's"),
-        ("Of a street", "lanes", streets.LANES_RANGE, "1"),
-        ("Of a street", "median", streets.MEDIAN_RANGE, "0"),
-        ("Of a street", "speed", streets.SPEED_RANGE, "the town's"),
-        ("Of a street", "width", streets.WIDTH_RANGE, "the town's"),
-        ("Of a street", "sidewalk", streets.SIDEWALK_RANGE, "the town's"),
-        ("Of a street", "radius", streets.RADIUS_RANGE, "the largest"),
-        ("Of lights and their phases", "offset", signs.OFFSET, "0"),
-        ("Of lights and their phases", "seconds", signs.SECONDS, "required"),
+        ("Keys of the town", "speed", streets.SPEED_RANGE, f"{DEFAULTS.speed:g}"),
+        ("Keys of the town", "width", streets.WIDTH_RANGE, f"{DEFAULTS.width:g}"),
+        ("Keys of the town", "sidewalk", streets.SIDEWALK_RANGE, f"{DEFAULTS.sidewalk:g}"),
+        ("Keys of a junction", "roundabout", schema.ROUNDABOUT_RADIUS, "a plain junction"),
+        ("Keys of a junction", "lanes", schema.ROUNDABOUT_LANES, "1"),
+        ("Keys of a junction", "speed", streets.SPEED_RANGE, f"{schema.ROUNDABOUT_SPEED:g}, or the town's"),
+        ("Keys of a street", "lanes", streets.LANES_RANGE, "1"),
+        ("Keys of a street", "median", streets.MEDIAN_RANGE, "0"),
+        ("Keys of a street", "speed", streets.SPEED_RANGE, "the town's"),
+        ("Keys of a street", "width", streets.WIDTH_RANGE, "the town's"),
+        ("Keys of a street", "sidewalk", streets.SIDEWALK_RANGE, "the town's"),
+        ("Keys of a street", "radius", streets.RADIUS_RANGE, "the largest"),
+        ("Keys of lights and phases", "offset", signs.OFFSET, "0"),
+        ("Keys of lights and phases", "seconds", signs.SECONDS, "required"),
     ],
 )
 def test_the_tables_list_ranges_and_defaults(heading: str, key: str, limits: tuple[float, float], default: str) -> None:

@@ -103,6 +103,9 @@ def episode_arrays(config: NavigationConfig) -> EpisodeArrays:
     return arrays
 
 
+_write_terms = compiled(write_navigation_terms)
+
+
 @compiled
 def judge(world: WorldArrays, episode: EpisodeArrays) -> None:
     """Ends an episode where it is over, and writes the reward of the last decision and its terms.
@@ -127,7 +130,7 @@ def judge(world: WorldArrays, episode: EpisodeArrays) -> None:
     for kind in range(len(world.watch[0].counts)):
         broken += world.watch[0].counts[kind] if kind != COLLISION else 0
     failed = state.ending == _LEFT_ROAD or state.ending == _GAVE_UP
-    state.reward = write_navigation_terms(
+    state.reward = _write_terms(
         state.terms,
         settings.weights,
         state.progress,
