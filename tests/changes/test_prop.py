@@ -33,8 +33,8 @@ EDITS = (
         "def _sign(model",
         "def _bench(model: ModelBuilder, kind: PropKind) -> None:\n"
         "    half, side = kind.length / 2.0, kind.width / 2.0\n"
-        "    model.box((-half, -side, 0.4), (half, side, 0.46), Slot.TROUSERS)\n"
-        "    model.box((half - 0.08, -side, 0.46), (half, side, kind.height), Slot.TROUSERS)\n\n\n"
+        "    model.box((-half, -side, 0.4), (half, side, 0.46), Part.TROUSERS)\n"
+        "    model.box((half - 0.08, -side, 0.46), (half, side, kind.height), Part.TROUSERS)\n\n\n"
         "def _sign(model",
         r"NameError: name '_bench'",
     ),
