@@ -23,18 +23,18 @@ EDITS = (
         r"dorothie_gym/dialogue/data/talk: there is no section `== Explain topic=much_dust_storm`",
     ),
     Edit(
-        "dorothie_gym/policies/ad_wizard.py",
-        "        WeatherParameter.WETNESS: (1.0, (0.5, 1.0)),\n",
-        "        WeatherParameter.WETNESS: (1.0, (0.5, 1.0)),\n"
-        "        WeatherParameter.DUST_STORM: (1.0, (0.5, 1.0)),\n",
-        r"WEATHERS of dorothie_gym/policies/ad_wizard\.py .* WeatherParameter\.DUST_STORM",
-    ),
-    Edit(
         "dorothie_gym/policies/notable_conditions.py",
         "        W.WETNESS: lambda now: now[W.WETNESS] / 45.0,\n",
         "        W.WETNESS: lambda now: now[W.WETNESS] / 45.0,\n"
         "        W.DUST_STORM: lambda now: now[W.DUST_STORM] / 40.0,\n",
         r"CONSPICUOUS of dorothie_gym/policies/notable_conditions\.py .* WeatherParameter\.DUST_STORM",
+    ),
+    Edit(
+        "dorothie_gym/policies/ad_wizard.py",
+        "        WeatherParameter.WETNESS: (1.0, (0.5, 1.0)),\n",
+        "        WeatherParameter.WETNESS: (1.0, (0.5, 1.0)),\n"
+        "        WeatherParameter.DUST_STORM: (1.0, (0.5, 1.0)),\n",
+        r"WEATHERS of dorothie_gym/policies/ad_wizard\.py .* WeatherParameter\.DUST_STORM",
     ),
     Edit(
         "dorothie_gym/sim/weather.py",
