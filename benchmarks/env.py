@@ -16,7 +16,7 @@ from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces import noop
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from benchmarks.highway_reference import StockIntersection

@@ -1,8 +1,8 @@
 """Compares the two models of perception: the objects that they show, and the outcomes of scripted sessions.
 
 Sessions with the symbolic model are looked at every four seconds: for each object that it shows, whether the picture
-    also shows it, and otherwise why not. A reason is found by drawing again: the body alone, and all bodies without the
-    town.
+also shows it, and otherwise why not. A reason is found by drawing again: the body alone, and all bodies without the
+town.
 """
 
 import json

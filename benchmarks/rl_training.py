@@ -15,7 +15,7 @@ from dorothie_gym.baselines.rl.checkpoint import make_model
 from dorothie_gym.baselines.rl.environments import has_batch, make_training_env
 from dorothie_gym.baselines.rl.settings import CAMERA, NAVIGATION, ON_POLICY, TrainingSettings, tuned_settings
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 ALONE = (
     "batch_steps_per_second",

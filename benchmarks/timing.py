@@ -23,8 +23,8 @@ from types import TracebackType
 from typing import Any, Final, NoReturn, Self, TypeAlias
 
 from dorothie_gym.errors import ProcessError
-from dorothie_gym.support.files import available_processors
 from dorothie_gym.support.interruption import starting_process
+from dorothie_gym.support.processors import available_processors
 
 Progress: TypeAlias = Callable[[str, float], None]
 """Callback with the name of the present part of a measurement, and the share of the whole that is done, in [0, 1]."""

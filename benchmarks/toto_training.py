@@ -21,7 +21,7 @@ from dorothie_gym.baselines.model_io import TASKS, Examples, Labels
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.evaluation.teacher_forced.features import Columns, build, points
 from dorothie_gym.session.recording import Session
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 _POINTS: Final = 512
 """Points of the corpus that are looked at."""

@@ -45,12 +45,11 @@ from dorothie_gym.pictures.views.playback import Playback
 from dorothie_gym.pictures.views.session_views import SessionRenderer
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction
-from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, RenderView
 from dorothie_gym.session.recording import Session
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.support.render_view import RenderView
 
 sys.path.append(str(Path(__file__).parents[1]))  # the benchmarks are a folder of the checkout and not installed
 from benchmarks.report import Report, draw, world_report

@@ -30,7 +30,7 @@ from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, tow
 from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
-from dorothie_gym.session.providers import CabinState, signal_to_noise
+from dorothie_gym.session.dialogue_channel import CabinState, signal_to_noise
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.tasks import bind, load_template, template_names

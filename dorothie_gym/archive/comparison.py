@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dorothie_gym.archive.corpus import layout_of, read_session
 from dorothie_gym.errors import MAX_SHOWN, SessionError
 from dorothie_gym.session.recording.events import encode_event
-from dorothie_gym.session.recording.json_io import canonical, from_line
+from dorothie_gym.session.recording.files import canonical, from_line
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import SceneTable
 

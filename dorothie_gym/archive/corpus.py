@@ -19,8 +19,7 @@ from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.ontology.spellings import parse_exception
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import Event, EventType, decode_event
-from dorothie_gym.session.recording.header import parse_version
-from dorothie_gym.session.recording.json_io import (
+from dorothie_gym.session.recording.files import (
     EVENTS_FILE,
     HEADER_FILE,
     decode_text,
@@ -28,6 +27,7 @@ from dorothie_gym.session.recording.json_io import (
     read_object,
     to_page,
 )
+from dorothie_gym.session.recording.header import parse_version
 from dorothie_gym.session.recording.session import Session, read_session_file
 from dorothie_gym.support.files import write_atomically
 

@@ -16,8 +16,9 @@ from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, U_TURN_ANGLE, Argu
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import ActionRecord, Event, EventType, MoveRecord, UtteranceRecord
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH, LandmarkRow
+from dorothie_gym.session.recording.header import LandmarkRow
 from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.portable_math import wrap_degrees

@@ -25,7 +25,7 @@ from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import build
 from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable, points
 from dorothie_gym.evaluation.teacher_forced.features.sight import Sight, VisibleBoxes
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.support.user_cache import cache_folder
 
 if TYPE_CHECKING:

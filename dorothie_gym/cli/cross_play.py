@@ -37,7 +37,8 @@ from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session import recording
-from dorothie_gym.support.files import available_processors, write_atomically
+from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.policy_loader import Player

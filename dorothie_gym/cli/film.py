@@ -20,12 +20,12 @@ from dorothie_gym.pictures.camera.session_pictures import windscreen_camera
 from dorothie_gym.pictures.views.scene import Actor, Scene, SpokenLine
 from dorothie_gym.pictures.views.session_scene import scene_of
 from dorothie_gym.pictures.views.session_views import SessionRenderer
+from dorothie_gym.session.config import RenderView
 from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.audio import SAMPLE_RATE, encode_wav
 from dorothie_gym.support.portable_math import wrap_radians
-from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.body_snapshots import BodySnapshot

@@ -25,7 +25,7 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import rollout as rollouts
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 
 def frames(

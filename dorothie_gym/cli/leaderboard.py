@@ -27,7 +27,7 @@ from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError, RolloutError
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 PAGE = Path("leaderboard.md")
 """Default page of the leaderboard, in the present folder."""

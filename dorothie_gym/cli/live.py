@@ -20,7 +20,7 @@ from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.pictures.views.exception_words import exception_words
 from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.recording.events import Event, EventType, move_record
-from dorothie_gym.session.recording.json_io import Fields
+from dorothie_gym.session.recording.files import Fields
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.tasks.storyboard import TaskState
 

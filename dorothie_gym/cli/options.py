@@ -16,10 +16,9 @@ from dorothie_gym.cli.output import exit_interrupted, fail
 from dorothie_gym.errors import PolicyLoadError, SpeechError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session import spaces
-from dorothie_gym.session.config import PerceptionModel
+from dorothie_gym.session.config import PerceptionModel, RenderView
 from dorothie_gym.support.interruption import message, raising_interrupts
 from dorothie_gym.support.optional_modules import check_installed
-from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.language_model import LanguageModelOptions

@@ -50,7 +50,7 @@ from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.session.config import PerceptionModel
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 
 def rollout(

@@ -51,8 +51,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
-from dorothie_gym.session.config import PerceptionModel
-from dorothie_gym.support.render_view import RenderView
+from dorothie_gym.session.config import PerceptionModel, RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.film import Film

@@ -28,8 +28,8 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.pictures import camera
-from dorothie_gym.support.files import available_processors
-from dorothie_gym.support.render_view import RenderView
+from dorothie_gym.session.config import RenderView
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     import numpy as np

@@ -22,7 +22,8 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.session import recording
-from dorothie_gym.support.files import available_processors, write_atomically
+from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop.submission import SubmissionCheck

@@ -28,7 +28,7 @@ from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 from dorothie_gym.errors import CacheError, CheckpointError, EncoderError, PredictionError, ProcessError
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.evaluation import teacher_forced
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment

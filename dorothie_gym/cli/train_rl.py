@@ -18,7 +18,7 @@ from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ModelFileError, ProcessError, SettingsError
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 DEFAULT_ENV = "dorothie_gym/Navigation-v0"
 """Environment of train-rl."""

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym.cli.output import Facts, exit_interrupted, fail, print_json, stage_progress, stdout, wide_stdout
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 VISION_MODELS: Final = ("segformer", "detr")
 """Commands of the vision models."""

@@ -310,6 +310,11 @@ def _joined(parts: Sequence[Words]) -> Words:
 
 
 # --- Files of phrases -------------------------------------------------------------------------------------------------
+# Reader of the files in data/talk: named phrases and sections of lines in the phrase language (`phrases`).
+#
+# # a comment
+# <name> = one | another          a named phrase; lines that start with "|" continue it
+# == head words key=value         a section; each following line is one alternative
 
 _DEFINITION = re.compile(r"<(\w+)>\s*=\s*(.*)")
 

@@ -17,7 +17,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_batch import SessionBatch
 from dorothie_gym.support.copying import Restorable, taken
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
 """A town, or several that the environments of a batch play in turn."""

@@ -18,7 +18,7 @@ from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.config import ChannelKind, EnvConfig, PerceptionModel
+from dorothie_gym.session.config import ChannelKind, EnvConfig, PerceptionModel, RenderView, checked_view
 from dorothie_gym.session.providers import OBSERVERS, picture_spaces
 from dorothie_gym.session.rewards import term_names
 from dorothie_gym.session.scenario import Scenario, scenario_option
@@ -29,7 +29,6 @@ from dorothie_gym.session.spaces.actions import ActionMapping, action_space
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import observation_space
 from dorothie_gym.sim.traffic_rules import INFRACTION_KINDS
-from dorothie_gym.support.render_view import RenderView, checked_view
 from dorothie_gym.support.vector_infos import Infos, mask_of, seeds_of
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 

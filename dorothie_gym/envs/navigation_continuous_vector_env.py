@@ -13,9 +13,8 @@ from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
-from dorothie_gym.session.config import CameraConfig
+from dorothie_gym.session.config import CameraConfig, RenderView
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
-from dorothie_gym.support.render_view import RenderView
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 

@@ -20,10 +20,9 @@ from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import navigation_space
-from dorothie_gym.session.config import CameraConfig
+from dorothie_gym.session.config import CameraConfig, RenderView
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.support.action_values import as_array
-from dorothie_gym.support.render_view import RenderView
 from dorothie_gym.support.vector_infos import Infos, masked_infos
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from dorothie_gym import pictures  # lazy: most sessions are never drawn
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.config import RenderView, checked_view
 from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import CachedViews
-from dorothie_gym.support.render_view import RenderView, checked_view
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""

@@ -1,4 +1,4 @@
-"""Elements of a town: lanes and the links between them, junctions, streets, sites, signals, crosswalks, sidewalks.
+"""Elements of a town: lanes, their links and centre lines, junctions, streets, sites, signals, crosswalks, sidewalks.
 
 Frame: metres, x east, y south, z up; headings in radians, clockwise seen from above (an increase turns right).
 Angles of actions are in degrees, positive LEFT: an action angle is minus the change of heading.
@@ -298,7 +298,10 @@ class Sidewalk:
     street: int = NO_STREET
 
 
-# --- Elements ---------------------------------------------------------------------------------------------------------
+# --- Centre lines as flat arrays (compiled) ---------------------------------------------------------------------------
+# Lane centre lines as flat arrays, with compiled functions that measure along them.
+#
+# Lanes, the grid index and the neighbour search share these functions, so that their results agree to the last bit.
 
 IntArray = NDArray[np.int64]
 

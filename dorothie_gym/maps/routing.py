@@ -1,4 +1,4 @@
-"""Route search in a town, by the manoeuvres of the car: follow lanes, turn, change lanes, make U-turns."""
+"""Route search in a town, by the manoeuvres of the car: follow lanes, turn, change lanes, make U-turns; roadblocks."""
 
 from __future__ import annotations
 
@@ -359,6 +359,11 @@ def router(town: Town) -> Router:
 
 
 # --- Roadblocks -------------------------------------------------------------------------------------------------------
+# Check that a town remains passable with roadblocks in it.
+#
+# The cells of the router are closed that a car cannot drive or turn round in because of a prop. What is left has to
+# hold for good, not only from where the car is now: wherever it may still come to, and wherever it may have to stop
+# before a prop, it must be able to reach every place that it could reach before.
 
 STANDS_BEFORE = 17.0
 """Distance of a car that stops for a prop to the prop, between their middles [m]."""

@@ -1,4 +1,4 @@
-"""Town: lanes, links and everything along the roads, with the queries of the simulation."""
+"""Town: lanes, links and everything along the roads, traffic lights among it, with the queries of the simulation."""
 
 from __future__ import annotations
 
@@ -27,6 +27,9 @@ from dorothie_gym.maps.model import (
 )
 from dorothie_gym.support.copying import digest_of, shared
 from dorothie_gym.support.portable_math import wrap_degrees
+
+# --- Traffic lights ---------------------------------------------------------------------------------------------------
+# Traffic light programmes: the colour of each light of a junction as a function of time alone.
 
 _SHORTLY = 1e-6  # [s] more than rounding moves the end of a phase
 
@@ -106,6 +109,8 @@ class LightProgramme:
         """Returns the colour of a signal at a simulated time [s]."""
         return self.phase_at(time).colour(signal)
 
+
+# --- Town -------------------------------------------------------------------------------------------------------------
 
 MAX_EXTENT = 20_000.0
 """Largest extent of a town along x and y [m]; the index of its lanes takes 250 MB there."""

@@ -1,18 +1,19 @@
-"""Settings of a session."""
+"""Settings of a session: camera, perception, channel, and the views in which it is drawn."""
 
 from __future__ import annotations
 
 import enum
 from dataclasses import asdict, dataclass, field
-from enum import StrEnum
 
 from dorothie_gym.dialogue.conversation import USUAL_WORD_ERROR_RATE, WORDS_PER_SECOND
 from dorothie_gym.session.rewards import RewardWeights
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
 
+# --- First-person camera ----------------------------------------------------------------------------------------------
 
-class CameraOutput(StrEnum):
+
+class CameraOutput(enum.StrEnum):
     """Part of a picture. All but RGB are ground truth, which no camera gives: privileged."""
 
     RGB = "rgb"
@@ -111,6 +112,9 @@ class CameraConfig:
         return 2 if self.antialiasing else 1
 
 
+# --- Session ----------------------------------------------------------------------------------------------------------
+
+
 class PerceptionModel(enum.StrEnum):
     """Bodies and landmarks that the participant and the Co-Wizard see."""
 
@@ -207,3 +211,28 @@ class EnvConfig:
             if value is not getattr(EnvConfig, name):
                 settings[name] = str(value)
         return settings
+
+
+# --- Views ------------------------------------------------------------------------------------------------------------
+
+
+class RenderView(enum.StrEnum):
+    """View of a session."""
+
+    MAP = "map"
+    """Map around the car, with tasks and talk (800, 1280, 3)."""
+    CAMERA = "camera"
+    """Picture of the camera behind the windscreen (720, 1280, 3)."""
+    BOTH = "both"
+    """Windscreen, subtitles, map and tasks (720, 1280, 3)."""
+
+
+def checked_view(name: str) -> RenderView:
+    """Returns the view of a name.
+
+    Raises:
+        ValueError: there is no such view; lists them.
+    """
+    if name not in [view.value for view in RenderView]:
+        raise ValueError(f"render_view is {name!r}; it must be one of {', '.join(RenderView)}")
+    return RenderView(name)

@@ -19,10 +19,9 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.beliefs import BeliefTracker
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.dialogue_channel import DialogueChannel
+from dorothie_gym.session.dialogue_channel import DialogueChannel, cabin_of
 from dorothie_gym.session.exception_executor import ExceptionExecutor
 from dorothie_gym.session.observations import DeliveredMessages, SessionObserver
-from dorothie_gym.session.providers import cabin_of
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
 from dorothie_gym.session.rewards import RewardTerms
 from dorothie_gym.session.scenario import Scenario, session_seeds

@@ -1,4 +1,4 @@
-"""Observations of the roles. A value that a role must not know is never written into its observation."""
+"""Observations and action masks of the roles. A value that a role must not know is never written into either."""
 
 from __future__ import annotations
 
@@ -39,6 +39,10 @@ from dorothie_gym.tasks.storyboard import Landmark, TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+
+
+# --- Action masks -----------------------------------------------------------------------------------------------------
+# Action masks of the three roles, in the form that `Dict.sample(mask=...)` takes.
 
 RoleMask: TypeAlias = dict[str, Mask | tuple[Mask, ...] | None]
 """Mask of a role's action space, by field; None for fields without a mask."""
@@ -118,6 +122,8 @@ class ActionMasks(CachedViews):
         mask[ExceptionKind.TASK_DELETE] = bool(task.possible_deletions())
         mask[ExceptionKind.TASK_CHANGE] = bool(task.possible_changes())
 
+
+# --- Observations -----------------------------------------------------------------------------------------------------
 
 Table = NDArray[np.float64]
 

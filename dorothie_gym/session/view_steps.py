@@ -32,7 +32,7 @@ from dorothie_gym.sim.ego.path_builder import SEARCH, last_point_before, progres
 from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
-from dorothie_gym.sim.state.ego_records import CoursePointRecord
+from dorothie_gym.sim.state.records import CoursePointRecord
 from dorothie_gym.sim.state.world_arrays import WorldArrays, world_of
 from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
@@ -305,7 +305,8 @@ def write_masks(
         angle[-90 + _STRAIGHT] = 1
 
 
-# --- Rows of the arrays -----------------------------------------------------------------------------------------------
+# --- Row of a session -------------------------------------------------------------------------------------------------
+# Row of a session in the arrays of observations and masks.
 
 _observe_share = direct(observe_share)
 _FLAGS = dict(zip(AGENT_ROLES, map(int, (Wanted.PARTICIPANT, Wanted.CO_WIZARD, Wanted.AD_WIZARD)), strict=True))

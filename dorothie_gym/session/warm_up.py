@@ -37,8 +37,8 @@ from dorothie_gym.sim.step import step_share
 from dorothie_gym.sim.town_env import TownEnv
 from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation.dispatcher import CompiledFunction
-from dorothie_gym.support.files import available_processors
 from dorothie_gym.support.interruption import starting_process
+from dorothie_gym.support.processors import available_processors
 
 TOWN: Final = "brookside"
 """Town of the short session that is played; machine code is the same for all towns."""

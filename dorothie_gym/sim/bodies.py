@@ -25,7 +25,6 @@ from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.record_views import (
     ArrayHolder,
     BodyView,
@@ -38,6 +37,7 @@ from dorothie_gym.sim.state.record_views import (
     heading_field,
     int_field,
 )
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED

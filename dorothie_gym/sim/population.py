@@ -17,7 +17,7 @@ from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import POOL, seed_of
 from dorothie_gym.sim.state.codes import NOBODY, Footway, Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild

@@ -17,7 +17,7 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled
 
 if TYPE_CHECKING:
-    from dorothie_gym.sim.state.ego_records import RandomBody, RandomStream
+    from dorothie_gym.sim.state.records import RandomBody, RandomStream
 
 MASK = 0xFFFFFFFF
 

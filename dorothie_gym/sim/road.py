@@ -20,8 +20,8 @@ from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.network.ahead import LaneChains, Neighbours, lane_zones, neighbours_on
 from dorothie_gym.sim.network.network import LaneIndex, Route, TownNetwork
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.ego_records import VehicleRecord
 from dorothie_gym.sim.state.record_views import BodyView
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step_around, update_lane

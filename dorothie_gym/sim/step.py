@@ -17,7 +17,7 @@ from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.sensing.localizer import localize
 from dorothie_gym.sim.state.codes import NO_SPACE, Kind, Refusal, Wait
-from dorothie_gym.sim.state.ego_records import VehicleRecord
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.world_arrays import note_pose, trace, world_of
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild

@@ -17,8 +17,8 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import LOOKUP_CELL, closest_segment, coordinates, value_near
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.codes import COLLISION, NOBODY, OFF_ROAD, RED_LIGHT, STOP_SIGN, WRONG_WAY, Colour, EventCode
-from dorothie_gym.sim.state.ego_records import POSE, BreachRecord, EventRecord
 from dorothie_gym.sim.state.record_views import ArrayHolder
+from dorothie_gym.sim.state.records import POSE, BreachRecord, EventRecord
 from dorothie_gym.sim.state.town_arrays import OFF_ROAD_MARGIN
 from dorothie_gym.sim.state.town_records import LaneRecord, StopLineRecord
 from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -283,6 +283,10 @@ def _survey(town: TownArrays, poses: Array, k: int) -> tuple[float, bool, int, f
 
 
 # --- Infractions ------------------------------------------------------------------------------------------------------
+# Infractions of the ego: red lights, stop signs, leaving the road, driving against the traffic.
+#
+# They follow from the ego's trajectory alone, whatever drove it, and are counted and listed by `sim.traffic_rules`;
+# collisions, the fifth kind, are detected in `sim.collisions`. This module reads the lists.
 
 
 class WorldEventKind(enum.StrEnum):

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.session.providers import CabinState, noise_levels
+from dorothie_gym.session.dialogue_channel import CabinState, noise_levels
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.audio import SAMPLE_RATE, Samples

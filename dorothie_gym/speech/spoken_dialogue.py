@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.conversation import SHORTEST_SPAN, Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.providers import CabinState, signal_to_noise
+from dorothie_gym.session.dialogue_channel import CabinState, signal_to_noise
 from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
 from dorothie_gym.speech.cabin_noise import cabin_noise, mixed
 from dorothie_gym.speech.recognizer import Recognition

@@ -164,10 +164,3 @@ def _identity(folder: Path) -> tuple[int, int] | None:
 
 
 # --- Processors -------------------------------------------------------------------------------------------------------
-
-
-def available_processors() -> int:
-    """Returns the number of processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -146,7 +146,6 @@ def _check_messages(template: StoryboardTemplate) -> None:
 
 
 # --- parser -----------------------------------------------------------------------------------------------------------
-
 # Strings are matched as a whole, so that commas inside them are kept.
 _STRING_OR_LAST_COMMA = re.compile(r'"(?:\\.|[^"\\])*"|(?<=[^\s\[{,:])(\s*),(?=\s*[\]}])', re.DOTALL)
 

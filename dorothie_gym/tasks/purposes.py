@@ -1,7 +1,7 @@
 """Purposes of errands, read from the texts that a participant observes: task, beneficiary and reason.
 
 The readers know English clauses, not templates: they read the storyboards of the package and of others. Unreadable
-    parts are None or empty; the text is not changed except from "you" to "I".
+parts are None or empty; the text is not changed except from "you" to "I".
 """
 
 from __future__ import annotations

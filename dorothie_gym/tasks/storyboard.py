@@ -1,4 +1,4 @@
-"""Storyboards: templates with `$NAME` references, and the storyboard bound to a town."""
+"""Storyboards: templates with `$NAME` references, the storyboard bound to a town, and the state of its task."""
 
 from __future__ import annotations
 
@@ -308,6 +308,7 @@ class Storyboard:
 
 
 # --- State of the task ------------------------------------------------------------------------------------------------
+# State of the task: live, reached, deleted and changed subgoals.
 
 
 class TaskState:

@@ -21,9 +21,9 @@ from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.recorder import LightStates, actors_around
 from dorothie_gym.session.recording.events import Event
-from dorothie_gym.session.recording.header import trajectory_of
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
+from dorothie_gym.session.recording.trajectory import trajectory_of
 from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.session.spaces.fields import SpaceLimits
 

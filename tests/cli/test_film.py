@@ -21,11 +21,10 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.policies import make_policy
-from dorothie_gym.session.config import CameraConfig, EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig, RenderView
 from dorothie_gym.session.recording import Session
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.support.render_view import RenderView
 from tests.archive.sdn.builders import release
 
 LEFT, TOP = 832, 540

@@ -22,7 +22,7 @@ from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.pretrained import pretrained_card, pretrained_names
 from dorothie_gym.session.config import CameraConfig, ChannelKind, EnvConfig, PerceptionModel
 from dorothie_gym.session.recording import Session
-from dorothie_gym.session.recording.json_io import AUDIO_FOLDER
+from dorothie_gym.session.recording.files import AUDIO_FOLDER
 from dorothie_gym.session.session_engine import SessionEngine
 from tests.lab.console.people import Table
 from tests.maps.opendrive_text import MAPS

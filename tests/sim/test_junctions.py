@@ -17,7 +17,7 @@ from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.population import add_vehicle
 from dorothie_gym.sim.state.codes import Kind, Wait
-from dorothie_gym.sim.state.ego_records import VehicleRecord
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.step import update_lane

@@ -19,7 +19,7 @@ from dorothie_gym.sim.sensing.perception import (
     switch_lamps,
 )
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, DENSEST_FOG, SHORTEST_SIGHT, Visibility
-from dorothie_gym.sim.state.ego_records import EyeRecord
+from dorothie_gym.sim.state.records import EyeRecord
 from dorothie_gym.sim.weather import WET_LOSS, Weather
 from dorothie_gym.support.compilation.records import empty_records
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dorothie_gym.session.providers import CabinState, noise_level, noise_levels, signal_to_noise
+from dorothie_gym.session.dialogue_channel import CabinState, noise_level, noise_levels, signal_to_noise
 from dorothie_gym.speech import cabin_noise, mixed
 from dorothie_gym.speech.cabin_noise import active_rms
 

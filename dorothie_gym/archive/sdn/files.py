@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, TypeAlias
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.session.recording.json_io import MAX_EVENTS, MAX_FRAME, decode_text, read_bytes
+from dorothie_gym.session.recording.files import MAX_EVENTS, MAX_FRAME, decode_text, read_bytes
 from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support.input_files import LONG_NUMBER, MAX_DEPTH, MAX_DIGITS, check_value_count, raising
 

@@ -23,7 +23,7 @@ from dorothie_gym.archive.sdn.slots import LEFT_OUT, SlotReader
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_act, parse_move
-from dorothie_gym.session.recording.header import TENTHS
+from dorothie_gym.session.recording.trajectory import TENTHS
 from dorothie_gym.session.recording.validation import ReadReport
 
 SDN_WORDS_PER_SECOND: Final = 2.5

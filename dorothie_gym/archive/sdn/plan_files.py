@@ -29,8 +29,9 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_exception, parse_goal_status, parse_prop
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH, SessionHeader, SubgoalRow
-from dorothie_gym.session.recording.json_io import MAX_EVENTS
+from dorothie_gym.session.recording.files import MAX_EVENTS
+from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.recording.validation import ReadReport
 
 _PROP: Final = ("id", "x", "y", "z", "pitch", "yaw", "roll")

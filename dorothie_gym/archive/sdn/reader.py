@@ -32,8 +32,8 @@ from dorothie_gym.archive.sdn.turn_angles import SignVote, vote, with_roads, wit
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.session.recording.events import Event
+from dorothie_gym.session.recording.files import ANNOTATIONS_FOLDER, MAX_FRAME
 from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.recording.json_io import ANNOTATIONS_FOLDER, MAX_FRAME
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.validation import ReadReport
 

@@ -17,11 +17,12 @@ from dorothie_gym.archive.sdn.files import number_of, read_csv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.model import NO_STREET, LinkType
 from dorothie_gym.maps.town import Town
+from dorothie_gym.session.recording.files import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.session.recording.frames import read_frames, write_frames
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH, NO_LANE, TENTHS, TRAJECTORY_DTYPE, Trajectory
-from dorothie_gym.session.recording.json_io import MAX_FRAME, MAX_FRAMES
+from dorothie_gym.session.recording.header import NO_LANE
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import Surroundings
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TENTHS, TRAJECTORY_DTYPE, Trajectory
 from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support import portable_arrays as pn
 

@@ -11,7 +11,7 @@ import numpy as np
 from dorothie_gym.archive.sdn.trajectory import CarPoses, SdnMap
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.support.portable_math import wrap_degrees
 
 MIN_CLEAR_TURN: Final = 30.0

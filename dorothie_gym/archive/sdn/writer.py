@@ -35,9 +35,10 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_mental_action, parse_physical_action, parse_prop
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH, TENTHS, LandmarkRow, SessionHeader
-from dorothie_gym.session.recording.json_io import AUDIO_FOLDER, EVENTS_FILE, canonical
+from dorothie_gym.session.recording.files import AUDIO_FOLDER, EVENTS_FILE, canonical
+from dorothie_gym.session.recording.header import LandmarkRow, SessionHeader
 from dorothie_gym.session.recording.session import Session, new_session_folder
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 from dorothie_gym.support.audio import encode_flac, read_audio
 from dorothie_gym.support.files import write_atomically
 

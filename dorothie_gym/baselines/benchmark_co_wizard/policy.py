@@ -31,7 +31,7 @@ from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping, heard_acts

@@ -1,7 +1,7 @@
 """Objects that a trained detector finds in the pictures of a recorded session, as rows of `ACTOR_DTYPE`.
 
 Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers start again in
-    each picture, and no speed is known, because objects are not tracked from picture to picture.
+each picture, and no speed is known, because objects are not tracked from picture to picture.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.session.config import CameraConfig, CameraOutput
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind, Rows, SceneTable
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.portable_math import wrap_radians
 

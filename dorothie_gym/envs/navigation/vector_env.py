@@ -26,9 +26,9 @@ from dorothie_gym.envs.navigation.rows import INFRACTIONS, REFUSED
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.config import checked_view
 from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import Scenario, check_options, scenario_option, template_option
-from dorothie_gym.support.render_view import checked_view
 from dorothie_gym.support.vector_infos import Infos, mask_of, masked_infos, seeds_of
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 

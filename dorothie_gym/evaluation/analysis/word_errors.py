@@ -14,7 +14,7 @@ from rapidfuzz.distance import Levenshtein
 from dorothie_gym.dialogue.recognition_errors import Loudness, WordClass, word_class
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
-from dorothie_gym.session.providers import CabinState, signal_to_noise
+from dorothie_gym.session.dialogue_channel import CabinState, signal_to_noise
 from dorothie_gym.session.recording.events import MoveRecord
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.speech.spoken_form import spoken_words

@@ -20,7 +20,7 @@ from dorothie_gym.policies.policy_loader import (
     policy_names,
 )
 from dorothie_gym.policies.pretrained import is_pretrained
-from dorothie_gym.session.recording.json_io import same_json
+from dorothie_gym.session.recording.files import same_json
 from dorothie_gym.session.spaces.fields import SpaceLimits
 
 

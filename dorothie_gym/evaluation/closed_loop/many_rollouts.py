@@ -10,7 +10,7 @@ from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResu
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, roll_out
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy_loader import Player
-from dorothie_gym.session.recording.json_io import safe_name
+from dorothie_gym.session.recording.files import safe_name
 
 
 def roll_out_all(

@@ -19,7 +19,7 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import ChannelKind, EnvConfig
-from dorothie_gym.session.recording.json_io import safe_name, to_page
+from dorothie_gym.session.recording.files import safe_name, to_page
 from dorothie_gym.support.files import write_atomically
 
 SESSIONS_FOLDER: Final = "sessions"

@@ -26,8 +26,7 @@ from dorothie_gym.policies.policy import AnyPolicy, policy_seed
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recording.events import EndReason, EventType
-from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.recording.json_io import (
+from dorothie_gym.session.recording.files import (
     ACTIONS_FILE,
     AUDIO_FOLDER,
     EVENTS_FILE,
@@ -36,6 +35,7 @@ from dorothie_gym.session.recording.json_io import (
     SessionState,
     same_json,
 )
+from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 

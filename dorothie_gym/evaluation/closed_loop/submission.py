@@ -38,8 +38,8 @@ from dorothie_gym.evaluation.rollout.runner import COST_FILE
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.files import same_json, to_line
 from dorothie_gym.session.recording.header import FORMAT_VERSION
-from dorothie_gym.session.recording.json_io import same_json, to_line
 from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import MAX_RESULT_JSON, MAX_SMALL_JSON, checked, raising, read_json
 
@@ -205,7 +205,7 @@ def differences_from(file: Path | str, submission: Mapping[str, object]) -> tupl
     """Compares the file of a submission with the submission of a folder, as `check_submission` makes it.
 
     The results of the check are ignored: another seed draws another sample, and a receiver may lack the libraries of a
-        model.
+    model.
 
     Raises:
         RolloutError: the file is not a submission.

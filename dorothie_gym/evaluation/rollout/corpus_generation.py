@@ -14,7 +14,7 @@ from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, ru
 from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.recording.json_io import SessionState
+from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import session_state
 
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())

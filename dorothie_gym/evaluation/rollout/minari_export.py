@@ -1,7 +1,7 @@
 """Recorded sessions as datasets of one role for Minari and readers of Minari's datasets (TorchRL, d3rlpy).
 
 As in `hugging_face_export`, a dataset contains no data of the other roles, and nothing from which they could be
-    derived: episodes have neither names nor seeds, and the environment of the dataset draws new sessions.
+derived: episodes have neither names nor seeds, and the environment of the dataset draws new sessions.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession
-from dorothie_gym.session.recording.json_io import SessionState
+from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import session_state
 
 Plan = TypeVar("Plan", bound=PlannedSession)

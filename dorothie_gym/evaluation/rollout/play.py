@@ -11,8 +11,8 @@ from typing import Any, Final, Protocol
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.session.recorder import SessionRecorder
+from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.recording.json_io import to_page
 from dorothie_gym.session.recording.writer import SessionWriter
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.session_log import SessionSummary

@@ -24,7 +24,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.recording.json_io import SessionState, to_page
+from dorothie_gym.session.recording.files import SessionState, to_page
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.support.files import write_atomically

@@ -23,7 +23,7 @@ from dorothie_gym.lab.annotation.source_text import SPEAKERS, SourceLine, Source
 from dorothie_gym.ontology.dialogue_acts import UnitEnd
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_landmark
-from dorothie_gym.session.recording.json_io import read_bytes
+from dorothie_gym.session.recording.files import read_bytes
 
 MAX_ELEMENTS: Final = 500_000
 """Most elements of a file; each takes some 200 bytes of memory."""

@@ -20,8 +20,8 @@ from dorothie_gym.lab.annotation.rows import (
     rows_of,
 )
 from dorothie_gym.lab.annotation.source_text import SourceText
+from dorothie_gym.session.recording.files import decode_text, read_lines
 from dorothie_gym.session.recording.header import parse_version
-from dorothie_gym.session.recording.json_io import decode_text, read_lines
 from dorothie_gym.support.files import write_atomically
 
 VERSION: Final = "1.0"

@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 from dorothie_gym.errors import AnnotationError, one_line
 from dorothie_gym.lab.annotation.log_file import check_place
 from dorothie_gym.lab.annotation.workplace import Seat, SeatKind
-from dorothie_gym.session.recording.json_io import ANNOTATIONS_FOLDER
+from dorothie_gym.session.recording.files import ANNOTATIONS_FOLDER
 from dorothie_gym.support.files import make_folder, write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, raising, read_file
 

@@ -22,8 +22,8 @@ from dorothie_gym.lab.annotation.log_file import Extent, appending, check_place
 from dorothie_gym.lab.annotation.marks import Annotation, Change, check_change
 from dorothie_gym.lab.annotation.rows import ChangeRows, change_of, rows_of
 from dorothie_gym.lab.annotation.source_text import SourceText
+from dorothie_gym.session.recording.files import ANNOTATIONS_FOLDER, decode_text, read_bytes
 from dorothie_gym.session.recording.header import parse_version
-from dorothie_gym.session.recording.json_io import ANNOTATIONS_FOLDER, decode_text, read_bytes
 from dorothie_gym.support.files import make_folder, sync
 
 ADJUDICATED: Final = "adjudicated"

@@ -31,7 +31,7 @@ from dorothie_gym.lab.gate import (
 from dorothie_gym.lab.pages import SHARED, files, page, redirection
 from dorothie_gym.lab.town_page import town_page
 from dorothie_gym.lab.web import application
-from dorothie_gym.session.recording.json_io import MAX_FRAME
+from dorothie_gym.session.recording.files import MAX_FRAME
 
 STATIC: Final = Path(__file__).parent / "static"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from dorothie_gym.errors import SessionError
 from dorothie_gym.lab.console.config import ConsoleConfig
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.recording.json_io import SessionState
+from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.seat_log import SeatEvent, SeatEventKind, read_seat_log
 from dorothie_gym.session.recording.session import Session, session_state
 

@@ -1,9 +1,9 @@
 """Deletion of all data of people, as a list of steps that survives failures and crashes.
 
 Deleted data: the person's answers, stages, role and secret, the ids of the recruiting platform, and the whole recording
-    of each session that the person took part in: its dialogue and actions belong to both people, and it could not be
-    replayed without one of them. Kept data of a partner: answers, stages, and the fact that there was a session, with
-    its condition and the reason "withdrawn".
+of each session that the person took part in: its dialogue and actions belong to both people, and it could not be
+replayed without one of them. Kept data of a partner: answers, stages, and the fact that there was a session, with its
+condition and the reason "withdrawn".
 
 The first step deletes the person from the pseudonymous data, and records in the same transaction which sessions have to
 be removed. It is done or not done. From then on the deletion cannot be undone: `finish_erasures` does each further

@@ -19,7 +19,7 @@ from dorothie_gym.lab.studies.record_types import SESSIONS_FOLDER, STUDY_FILE
 from dorothie_gym.lab.studies.records import StudyRecords
 from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.lab.studies.study_file import read_study
-from dorothie_gym.session.recording.json_io import SessionState
+from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.support.files import replacing, write_atomically
 from dorothie_gym.support.libraries import pa, pq

@@ -20,7 +20,7 @@ from dorothie_gym.lab.studies.room_building import RoomBuilder
 from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import EndReason
-from dorothie_gym.session.recording.json_io import SessionState
+from dorothie_gym.session.recording.files import SessionState
 
 logger = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from dorothie_gym.lab.studies.study_file import sources
 from dorothie_gym.lab.town_page import town_page
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.json_io import SessionState
+from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.tasks.parsing import load_template

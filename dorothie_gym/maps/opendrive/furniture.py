@@ -178,7 +178,6 @@ def _outline(road: RoadRecord, crossing: CrosswalkRecord) -> np.ndarray[tuple[in
 
 
 # --- Sidewalks -------------------------------------------------------------------------------------------------------
-
 # Narrowest sidewalk [m].
 NARROWEST_SIDEWALK = 0.5
 

@@ -149,7 +149,6 @@ class ElementReader:
 
 
 # --- Signals and crosswalks ------------------------------------------------------------------------------------------
-
 # Corner elements of an object: in its own frame, or on its road.
 _CORNERS = (("cornerLocal", ("u", "v")), ("cornerRoad", ("s", "t")))
 
@@ -221,7 +220,6 @@ def _open_ring(corners: Array) -> Array:
 
 
 # --- Roads and junctions ---------------------------------------------------------------------------------------------
-
 # Largest length of a road [m]; a longer one is an error that would exhaust memory.
 LONGEST_ROAD = 100_000.0
 

@@ -241,7 +241,6 @@ def _equal_lanes(records: OpenDriveRecords, here: _Touch, there: _Touch) -> Iter
 
 
 # --- Turn types, derived from geometry -------------------------------------------------------------------------------
-
 # Limits between the turn types [degrees].
 STRAIGHT_BELOW, U_TURN_ABOVE = 35.0, 150.0
 

@@ -24,7 +24,7 @@ from dorothie_gym.session.providers import OBSERVERS
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.sim.sensing.perception import BODY, look_around
-from dorothie_gym.sim.state.ego_records import EyeRecord, SeenRecord
+from dorothie_gym.sim.state.records import EyeRecord, SeenRecord
 from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import RecordArray, empty_records, plain

@@ -40,7 +40,7 @@ from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.pedestrians.walking import PACE
 from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import CLARITY

@@ -23,7 +23,7 @@ from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.sim.state.codes import Colour
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.world_arrays import CAR_KEY
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World

@@ -11,8 +11,8 @@ from dorothie_gym.pictures.views.frames import SceneRenderer
 from dorothie_gym.pictures.views.panel import Panel
 from dorothie_gym.pictures.views.scene import Scene
 from dorothie_gym.pictures.views.subtitles import Subtitles
+from dorothie_gym.session.config import RenderView
 from dorothie_gym.support.libraries import pygame
-from dorothie_gym.support.render_view import RenderView
 
 _SIZE = 1280, 720
 _WINDSCREEN = 832, 540  # of `RenderView.BOTH`; the subtitles are below

@@ -10,7 +10,7 @@ from typing import Final
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.json_io import (
+from dorothie_gym.session.recording.files import (
     ACTIONS_FILE,
     MAX_EVENTS,
     MAX_FRAME,

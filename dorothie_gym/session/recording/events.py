@@ -14,7 +14,7 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.spellings import parse_act, parse_physical_action
-from dorothie_gym.session.recording.json_io import MAX_FRAME, Fields, canonical, canonical_object, from_line, to_line
+from dorothie_gym.session.recording.files import MAX_FRAME, Fields, canonical, canonical_object, from_line, to_line
 from dorothie_gym.sim.config import FRAME_RATE
 
 EXCHANGE_UNIT: Final = "exchange_unit"

@@ -15,15 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError, short_repr
-from dorothie_gym.session.recording.header import (
-    OPEN_COLUMNS,
-    TRAJECTORY_COLUMNS,
-    TRAJECTORY_DTYPE,
-    Trajectory,
-    check_rising,
-    trajectory_of,
-)
-from dorothie_gym.session.recording.json_io import MAX_FRAME, MAX_FRAMES, MAX_FRAMES_FILE, read_bytes
+from dorothie_gym.session.recording.files import MAX_FRAME, MAX_FRAMES, MAX_FRAMES_FILE, read_bytes
 from dorothie_gym.session.recording.surroundings import (
     ACTOR_DTYPE,
     LIGHT_DTYPE,
@@ -34,6 +26,14 @@ from dorothie_gym.session.recording.surroundings import (
     SceneTable,
     Surroundings,
     actor_rows,
+)
+from dorothie_gym.session.recording.trajectory import (
+    OPEN_COLUMNS,
+    TRAJECTORY_COLUMNS,
+    TRAJECTORY_DTYPE,
+    Trajectory,
+    check_rising,
+    trajectory_of,
 )
 from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support.files import replacing

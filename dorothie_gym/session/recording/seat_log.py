@@ -16,7 +16,7 @@ from typing import Final, Self
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.json_io import (
+from dorothie_gym.session.recording.files import (
     MAX_EVENTS,
     MAX_FRAME,
     SEATS_FILE,

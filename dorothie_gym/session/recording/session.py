@@ -33,9 +33,7 @@ from dorothie_gym.session.recording.events import (
     move_record,
     utterance_records,
 )
-from dorothie_gym.session.recording.frames import read_frames, read_journal, write_frames
-from dorothie_gym.session.recording.header import TRAJECTORY_DTYPE, SessionHeader, Trajectory, check_rising
-from dorothie_gym.session.recording.json_io import (
+from dorothie_gym.session.recording.files import (
     ACTIONS_FILE,
     AUDIO_FOLDER,
     EVENTS_FILE,
@@ -55,7 +53,10 @@ from dorothie_gym.session.recording.json_io import (
     to_line,
     to_page,
 )
+from dorothie_gym.session.recording.frames import read_frames, read_journal, write_frames
+from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.surroundings import Surroundings
+from dorothie_gym.session.recording.trajectory import TRAJECTORY_DTYPE, Trajectory, check_rising
 from dorothie_gym.session.recording.validation import ReadReport, faults_of
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared

@@ -18,9 +18,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.session.recording.action_log import Decision, encode_decision
 from dorothie_gym.session.recording.events import Event, encode_event
-from dorothie_gym.session.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
-from dorothie_gym.session.recording.header import SessionHeader, check_rising, checked_rows
-from dorothie_gym.session.recording.json_io import (
+from dorothie_gym.session.recording.files import (
     ACTIONS_FILE,
     AUDIO_FOLDER,
     EVENTS_FILE,
@@ -33,8 +31,11 @@ from dorothie_gym.session.recording.json_io import (
     canonical_object,
     safe_name,
 )
+from dorothie_gym.session.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
+from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.session import SessionFile, picture_name
 from dorothie_gym.session.recording.surroundings import ActorColumns, Rows, actor_rows, light_rows, weather_rows
+from dorothie_gym.session.recording.trajectory import check_rising, checked_rows
 from dorothie_gym.support.files import PART, make_folder, sync, write_atomically
 
 

@@ -1,4 +1,4 @@
-"""Field specifications, from which spaces and documentation are built, and buffers for the arrays of a space."""
+"""Field specifications, from which spaces and documentation are built; sizes of spaces, texts, buffers of arrays."""
 
 from __future__ import annotations
 
@@ -27,6 +27,13 @@ from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.town import Town
 from dorothie_gym.support.copying import CachedViews, shared
 from dorothie_gym.tasks.storyboard import MESSAGE_LENGTH as MESSAGE_LENGTH
+
+# --- Texts in shared memory -------------------------------------------------------------------------------------------
+# Text space whose values reach `gymnasium.vector.AsyncVectorEnv` through shared memory.
+#
+# `AsyncVectorEnv` reads its shared memory once, when it is made. Arrays are views on the memory; the texts of
+# `gymnasium.spaces.Text` are copies of its content at that time, and are never updated (Gymnasium 1.0 to 1.4). The
+# functions that this module registers for its own class return a tuple that reads the memory whenever it is used.
 
 
 class SharedText(spaces.Text):
@@ -149,6 +156,9 @@ def _write(space: SharedText, index: int, value: str, shared_memory: Synchronize
 batch_differing_spaces.register(SharedText, batch_differing_spaces.dispatch(spaces.Text))
 
 
+# --- Sizes of the spaces, and texts -----------------------------------------------------------------------------------
+# Sizes of the observation and action spaces, equal for all towns by default, and text normalisation.
+
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
 """Permitted characters of utterances, messages and stories."""
 
@@ -240,6 +250,8 @@ def plain_text(text: str, length: int) -> str:
     spelt = unicodedata.normalize("NFKD", text.translate(_PLAIN))
     return "".join(c for c in spelt if c in _KNOWN)[:length]
 
+
+# --- Fields -----------------------------------------------------------------------------------------------------------
 
 AnySpace: TypeAlias = spaces.Space[Any]
 """Space whose kind of values is not known statically."""

@@ -17,7 +17,7 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_ro
 from dorothie_gym.sim.step import step_share
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.copying import CachedViews
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:
@@ -91,9 +91,9 @@ class VectorWorld(CachedViews):
     """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
-    threads have not reached yet, so that a late or busy thread does fewer.
-    A world depends only on its own arrays: not on the other worlds, its place among them, or the threads. Threads share
-        nothing that is written to, and hold the interpreter's lock between calls only.
+    threads have not reached yet, so that a late or busy thread does fewer. A world depends only on its own arrays: not
+    on the other worlds, its place among them, or the threads. Threads share nothing that is written to, and hold the
+    interpreter's lock between calls only.
 
     Attributes:
         town: arrays of the town.

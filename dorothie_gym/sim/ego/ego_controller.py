@@ -19,14 +19,17 @@ from dorothie_gym.sim.ego.manoeuvres import find_feasible, request
 from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusal
-from dorothie_gym.sim.state.ego_records import GoalRecord
 from dorothie_gym.sim.state.record_views import ArrayHolder
+from dorothie_gym.sim.state.records import GoalRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import fields, filled_records, plain
 from dorothie_gym.support.copying import CachedViews, shared
+
+# --- The car as a vehicle of highway-env ------------------------------------------------------------------------------
+# The ego car as a highway-env vehicle: a view on the arrays of its world.
 
 
 class Car(CachedViews, Vehicle):
@@ -136,6 +139,8 @@ class CarRecord:
         self.props = fields(arrays.plan, "props")
         self.air = fields(arrays.car, "friction", "wind", "wind_heading", "wind_phase")
 
+
+# --- Physical actions -------------------------------------------------------------------------------------------------
 
 CRUISE_REFUSAL = f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
 """Reason of the refusal of a cruise speed."""

@@ -18,7 +18,7 @@ from dorothie_gym.sim.ego.obstacles import ROADBLOCK_GAP, STANDSTILL_GAP, bodies
 from dorothie_gym.sim.ego.path import point_at
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, U_TURN, VEHICLES, TrafficControl, Wait, Walk
-from dorothie_gym.sim.state.ego_records import SeenRecord
+from dorothie_gym.sim.state.records import SeenRecord
 from dorothie_gym.sim.state.town_records import PassageRecord
 from dorothie_gym.sim.traffic.idm_traffic import STEP_AHEAD, STEP_PAST
 from dorothie_gym.sim.traffic.junctions import announce, close, request

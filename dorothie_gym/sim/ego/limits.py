@@ -143,6 +143,10 @@ MANOEUVRE_PROP_GAP = 16.5
 
 
 # --- Feasibility of physical actions ----------------------------------------------------------------------------------
+# Feasibility of the physical actions: the conditions that planner, masks and policies share.
+#
+# `LocalPlanner.feasible` answers for the manoeuvres of the ego as it stands; the functions here are the conditions,
+# for policies that know an observation only.
 
 
 class FeasibleManoeuvres(NamedTuple):

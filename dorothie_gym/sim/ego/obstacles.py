@@ -11,7 +11,7 @@ from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.ego.path import WIDEST_SWEEP, point_at
 from dorothie_gym.sim.ego.path_builder import PATH_SPACING, height_at_point
 from dorothie_gym.sim.state.codes import STATIC
-from dorothie_gym.sim.state.ego_records import EgoRecord, SeenRecord
+from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.path_builder import SEARCH_RANGE
-from dorothie_gym.sim.state.ego_records import CoursePointRecord, SweepRecord, VehicleRecord
+from dorothie_gym.sim.state.records import CoursePointRecord, SweepRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.vehicle_models import locate
 from dorothie_gym.support import portable_math as pm

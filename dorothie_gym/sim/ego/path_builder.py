@@ -1,4 +1,4 @@
-"""The whole path of the ego: pieces along lanes, lane switches and U-turns, directions, allowed speeds (compiled).
+"""The whole path of the ego: pieces along lanes, lane switches and U-turns, directions, speeds, places (compiled).
 
 A path is laid twice: the first time its points are only counted, so that nothing changes where there is no room.
 """
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dorothie_gym.maps.model import HEADING, HEIGHT, STATION, Array, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
 from dorothie_gym.sim.network.lane_lookup import closest_segment, stretch_near, wrap_radians
-from dorothie_gym.sim.state.ego_records import CoursePointRecord
+from dorothie_gym.sim.state.records import CoursePointRecord
 from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH
 from dorothie_gym.support import portable_math as pm
@@ -21,6 +21,10 @@ from dorothie_gym.support.compilation.records import RecordArray
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+# --- Along the centre line of a lane ----------------------------------------------------------------------------------
+# Measurements along the centre line of a lane, with the results of `maps.model.Lane` to the last bit (compiled).
 
 
 @inlined
@@ -76,6 +80,9 @@ def project_on(town: TownArrays, number: int, x: float, y: float) -> tuple[float
     station = points[at, STATION] + share * (points[at + 1, STATION] - points[at, STATION])
     return station, distance if dx * aside_y - dy * aside_x >= 0.0 else -distance
 
+
+# --- Search along a path ----------------------------------------------------------------------------------------------
+# Searches along a path: the point at a distance, and the closest place to a position.
 
 SEARCH = 6.0
 """Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""
@@ -137,6 +144,8 @@ def progress_on_path(
             best, answer = distance, one.s + t * (other.s - one.s)
     return answer
 
+
+# --- Limits of a path -------------------------------------------------------------------------------------------------
 
 PATH_SPACING = 1.0
 """Distance between points of a path [m]."""

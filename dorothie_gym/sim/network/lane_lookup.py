@@ -1,7 +1,7 @@
 """Place of a body on a lane, and the closest lane (compiled), exactly as `TownNetwork.get_closest_lane_index`.
 
-The functions give the same bits as those of `maps.polyline` and `network.grid`, but consider only the few segments that
-a cell lists. Where a cell has no answer (off the road), all lanes are considered.
+The functions give the same bits as those of `maps.model` and `GridIndex`, but consider only the few segments that a
+cell lists. Where a cell has no answer (off the road), all lanes are considered.
 """
 
 from __future__ import annotations
@@ -28,6 +28,10 @@ from dorothie_gym.support.compilation.records import RecordArray, empty_records
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
+
+
+# --- Index over the lanes of a network --------------------------------------------------------------------------------
+# An index over the lanes of a network that finds the closest one exactly.
 
 GRID_CELL = 8.0
 """Side of a cell [m]."""
@@ -148,6 +152,8 @@ def _closest(arrays: _Arrays, x: float, y: float, heading: float, weight: float,
             best, found = cost, lane
     return found
 
+
+# --- Cells that list the lanes near them ------------------------------------------------------------------------------
 
 LOOKUP_CELL = 4.0
 """Side of a cell [m]: finer than the network's own grid, so that the stretches are short."""

@@ -1,4 +1,4 @@
-"""A town as a highway-env road network."""
+"""A town as a highway-env road network, and tables of the ways on from each lane."""
 
 from __future__ import annotations
 
@@ -339,6 +339,7 @@ def network_of(town: Town) -> TownNetwork:
 
 
 # --- Ways on from each lane -------------------------------------------------------------------------------------------
+# Tables of the ways on from each lane, built once for each town: exits, default successors, lanes beside, oncoming.
 
 ANOTHER_WAY = 15.0
 """Difference of angle from which on exits are different turns [degrees]."""

@@ -11,7 +11,7 @@ from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lane
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.pedestrians.pacing import FROM_ENDS, FROM_JUNCTION, KERB, SHORTEST_WALK, WALK_STEP
-from dorothie_gym.sim.state.ego_records import PedestrianRecord
+from dorothie_gym.sim.state.records import PedestrianRecord
 from dorothie_gym.sim.state.town_records import LaneRecord, WalkwayRecord
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.compilation import compiled, inlined

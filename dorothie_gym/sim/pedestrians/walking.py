@@ -1,4 +1,4 @@
-"""Pedestrians: along footways, round corners, over crosswalks.
+"""Pedestrians: along footways, round corners, over crosswalks, and across streets without a pavement.
 
 A pedestrian walks towards a place a little ahead on its way and decides again every `PACE` substeps, not all of them in
 the same substep; in between it walks straight on.
@@ -31,7 +31,7 @@ from dorothie_gym.sim.pedestrians.pacing import (
 )
 from dorothie_gym.sim.randomness import draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, VehicleRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, VehicleRecord
 from dorothie_gym.sim.state.town_records import CrossingRecord, WalkwayRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import ASKING, CRITICAL_GAP, TRAFFIC_STANDING
@@ -42,6 +42,10 @@ from dorothie_gym.support.compilation import compiled, inlined
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+# --- Jaywalking -------------------------------------------------------------------------------------------------------
+# Jaywalking: pedestrians beside streets without a pavement cross anywhere, away from junctions and close vehicles.
 
 OVER, BACK, THERE = 0, 1, 2
 """Values of `mouth` while straying: on the way over, on the way back, at a far kerb without a way."""
@@ -171,6 +175,8 @@ def _way_to(town: TownArrays, vehicle: VehicleRecord, walker: PedestrianRecord, 
         begin += lane.length
     return math.inf
 
+
+# --- Crosswalks -------------------------------------------------------------------------------------------------------
 
 EXPECTED_REACTION = 1.0
 """Reaction time of drivers that pedestrians count on [s]."""

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.randomness import begin_stream, draw_normal
-from dorothie_gym.sim.state.ego_records import LOCALIZER_STATES, ODOMETRY_DRAWS
 from dorothie_gym.sim.state.record_views import ArrayHolder
+from dorothie_gym.sim.state.records import LOCALIZER_STATES, ODOMETRY_DRAWS
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled

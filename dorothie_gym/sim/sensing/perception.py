@@ -24,7 +24,7 @@ from dorothie_gym.sim.sensing.visibility import (
     signal,
 )
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, Group, Kind, Walk
-from dorothie_gym.sim.state.ego_records import (
+from dorothie_gym.sim.state.records import (
     EyeRecord,
     PedestrianRecord,
     PlacedBody,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.codes import NOBODY, U_TURN
-from dorothie_gym.sim.state.ego_records import (
+from dorothie_gym.sim.state.records import (
     POSE,
     TRACE,
     BreachRecord,
@@ -93,8 +93,8 @@ class WorldArrays(NamedTuple):
         seen_props: (p, 3) x, y and height of the props that it sees [m].
         eye: (1,) its visibility.
         seen: bodies that it perceives, nearest first.
-        trace: (f, 10) its trajectory in the last call of `step`, see `ego_records.TRACE`.
-        poses: (f + 1, 6) its poses before that call and after each of its substeps, see `ego_records.POSE`.
+        trace: (f, 10) its trajectory in the last call of `step`, see `records.TRACE`.
+        poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
         events: its events in that call.
         localizer: (1,) its pose estimate.
         watch: (1,) numbers of its breaches of the rules.
@@ -331,7 +331,7 @@ def _extended(records: RecordArray[Record], count: int) -> RecordArray[Record]:
 
 @inlined
 def trace(world: WorldArrays) -> None:
-    """Logs the ego's state after a substep, see `ego_records.TRACE` and `ego_records.POSE`."""
+    """Logs the ego's state after a substep, see `records.TRACE` and `records.POSE`."""
     car, vehicle = world.car[0], world.vehicles[0]
     rows, k = world.trace, int(car.frames)
     car.frames += 1

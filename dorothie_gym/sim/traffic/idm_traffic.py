@@ -11,7 +11,7 @@ from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.pedestrians.walking import give_way_to_strayers
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Wait, Walk
-from dorothie_gym.sim.state.ego_records import VehicleRecord
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_records import LaneRecord, PassageRecord
 from dorothie_gym.sim.traffic.junctions import announce, forget, note, request
 from dorothie_gym.sim.traffic.lane_index import around, next_on_lane

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.traffic_light_programs import YELLOW_BRAKING
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Kind, Relation, TrafficControl, Wait
-from dorothie_gym.sim.state.ego_records import VehicleRecord
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import (
     AFTER_END,

@@ -11,7 +11,7 @@ from dorothie_gym.sim.pedestrians.footways import place_beside
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import choose, draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
-from dorothie_gym.sim.state.ego_records import VehicleRecord
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import (
     CAR_LENGTH,

@@ -1,4 +1,4 @@
-"""Models of a single vehicle: car following (IDM), lane keeping, motion, lane changes (MOBIL).
+"""Models of a single vehicle: planned lanes, car following (IDM), lane keeping, motion, lane changes (MOBIL).
 
 They follow highway-env's: the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000), its lateral controller and
 kinematic bicycle, and MOBIL (Kesting, Treiber and Helbing 2007) without politeness.
@@ -14,7 +14,7 @@ from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project, value_near, wrap_radians
 from dorothie_gym.sim.randomness import choose
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.state.ego_records import VehicleRecord
+from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.lane_index import around
 from dorothie_gym.sim.traffic.parameters import (
@@ -48,6 +48,10 @@ from dorothie_gym.support.compilation import compiled, inlined
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+# --- Planned lanes ----------------------------------------------------------------------------------------------------
+# Route of a vehicle: its planned lanes, drawn from the vehicle's own random numbers.
 
 
 @inlined
@@ -118,6 +122,9 @@ def _drawn(town: TownArrays, vehicle: VehicleRecord, last: LaneRecord) -> int:
                 return int(town.neighbours[k])
             left -= 1
     return int(town.neighbours[last.successor])
+
+
+# --- Car following ----------------------------------------------------------------------------------------------------
 
 
 @inlined

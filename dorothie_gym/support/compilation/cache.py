@@ -32,6 +32,12 @@ from dorothie_gym.support.compilation.numba_classes import CompileResultCacheImp
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.user_cache import cache_folder, discard, is_private, mark_used, read_signed, write_signed
 
+# --- Fingerprints -----------------------------------------------------------------------------------------------------
+# Fingerprints of compiled functions: hashes of the code of a function and of everything in the package that it uses.
+#
+# A function with the same fingerprint has the same machine code, wherever its file is and whenever it was written.
+# numba itself goes by the modification time of the function's own file.
+
 PACKAGE: Final = "dorothie_gym"
 
 COMPILER: Final = ("__init__.py", "dispatcher.py", "numba_classes.py", "records.py")
@@ -151,6 +157,8 @@ def _text(value: object, reader: str, texts: dict[str, str], queue: list[Compila
 def _file_hash(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
+
+# --- Files ------------------------------------------------------------------------------------------------------------
 
 NUMBA_VARIABLE: Final = "NUMBA_CACHE_DIR"
 """numba's own environment variable for the folder of machine code; it goes before the user's cache folder."""

@@ -1,4 +1,4 @@
-"""Records that compiled functions work on, field by field: arrays of a class that names the fields.
+"""Records that compiled functions work on, field by field, and named tuples of arrays that they pass by address.
 
 A record is read and written by attribute (`vehicle.speed`), compiled and in plain Python alike. Its class names the
 fields for mypy and makes the dtype of the arrays; at runtime records are NumPy's own.
@@ -152,6 +152,15 @@ def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
 
 
 # --- Named tuples by address ------------------------------------------------------------------------------------------
+# Named tuples of arrays that compiled functions pass by address.
+#
+# numba passes a named tuple by value, item by item: a tuple of thirty arrays is two hundred arguments of every
+# function that takes it, and most of the compiler's work. A class with the decorator `by_reference` is one pointer
+# instead, to a table with the address and the shape of each array. Reading an item loads them from the table, which
+# never changes during a call, so that LLVM may keep loaded values.
+#
+# The table lies on the stack of the call from Python (or of `gives_row`), whose arguments keep the arrays alive.
+# Compiled code reads items; it cannot create such tuples, unpack them, or return them or their arrays to Python.
 
 F = TypeVar("F", bound=Callable[..., object])
 T = TypeVar("T", bound=type)

@@ -14,7 +14,7 @@ import pytest
 from dorothie_gym.archive.sdn import read_sdn
 from dorothie_gym.errors import SessionError
 from dorothie_gym.session.recording import Session
-from dorothie_gym.session.recording.json_io import MAX_EVENTS
+from dorothie_gym.session.recording.files import MAX_EVENTS
 from tests.archive.sdn.builders import (
     FIRST,
     HEADER,

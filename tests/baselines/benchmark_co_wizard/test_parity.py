@@ -17,7 +17,7 @@ from dorothie_gym.evaluation.teacher_forced.features import Columns, HistorySize
 from dorothie_gym.evaluation.teacher_forced.features.incremental import trajectory_at_tenths
 from dorothie_gym.evaluation.teacher_forced.features.session_columns import town_graph
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.spaces import Physical
 from tests.baselines.benchmark_co_wizard.listening import Played, play
 from tests.evaluation.teacher_forced.features.played import seen

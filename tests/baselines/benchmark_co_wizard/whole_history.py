@@ -30,8 +30,8 @@ from dorothie_gym.session.recording import (
     Surroundings,
     Trajectory,
 )
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH
 from dorothie_gym.session.recording.surroundings import LIGHT_DTYPE
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.spaces import Physical
 from dorothie_gym.sim.config import FRAME_RATE
 

@@ -23,7 +23,7 @@ from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.policies.language_model.usage import ModelUsage
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording import Decision, Event, EventType, Session
-from dorothie_gym.session.recording.json_io import to_page
+from dorothie_gym.session.recording.files import to_page
 
 CONFIG = EnvConfig(max_seconds=15.0)
 PROTOCOL = LeaderboardProtocol(sessions=3, config=CONFIG)

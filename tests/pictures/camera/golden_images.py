@@ -22,7 +22,7 @@ from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.compilation.records import RecordArray, empty_records
 from dorothie_gym.tasks import Landmark

@@ -20,7 +20,7 @@ from dorothie_gym.pictures.camera.visibility import BODY_PIXELS, LANDMARK_PIXELS
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.observation_parser import nearest_landmark, read_landmarks
 from dorothie_gym.session.config import PerceptionModel
-from dorothie_gym.session.recording.json_io import to_page
+from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import LandmarkColumn, ObjectColumn, Observation, noop
 from dorothie_gym.sim.config import WorldConfig

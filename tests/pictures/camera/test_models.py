@@ -27,7 +27,7 @@ from dorothie_gym.pictures.camera.models.model_bank import (
 )
 from dorothie_gym.pictures.camera.models.people import POSES
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH, CYCLIST_LENGTH, CYCLIST_WIDTH
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records
 

@@ -25,7 +25,7 @@ from dorothie_gym.session.recording import (
     SessionWriter,
     session_state,
 )
-from dorothie_gym.session.recording.json_io import AUDIO_FOLDER
+from dorothie_gym.session.recording.files import AUDIO_FOLDER
 from tests.power_failure import Disk, disk, needs_linux
 from tests.session.recording.builders import header, rows
 from tests.session.recording.dialogues import talk

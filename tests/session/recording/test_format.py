@@ -16,7 +16,7 @@ import pytest
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import Role
 from dorothie_gym.session.recording import Event, EventType, Session, SessionWriter
-from dorothie_gym.session.recording.json_io import MAX_EVENTS, safe_name
+from dorothie_gym.session.recording.files import MAX_EVENTS, safe_name
 from tests.session.recording.builders import header, physical, rows, session, utterance, write
 from tests.session.recording.dialogues import OKAY, talk
 

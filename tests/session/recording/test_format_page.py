@@ -10,7 +10,7 @@ import pytest
 
 from dorothie_gym.archive import Corpus
 from dorothie_gym.session.recording import FORMAT_VERSION, EventType, LandmarkRow, SubgoalRow
-from dorothie_gym.session.recording.json_io import MAX_EVENTS, MAX_FRAMES
+from dorothie_gym.session.recording.files import MAX_EVENTS, MAX_FRAMES
 from dorothie_gym.support.input_files import MAX_SESSION_TEXT
 from tests.session.recording.builders import write
 from tests.session.recording.dialogues import talk

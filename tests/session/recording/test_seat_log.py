@@ -9,7 +9,7 @@ import pytest
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import Role
 from dorothie_gym.session.recording import SeatEvent, SeatEventKind, SeatLogWriter, Session, read_seat_log
-from dorothie_gym.session.recording.json_io import SEATS_FILE
+from dorothie_gym.session.recording.files import SEATS_FILE
 from tests.session.recording.builders import write
 from tests.session.recording.dialogues import talk
 

@@ -13,7 +13,7 @@ from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.support.files import available_processors
+from dorothie_gym.support.processors import available_processors
 from tests.sim.network.towns import find_town
 
 DT = 1.0 / 30.0

@@ -24,7 +24,7 @@ from dorothie_gym.sim.sensing.localizer import (
     SLIP,
     measure,
 )
-from dorothie_gym.sim.state.ego_records import ODOMETRY_DRAWS
+from dorothie_gym.sim.state.records import ODOMETRY_DRAWS
 from tests.sim.sensing.odometer import CarriedLocalizer
 
 RUNS = 400

@@ -5,7 +5,7 @@ import pytest
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.sensing.localizer import BIAS_WALK, measure, reckon
-from dorothie_gym.sim.state.ego_records import LOCALIZER_STATES, ODOMETRY_DRAWS
+from dorothie_gym.sim.state.records import LOCALIZER_STATES, ODOMETRY_DRAWS
 
 DT = 1 / 30
 

@@ -13,7 +13,7 @@ from dorothie_gym.sim.ego.obstacles import PerceivedBody
 from dorothie_gym.sim.sensing.perception import Perception, detection_probability, position_error, see
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.state.ego_records import EyeRecord, PedestrianRecord, PropRecord, SeenRecord, VehicleRecord
+from dorothie_gym.sim.state.records import EyeRecord, PedestrianRecord, PropRecord, SeenRecord, VehicleRecord
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation.records import empty_records

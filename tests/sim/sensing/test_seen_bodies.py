@@ -22,7 +22,7 @@ from dorothie_gym.sim.sensing.perception import (
 )
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
 from dorothie_gym.sim.state.codes import Group, Kind, Walk
-from dorothie_gym.sim.state.ego_records import EyeRecord, PedestrianRecord, PropRecord, SeenRecord, VehicleRecord
+from dorothie_gym.sim.state.records import EyeRecord, PedestrianRecord, PropRecord, SeenRecord, VehicleRecord
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.compilation.records import RecordArray, empty_records
 

@@ -4,7 +4,7 @@ import pytest
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle
 from dorothie_gym.sim.randomness import POOL, begin_stream, choose, draw, draw_normal, draw_share, seed_of, seed_stream
-from dorothie_gym.sim.state.ego_records import LocalizerRecord
+from dorothie_gym.sim.state.records import LocalizerRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from dorothie_gym.support.compilation import compiled

@@ -22,7 +22,7 @@ class TrajectoryWatch(WorldEventLog):
         super().__init__(network, self)
 
     def look(self, poses: Array, frame: int) -> list[WorldEvent]:
-        """Returns the breaches on a trajectory (n + 1, 6), columns `ego_records.POSE`.
+        """Returns the breaches on a trajectory (n + 1, 6), columns `records.POSE`.
 
         The first pose is that of `frame`, and the last one of the stretch before.
         """

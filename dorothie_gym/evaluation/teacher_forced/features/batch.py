@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.evaluation.teacher_forced.features.columns import NO_TEXT, Columns, Flags, Ints, Reals
 from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
-from dorothie_gym.session.recording.header import TENTHS
+from dorothie_gym.session.recording.trajectory import TENTHS
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 

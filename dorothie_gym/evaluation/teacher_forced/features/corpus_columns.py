@@ -32,7 +32,7 @@ from dorothie_gym.evaluation.teacher_forced.features.sight import Sight, seen_by
 from dorothie_gym.maps.cache import compiler_digest
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.maps.town import Town
-from dorothie_gym.session.recording.json_io import ACTIONS_FILE
+from dorothie_gym.session.recording.files import ACTIONS_FILE
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_file, read_text

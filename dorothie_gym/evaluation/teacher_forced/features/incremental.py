@@ -34,8 +34,9 @@ from dorothie_gym.evaluation.teacher_forced.features.session_columns import (
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.session.recording.events import ActionRecord, UtteranceRecord
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH, TRAJECTORY_DTYPE, SessionHeader, Trajectory
+from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.surroundings import Rows, SceneTable, Surroundings
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TRAJECTORY_DTYPE, Trajectory
 
 _FULL_TURN: Final = 2.0 * math.pi
 

@@ -29,8 +29,9 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import LABELS
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.session.recording.events import ActionRecord, EventType, UtteranceRecord
-from dorothie_gym.session.recording.header import FRAMES_PER_TENTH, NO_LANE, TENTHS, SessionHeader, Trajectory
+from dorothie_gym.session.recording.header import NO_LANE, SessionHeader
 from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TENTHS, Trajectory
 
 HEADING_STEP: Final = 1e-3
 """Headings are rounded to this [degrees], so that they do not depend on the unit in a file."""

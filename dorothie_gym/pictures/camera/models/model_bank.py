@@ -33,7 +33,7 @@ from dorothie_gym.pictures.camera.models.people import (
 from dorothie_gym.pictures.camera.models.props import prop_model
 from dorothie_gym.pictures.camera.models.vehicles import PAINTS, Lamps, VehicleType, painted_vehicle, vehicle_form
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.ego_records import PedestrianRecord, PropRecord, VehicleRecord
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.support.compilation import compiled, concurrent
 from dorothie_gym.support.compilation.records import Float, Int32, RecordArray
 from dorothie_gym.support.copying import shared

@@ -1,4 +1,4 @@
-"""Records of the ego: path, plan, control, event log, perception, pose estimate, and the watch over its driving."""
+"""Records of a world: bodies, clock and lights; path, plan and control of the ego, its perception and its driving."""
 
 from __future__ import annotations
 
@@ -173,6 +173,7 @@ POSE = ("x", "y", "heading", "speed", "height", "turning")
 
 
 # --- Perception, pose estimate and watch ------------------------------------------------------------------------------
+# Records of the ego's perception, its pose estimate, and the monitoring of its driving.
 
 
 class SeenRecord:
@@ -256,7 +257,8 @@ class BreachRecord:
     signal: Int32  # id of the light or sign, -1 where there is none
 
 
-# --- Ego --------------------------------------------------------------------------------------------------------------
+# --- Bodies, clock and lights -----------------------------------------------------------------------------------------
+# Records of the bodies of a world, its clock and its lights; protocols of their common fields.
 
 
 class RandomBody(Protocol):
