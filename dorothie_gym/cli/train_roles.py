@@ -20,7 +20,7 @@ OnStage = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What is to be trained.
+    """Role to train, and the settings of its training.
 
     Attributes:
         corpus: folder of the corpus.

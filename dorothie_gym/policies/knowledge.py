@@ -1,9 +1,9 @@
-"""What a Co-Wizard believes, and why it does what it does: the record that scripted and learned Co-Wizards fill.
+"""Beliefs of a Co-Wizard and the reasons for its actions: the record that scripted and learned Co-Wizards fill.
 
 `co_wizard.proposition_truth` judges propositions and reasons over it, and `co_wizard.answers` words what follows. The
-state of the scripted Co-Wizard and the memory of the learned one differ in how their fields come about, by rules or by
-a network, and in what the learned one does not keep: whether a place that is not on its map was described to it, for
-what a stop was decided on, and for what reason it was told to stop.
+state of the scripted Co-Wizard comes about by rules, the memory of the learned one by a network. The learned one does
+not keep whether a place that is not on its map was described to it, the obstacle for which it stopped by a decision,
+and the reason for an instruction to stop.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Standstill:
         since: start of the present standstill [s]; None while the car moves.
         until: end of the last standstill [s].
         reason: why the car stands, or stood last, as far as that is known.
-        reason_since: since when it has stood for this reason [s].
+        reason_since: time since which it has stood for this reason [s].
     """
 
     since: float | None = 0.0
@@ -47,15 +47,15 @@ class Standstill:
         return replace(self, since=now, reason=None) if self.since is None else self
 
     def with_reason(self, reason: Proposition | None, now: float) -> Standstill:
-        """Notes why the car stands; a reason that is not known any more stays."""
+        """Stores why the car stands; a reason that can no longer be determined is kept."""
         return self if reason is None or reason == self.reason else replace(self, reason=reason, reason_since=now)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardKnowledge:
-    """What a Co-Wizard believes and intends.
+    """Beliefs and intentions of a Co-Wizard.
 
-    Fields with a default are what only the scripted one keeps.
+    Only the scripted Co-Wizard sets the fields with a default.
 
     Attributes:
         town: the map.
@@ -77,7 +77,7 @@ class CoWizardKnowledge:
         stop_reason: why the car stopped on that instruction.
         told_to_turn_round_at: time of the last instruction to turn round [s].
         standstill: present or last standstill.
-        rests_for: for what the car stops by a decision.
+        rests_for: obstacle for which the car stops by a decision.
         rests_until: end of that stop [s].
     """
 

@@ -212,6 +212,7 @@ def test_a_write_that_fails_leaves_nothing_behind(path: Path, folder: Path, monk
     def refuse(*_: object) -> None:
         raise PermissionError("no")
 
+    read_yaml_town(path)  # machine code of the reader is written before
     monkeypatch.setattr(os, "replace", refuse)
     assert through_cache(path, Reader()).name == "loop"
     assert list(folder.iterdir()) == []

@@ -247,7 +247,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
 
     @property
     def knowledge(self) -> CoWizardKnowledge:
-        """What is believed and intended."""
+        """Beliefs and intentions."""
         beliefs, intentions, dialogue = self.beliefs, self.intentions, self.dialogue
         return CoWizardKnowledge(
             town=self.town,

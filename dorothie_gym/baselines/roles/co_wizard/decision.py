@@ -36,7 +36,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardPercept(Percept[CoWizardView, WorkingMemory]):
-    """What is perceived at a decision."""
+    """Perception at a decision."""
 
     @cached_property
     def car(self) -> list[float]:

@@ -172,7 +172,7 @@ class WorkingMemory:
 
     @property
     def knowledge(self) -> CoWizardKnowledge:
-        """What is believed and intended, judged by the thresholds of the scripted Co-Wizard."""
+        """Beliefs and intentions, with the thresholds of the scripted Co-Wizard."""
         return CoWizardKnowledge(
             town=self.town,
             config=CONFIG,

@@ -1,4 +1,4 @@
-"""What the learned Co-Wizard and the learned participant share.
+"""Common parts of the learned Co-Wizard and the learned participant.
 
 A role fills `training.LearnedRole`: its files and network, examples, loss, and how lessons are made. `hearing`,
 `decision` and `encoding` turn observations into inputs, `network` has layers, `remark_forms` the forms of remarks,

@@ -41,7 +41,7 @@ class Attention(Generic[RoleMemory]):
 
 @dataclass(frozen=True, kw_only=True)
 class Percept(Generic[View, RoleMemory]):
-    """What is perceived at a decision.
+    """Perception at a decision.
 
     Attributes:
         view: observation.

@@ -1,4 +1,4 @@
-"""What the networks of the roles share: embedded words, hidden layers, remarks behind others, scores of options."""
+"""Common layers of the networks of the roles: embedded words, hidden layers, remarks behind others, scores of options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the players of the learned roles share: their network, the forms of their vocabulary, and draws of remarks."""
+"""Common parts of the players of the learned roles: their network, the forms of their vocabulary, and draws of remarks."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ Settings = TypeVar("Settings", bound=RoundSettings)
 
 @dataclass(frozen=True, kw_only=True)
 class LearnedRole(Generic[Network, Batch, Example, Settings]):
-    """What a role brings to its training.
+    """Role that can be trained: its files, network, examples and loss.
 
     Attributes:
         files: files and network of its models.

@@ -16,7 +16,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantPercept(Percept[ParticipantView, SessionMemory]):
-    """What is perceived at a decision.
+    """Perception at a decision.
 
     Attributes:
         rng: random generator of the decision.

@@ -49,7 +49,7 @@ LONGEST_WAIT: Final = 12.0
 
 
 class NotedEvent(enum.IntEnum):
-    """What has happened to the tasks, on the way, or in the talk; the memory keeps when, and which place."""
+    """Event of the tasks, the drive or the talk; the memory keeps its time and its place."""
 
     DONE = 0
     ADDED = 1
