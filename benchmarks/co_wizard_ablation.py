@@ -68,7 +68,7 @@ class RuledCommands(LearnedCoWizard):
 
 
 def ruled_command(memory: WorkingMemory, view: CoWizardView) -> int:
-    """Returns the index of the first allowed command among: stop, what was asked for, the route, go on, speed, lights.
+    """Returns the index of the first allowed command among: stop, requested action, route, driving on, speed, lights.
 
     Args:
         memory: working memory after listening.

@@ -67,7 +67,7 @@ def answer_yes_no(
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
-    """Returns what a yes/no question asks; None if that cannot be told."""
+    """Returns the proposition of a yes/no question; None if that cannot be told."""
     slots = (act.values(slot) for slot in (Slot.OBJECT, Slot.ACTION, Slot.LANDMARK, Slot.STREET))
     return words.asked or act_builders.asked_by_slots(*slots)
 
@@ -102,7 +102,7 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
+    """Returns an addition to an answer, by chance: why something is not seen, or the time to the goal."""
     unseen = asked.predicate is Predicate.SEES and not believes(state.knowledge, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(view, rng)

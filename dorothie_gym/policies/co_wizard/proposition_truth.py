@@ -1,4 +1,4 @@
-"""Truth of propositions by what a Co-Wizard knows and observes, and its reasons for what it does."""
+"""Truth of propositions by the knowledge and observations of a Co-Wizard, and the reasons for its actions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Judgement = Callable[[CoWizardKnowledge, CoWizardView, Proposition], bool | None
 
 
 def believes(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
-    """Returns whether a proposition is true by what is known and seen; None if nothing tells."""
+    """Returns whether the Co-Wizard believes a proposition; None if it does not know."""
     judge = _JUDGEMENTS.get(said.predicate)
     held = None if judge is None else judge(known, view, said)
     return held if held is None else held is not said.negated
@@ -182,7 +182,7 @@ _JUDGEMENTS: Final[dict[Predicate, Judgement]] = {
 
 
 def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
-    """Returns why the car stands now; None if that cannot be told."""
+    """Returns why the car stands now, from the Co-Wizard's own actions; None if it does not know."""
     goal, since = known.goal, view.time if known.standstill.since is None else known.standstill.since
     resting = view.time < known.rests_until
     hazard = view.hazard if view.motion is Motion.HAZARD else known.rests_for if resting else ObjectClass.UNLABELED
@@ -207,7 +207,7 @@ def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition
 
 
 def reason_to_turn_round(known: CoWizardKnowledge, view: CoWizardView) -> Proposition | None:
-    """Returns why the car turns round now; None if that cannot be told."""
+    """Returns why the car turns round now; None if the Co-Wizard does not know."""
     told = view.time - known.told_to_turn_round_at < known.config.wish_time + OBEYED_WITHIN
     if known.to_turn_round or told:
         return Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)

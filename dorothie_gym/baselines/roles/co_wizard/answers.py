@@ -1,7 +1,7 @@
 """Answers of the learned Co-Wizard from its evidence, and rules that exclude remarks.
 
-Whether a question is answered is chosen by the network. The answers are those that the scripted Co-Wizard would give
-with the knowledge of the memory (`policies.co_wizard.answers`). What was not understood is said again from memory.
+The network chooses whether to answer a question. The answers are those of the scripted Co-Wizard with the knowledge of
+the memory (`policies.co_wizard.answers`). A remark that was not understood is repeated from memory.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _STATEMENTS: Final = (*_ANSWERS, DialogueMove.REPLY_W, DialogueMove.EXPLAIN)
 
 
 def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizardView) -> Remark | None:
-    """Returns the answer to a question whose answer follows from the evidence; None if none has just been asked.
+    """Returns the answer to the last question if it follows from the evidence; None without such a question.
 
     These are questions that yes or no answers, why the car stands or turns round, and when it arrives.
 
@@ -69,7 +69,7 @@ def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizard
 
 
 def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None:
-    """Returns what a yes/no question asks; a check that names no more is about the present goal."""
+    """Returns the proposition of a yes/no question; a check that names no more is about the present goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
     if utterance.places:
@@ -100,7 +100,7 @@ def is_answer(remark: Remark, answer: Remark) -> bool:
 
 
 def said_again(utterance: Utterance | None, memory: WorkingMemory) -> Remark | None:
-    """Returns the last own remark, said again, if the participant has just not understood it."""
+    """Returns a repetition of the Co-Wizard's last remark if the participant has just not understood it."""
     if utterance is None or memory.last is None or not utterance.heard.acts:
         return None
     if utterance.heard.acts[0].move is not DialogueMove.CONFUSE:
@@ -148,7 +148,7 @@ def is_sayable(
 
 
 def _waits_for_answer(utterance: Utterance, memory: WorkingMemory) -> bool:
-    """Returns whether an utterance asks something, and nothing has been said since."""
+    """Returns whether an utterance asks something that has not been answered yet."""
     return memory.spoke_at < utterance.time and any(act.move in QUESTIONS for act in utterance.heard.acts)
 
 

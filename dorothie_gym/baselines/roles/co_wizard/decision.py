@@ -126,7 +126,7 @@ def finished(
     """Returns the belief update to send, and the state after a decision.
 
     Args:
-        percept: what was perceived.
+        percept: perception.
         memory: memory after listening.
         physical: command that is given.
         remarks: what was decided to say.

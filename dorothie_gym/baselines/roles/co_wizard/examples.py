@@ -64,7 +64,7 @@ def make_example(
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        percept: what was perceived.
+        percept: perception.
         listening: inputs of the first step.
         acting: inputs of the second step.
         commands: possible commands.
@@ -110,7 +110,7 @@ def correcting_example(
     against the directions that it gets.
 
     Args:
-        percept: what the player perceived, with its own memory.
+        percept: the player's perception, with its own memory.
         listening: inputs of the first step.
         acting: inputs of the second step, from which nothing is learnt.
         led: memory that the teacher has led to.

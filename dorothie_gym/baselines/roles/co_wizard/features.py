@@ -123,7 +123,7 @@ def _road(memory: WorkingMemory, view: CoWizardView) -> list[float]:
 
 
 def ordered_exit(memory: WorkingMemory, view: CoWizardView, choice: Choice | None) -> Exit | None:
-    """Returns the exit of a junction that the turn in the memory means, whether or not junctions are to be passed."""
+    """Returns the exit of a junction that matches the turn in the memory, regardless of junctions to pass before."""
     order = ORDERS[memory.value("order")]
     if order is None or choice is None:
         return None

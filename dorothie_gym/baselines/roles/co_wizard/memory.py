@@ -1,8 +1,8 @@
 """Working memory of the learned Co-Wizard: its commitments, written by its own network.
 
 At each decision the network predicts the next value of each variable in `VARIABLES`, and an event of the goal
-(`GoalEvent`, or a place on the map); `WorkingMemory.updated` stores both. What is kept besides follows from them and
-from the own observation: times, the navigator's route, and where a slow approach ends.
+(`GoalEvent`, or a place on the map); `WorkingMemory.updated` stores both. All other content is derived from them and
+from the observation: times, the navigator's route, and the end of a slow approach.
 """
 
 from __future__ import annotations
@@ -256,7 +256,7 @@ class WorkingMemory:
         return memory._with_goal(update.goal, view, named)
 
     def _carrying_on(self, view: CoWizardView) -> WorkingMemory:
-        """Carries the place of a slow approach along, and sends the plan if the route has changed."""
+        """Moves the place of a slow approach along with the car, and sends the plan if the route has changed."""
         memory = self
         if self.value("creeping") and not self.value("halted") and view.manoeuvre is not PhysicalAction.U_TURN:
             left = self.distance_to(self.target, view)
@@ -337,13 +337,13 @@ class WorkingMemory:
         return memory._noting(mark.name, GoalStatus.ONGOING)
 
     def acted(self, physical: PhysicalAction | None, view: CoWizardView) -> WorkingMemory:
-        """Notes the own physical action."""
+        """Records a physical action of the Co-Wizard."""
         if physical is None:
             return self
         return replace(self, physical=physical, physical_at=view.time, junction_of_action=view.junction)
 
     def spoken(self, remark: Remark, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> WorkingMemory:
-        """Notes an own remark: what it is about, and whether it asks."""
+        """Records a remark of the Co-Wizard: its topic, and whether it asks."""
         last = remark if asks or remark.act.slots else self.last
         said = (*(pair for pair in self.said_at if pair[0] != topic), (topic, view.time))
         lane = view.choice.lane if asks_way and view.choice is not None else self.asked_lane

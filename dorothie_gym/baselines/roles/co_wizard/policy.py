@@ -74,7 +74,7 @@ class Turn:
     """Decision of the player.
 
     Attributes:
-        percept: what was perceived.
+        percept: perception.
         memory: memory after listening.
         action: the action.
         remarks: chosen remarks.

@@ -1,4 +1,4 @@
-"""Common layers of the networks of the roles: embedded words, hidden layers, remarks behind others, scores of options."""
+"""Layers of the networks of both roles: embedded words, hidden layers, remarks behind others, scores of options."""
 
 from __future__ import annotations
 

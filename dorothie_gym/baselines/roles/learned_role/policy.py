@@ -1,4 +1,4 @@
-"""Common parts of the players of the learned roles: their network, the forms of their vocabulary, and draws of remarks."""
+"""Common parts of the players of both roles: their network, the forms of their vocabulary, and draws of remarks."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def _decoded(code: Sequence[Any], available: Sources) -> Any:
 def check_form(
     form: str, needed: Collection[str], fill: Callable[[str, Sources], Remark | None], example: Callable[[str], object]
 ) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark.
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a valid form of a remark.
 
     Args:
         form: the text.

@@ -63,7 +63,7 @@ def make_example(
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        percept: what was perceived.
+        percept: perception.
         choosing: inputs of the first step.
         speaking: inputs of the second step.
         choice: the teacher's choice.

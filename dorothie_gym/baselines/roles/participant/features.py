@@ -58,7 +58,7 @@ _ACTIONS: Final = (
 
 
 def state_vector(memory: SessionMemory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
-    """Returns the state of car, road, route, tasks and talk.
+    """Returns the state of car, road, route, tasks and dialogue.
 
     Args:
         memory: working memory.
@@ -264,13 +264,13 @@ def _name_of(view: ParticipantView, subgoal: SeenSubgoal) -> LandmarkName | None
 
 
 def _said_other_side(memory: SessionMemory, direction: Direction) -> bool:
-    """Returns whether the last direction that the participant said is another one."""
+    """Returns whether the participant's last direction differs."""
     said = [item.wording.direction for item in memory.records.speech.said if item.wording.direction is not None]
     return bool(said) and said[-1] is not direction
 
 
 def answer_to(memory: SessionMemory, view: ParticipantView, utterance: Utterance) -> bool | None:
-    """Returns whether the answer to a question is yes; None if it is no such question, or nothing tells."""
+    """Returns whether the answer to a question is yes; None for other questions, or without evidence."""
     asked, direction = utterance.asked, utterance.heard.words.direction
     if asked is None:
         return None

@@ -135,7 +135,7 @@ class SessionMemory:
         return memory._noting_tasks(view)._following(view), view
 
     def hearing(self, heard: HeardUtterance, view: ParticipantView, rng: np.random.Generator) -> SessionMemory:
-        """Takes in an utterance of the car: it may be answered, and what it says is not said again."""
+        """Processes an utterance of the car, which may be answered and whose content is not repeated."""
         records = self._copied()
         records.conversation = records.conversation.after_hearing(view.time)
         speech = records.speech.heard_other(view.time, heard.acts, rng, records.clock.interval / 2.0)
@@ -163,7 +163,7 @@ class SessionMemory:
         return replace(self, records=records)
 
     def decided(self, remarks: Sequence[Remark], view: ParticipantView, rng: np.random.Generator) -> SessionMemory:
-        """Notes what is going to be said, and queues it; urgent remarks replace what waits to be said."""
+        """Records remarks and queues them; urgent remarks replace queued ones."""
         records, memory = self._copied(), self
         voice = records.speech
         if any(GoalStatus.COMPLETE in one.act.slots for one in remarks):
@@ -190,7 +190,7 @@ class SessionMemory:
         return replace(self.records)
 
     def _noting_tasks(self, view: ParticipantView) -> SessionMemory:
-        """Notes which tasks are done, new, dropped or changed; a target that is no longer open is given up."""
+        """Records tasks that are done, new, dropped or changed; a target that is no longer open is given up."""
         memory, records, now = self, self._copied(), view.time
         before = records.task.subgoals
         records.task = records.task.with_subgoals(view.subgoals, str(view.raw["tasks"]))
@@ -214,7 +214,7 @@ class SessionMemory:
         return replace(memory, records=records)
 
     def _following(self, view: ParticipantView) -> SessionMemory:
-        """Follows the route; plans another one where the car has left it, or where it did not help twice."""
+        """Follows the route; plans another one if the car has left it, or if it has failed twice."""
         memory = self._noting_blocked(view, near=False)
         records = memory._copied()
         guiding, guidance, route = records.guidance.guiding, records.guidance, records.route
@@ -240,7 +240,7 @@ class SessionMemory:
         return replace(memory, records=records)
 
     def _noting_blocked(self, view: ParticipantView, *, near: bool) -> SessionMemory:
-        """Notes what blocks the route, and plans around it."""
+        """Records obstacles on the route, and plans around them."""
         records = self._copied()
         known = records.route.blocked
         _silently(records, lambda: note_blocked(records, view, near=near))

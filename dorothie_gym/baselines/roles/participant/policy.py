@@ -53,7 +53,7 @@ class LearnedState:
 
 
 class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
-    """Participant whose network chooses the next errand, and what to say to the car and when.
+    """Participant whose network chooses the next errand, and the content and time of remarks to the car.
 
     The most likely target and guidance are chosen. Remarks are sampled: yes only if it is true, no only if it is not,
     and no crowd or weather that is not observed. Names, numbers and words of a remark are filled in (see `remarks`).
@@ -95,7 +95,7 @@ class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
         return TargetChoice(target=inputs.rows[chosen - 1] if chosen else KEEP_TARGET, guiding=bool(guiding[0] > 0.0))
 
     def speak(self, inputs: Inputs, percept: ParticipantPercept, memory: SessionMemory) -> tuple[Remark, ...]:
-        """Returns what to say, which is drawn; nothing for silence."""
+        """Returns sampled remarks; none for silence."""
         with torch.inference_mode():
             state, words, _, _ = inputs.tensors()
             scores, hidden = self._network.speak(state, words)
@@ -144,7 +144,7 @@ def finished(
     """Returns the speech of a decision, and the state after it.
 
     Args:
-        percept: what was perceived.
+        percept: perception.
         memory: memory after the choice of the target.
         remarks: chosen remarks.
     """

@@ -247,7 +247,7 @@ def check_form(form: str) -> None:
 
 
 def _example(source: str) -> object:
-    """Returns what a source can be."""
+    """Returns an example of a source."""
     if source.startswith(TEXT_MARK):
         return "text"
     if source in _VALUES:
@@ -260,7 +260,7 @@ def _example(source: str) -> object:
 # --- Stop at the target -----------------------------------------------------------------------------------------------
 
 STOP_FORM: Final = "stop"
-"""Form of the remark that stops the car at the target, whose words are chosen ahead (`SessionMemory.chosen`)."""
+"""Form of the remark that stops the car at the target, whose words are chosen in advance (`SessionMemory.chosen`)."""
 
 
 def is_stop(remark: Remark, memory: SessionMemory, view: ParticipantView) -> bool:

@@ -74,7 +74,7 @@ class Teacher:
         )
 
     def settle(self, memory: SessionMemory, *, spoke: bool) -> None:
-        """Puts into the state what the player has chosen and said instead.
+        """Copies the player's choices and remarks into the state.
 
         Args:
             memory: the player's memory after the decision.
