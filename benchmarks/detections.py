@@ -22,12 +22,13 @@ from PIL import Image, ImageDraw
 from dorothie_gym.archive import Corpus
 from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes, objects_in
 from dorothie_gym.baselines.vision.detector import Detector
-from dorothie_gym.baselines.vision.experiment import TESTS, config_of, load_detector, load_segformer, sampling_of
+from dorothie_gym.baselines.vision.experiment import TESTS, config_of, sampling_of
 from dorothie_gym.baselines.vision.frames import SessionFrames, load_frames
 from dorothie_gym.baselines.vision.object_learner import corners_of, focals_of
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import Focals, spaces_of
+from dorothie_gym.baselines.vision.trained import load_detector, load_segformer
 
 SCALE = 2
 """Pixels of the drawing for one of the picture."""

@@ -31,7 +31,7 @@ from dorothie_gym.evaluation.closed_loop.running import command_of
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player, find_player
 from dorothie_gym.policies.navigation import FIELDS
-from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.policies.policy import DESCRIPTION
 from dorothie_gym.policies.pretrained import CARD_FILE, PREFIX, SHIPPED, CardFigure, PretrainedCard
 from dorothie_gym.session.config import EnvConfig
 

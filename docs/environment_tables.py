@@ -16,7 +16,7 @@ from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.policies.navigation.actions import physical_of
 from dorothie_gym.policies.navigation.driver_view import driver_arrays
-from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.session.spaces import Column, FieldKind, FieldSpec, SpaceLimits
 
 LIMITS = SpaceLimits()

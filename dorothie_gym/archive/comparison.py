@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,10 @@ from dorothie_gym.archive.corpus import layout_of, read_session
 from dorothie_gym.errors import MAX_SHOWN, SessionError
 from dorothie_gym.session.recording.events import encode_event
 from dorothie_gym.session.recording.files import canonical, from_line
-from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.recording.surroundings import SceneTable
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.recording.surroundings import SceneTable
 
 _VERSIONS: Final = ("format_version", "package_version")
 """Fields of the header that name the writer of the session."""

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.archive.prediction_points import PointView, history_angle, nfd_points
 from dorothie_gym.ontology.dialogue_acts import VECTOR_SLOTS
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.libraries import pa, pq
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 UTTERANCES_FILE: Final = "utterances.parquet"
 DECISIONS_FILE: Final = "decision_points.parquet"

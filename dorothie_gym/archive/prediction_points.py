@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,13 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import ActionRecord, Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.session.recording.header import LandmarkRow
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 ANGLE_TOLERANCE: Final = 15.0
 """Largest error of a navigation action's angle that counts as right [degrees] (paper, section 5, Evaluation)."""

@@ -13,20 +13,22 @@ import enum
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import SceneTable, Surroundings
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 Array: TypeAlias = NDArray[np.float64]
 Switches: TypeAlias = Sequence[tuple[int, bool]]

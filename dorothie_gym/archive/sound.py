@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.session.recording.events import UtteranceRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support.audio import SAMPLE_RATE, Samples, read_audio
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import UtteranceRecord
+    from dorothie_gym.session.recording.session import Session
 
 
 @shared

@@ -22,7 +22,7 @@ from dorothie_gym.baselines.tensor_files import (
     save_tensors,
 )
 from dorothie_gym.errors import CheckpointError, InputFileError, ModelFileError, one_line, short_repr
-from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.policies.policy import DESCRIPTION
 from dorothie_gym.support.files import replacing, write_atomically
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, parse_json, raising, read_json
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 import torch
@@ -16,11 +16,9 @@ from dorothie_gym.archive.corpus import Corpus, Fold
 from dorothie_gym.baselines.encoders import text_encoder
 from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
 from dorothie_gym.baselines.encoders.encoder import TextEncoder, text_table
-from dorothie_gym.baselines.model_io import TASKS, Examples
-from dorothie_gym.baselines.sound_inputs import Sound, SoundInputs
+from dorothie_gym.baselines.model_io import TASKS, TRAIN, Examples
+from dorothie_gym.baselines.sound_inputs import SoundInputs
 from dorothie_gym.errors import CheckpointError, SessionError
-from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
-from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
 from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import build
 from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable, points
 from dorothie_gym.evaluation.teacher_forced.features.sight import Sight, VisibleBoxes
@@ -29,17 +27,12 @@ from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.support.user_cache import cache_folder
 
 if TYPE_CHECKING:
+    from dorothie_gym.baselines.model_entries import Objects, Sound
     from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes
+    from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
+    from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
 
 _TABLES: Final = "texts"
-
-TRAIN: Final = "train"
-VALIDATION: Final = "val"
-TEST: Final = "test"
-
-Objects: TypeAlias = Literal["record", "boxes", "detections"]
-"""Source of the objects around the ego: all near ones in the record, those of them that the camera on the car shows, or
-those that a trained detector finds in its pictures."""
 
 
 def sight_of(objects: Objects, detector: Path | None = None) -> Sight | None:

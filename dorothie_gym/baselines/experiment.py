@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypedDict
 
 import numpy as np
 import torch
@@ -17,17 +17,15 @@ from dorothie_gym._version import __version__
 from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines.checkpoints import ModelCard, sha256_of
-from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION, Dataset
+from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.learning_curves import draw_loss_curves
-from dorothie_gym.baselines.model_io import TASKS, Predicted
-from dorothie_gym.baselines.model_zoo import ROWS, SIZES, ModelEntry, find_row, make_model, needs_pieces
-from dorothie_gym.baselines.toto.model import TOTO
+from dorothie_gym.baselines.model_entries import ROWS, SIZES, ModelEntry, find_row
+from dorothie_gym.baselines.model_io import TASKS, TEST, TRAIN, VALIDATION, Predicted
+from dorothie_gym.baselines.model_zoo import make_model, needs_pieces
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.trainer import BEST_FILE, Epoch, OnEpoch, TrainingSummary, predict, train
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.evaluation.rollout.processes import run_tasks
-from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
-from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 from dorothie_gym.evaluation.teacher_forced.labels import labels_of
 from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_predictions
 from dorothie_gym.evaluation.teacher_forced.predictions import (
@@ -43,6 +41,11 @@ from dorothie_gym.evaluation.teacher_forced.table import ResultsTable, evaluate_
 from dorothie_gym.evaluation.teacher_forced.trivial_baselines import FLOORS, predict_floor
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, raising, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.toto.model import TOTO
+    from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+    from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 
 PREDICTIONS_FILE: Final = "predictions.parquet"
 RESULT_FILE: Final = "result.json"

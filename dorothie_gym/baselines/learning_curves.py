@@ -7,13 +7,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.baselines.trainer import Epoch
 from dorothie_gym.pictures.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.pictures.palette import CAR, ROAD
 from dorothie_gym.support.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from dorothie_gym.baselines.trainer import Epoch
 
 
 def draw_loss_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.spaces.fields import SpaceLimits
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.benchmark_co_wizard.policy import BenchmarkCoWizard
     from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard
     from dorothie_gym.baselines.roles.participant.policy import LearnedParticipant
     from dorothie_gym.policies.policy import AnyPolicy
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 
 def load_benchmark_model(path: Path, role: Role, limits: SpaceLimits) -> BenchmarkCoWizard:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Final, Self, TypeAlias
+from typing import TYPE_CHECKING, Final, Self, TypeAlias
 
 import numpy as np
 import torch
@@ -12,12 +12,18 @@ from torch import Tensor
 
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.evaluation.teacher_forced.features.batch import Batch, BatchSpec, gather
-from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
-from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, NAVIGATION_ACTIONS, ArgumentKind
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+    from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 
 Inputs: TypeAlias = Mapping[str, Tensor]
 """The fields of `Batch` by name, as tensors of B points; whole numbers as int64."""
+
+TRAIN: Final = "train"
+VALIDATION: Final = "val"
+TEST: Final = "test"
 
 TASKS: Final = (Task.UFN, Task.RFN, Task.NFD)
 """The tasks in the order of their numbers in `Labels.task`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -14,17 +14,17 @@ from torch import Tensor
 from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.archive.sound import audio_files
 from dorothie_gym.archive.visibility import Task
-from dorothie_gym.baselines.encoders.encoder import SpeechEncoder
 from dorothie_gym.baselines.encoders.pretrained import HubertEncoder
 from dorothie_gym.baselines.encoders.sound import BANDS, MEL_FRAMES, SpeechEmbeddingEncoder, mel_table
 from dorothie_gym.errors import EncoderError, SessionError
-from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
-from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support.audio import read_audio
 
-Sound: TypeAlias = Literal["log-mel", "speech-embedding", "hubert"]
-"""Encoder of sound: log-mel spectra for a convolution that is trained with the model, or frozen vectors."""
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.encoders.encoder import SpeechEncoder
+    from dorothie_gym.baselines.model_entries import Sound
+    from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+    from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
+    from dorothie_gym.session.recording.session import Session
 
 
 class SoundInputs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -18,16 +18,17 @@ from torch import nn
 from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines import checkpoints
-from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION
 from dorothie_gym.baselines.gradients import backpropagate
-from dorothie_gym.baselines.model_io import allowed_angle
+from dorothie_gym.baselines.model_io import TEST, TRAIN, VALIDATION, allowed_angle
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
-from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
 from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.teacher_forced.predictions import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
 
 ENVS: Final[dict[Task, type[TeacherForcedEnv]]] = {Task.UFN: UfNEnv, Task.RFN: RfNEnv, Task.NFD: NfDEnv}
 

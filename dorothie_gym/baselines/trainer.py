@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, cast
 
 import torch
 from torch import Tensor, nn
@@ -17,7 +17,9 @@ from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.gradients import backpropagate
 from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.errors import CheckpointError
-from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
 
 BEST_FILE: Final = "best.safetensors"
 """Weights of the epoch with the lowest validation loss."""

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from dorothie_gym import maps as town_maps
 from dorothie_gym import policies as players
 from dorothie_gym import tasks
 from dorothie_gym._registration import environment_ids
 from dorothie_gym.ontology.roles import Role
+
+ROLE_MODELS: Final = ("co-wizard", "participant")
+"""Models of `train` that play a role."""
+
+VISION_MODELS: Final = ("segformer", "detr")
+"""Models of `train` that read pictures."""
 
 Completion: TypeAlias = Callable[[str], list[str]]
 """Function that returns the completions of the beginning of a word."""
@@ -44,13 +50,10 @@ def complete_policy(role: str) -> Completion:
 def complete_model(incomplete: str) -> list[str]:
     """Returns the models of `train` that begin with a text; none where torch is not installed."""
     try:
-        from dorothie_gym.baselines.model_zoo import CAMERA_ROWS, ROWS
+        from dorothie_gym.baselines.model_entries import CAMERA_ROWS, ROWS
     except ImportError:
         return []
-    from dorothie_gym.cli.train_roles import ROLES
-    from dorothie_gym.cli.train_vision import VISION_MODELS
-
-    return _names(incomplete, (*(row.command for row in (*ROWS, *CAMERA_ROWS)), *VISION_MODELS, *ROLES))
+    return _names(incomplete, (*(row.command for row in (*ROWS, *CAMERA_ROWS)), *VISION_MODELS, *ROLE_MODELS))
 
 
 def complete_algorithm(incomplete: str) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.completion import complete_model
+from dorothie_gym.cli.completion import VISION_MODELS, complete_model
 from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import (
     FAILED,
@@ -24,7 +24,7 @@ from dorothie_gym.cli.output import (
     wide_stdout,
 )
 from dorothie_gym.cli.train_roles import ROLES, train_role
-from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
+from dorothie_gym.cli.train_vision import train_vision
 from dorothie_gym.errors import CacheError, CheckpointError, EncoderError, PredictionError, ProcessError
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.evaluation import teacher_forced
@@ -32,7 +32,7 @@ from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
-    from dorothie_gym.baselines.model_zoo import ModelEntry
+    from dorothie_gym.baselines.model_entries import ModelEntry
     from dorothie_gym.baselines.trainer import Epoch
     from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 
@@ -163,7 +163,7 @@ def _train_benchmark_model(
     """Trains a row of the results table with several seeds, and prints its scores."""
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import gather_table, table_experiments
-        from dorothie_gym.baselines.model_zoo import find_row
+        from dorothie_gym.baselines.model_entries import find_row
 
         row = find_row(model)
         if row.missing:
@@ -216,7 +216,7 @@ def table(
     begun = time.perf_counter()
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import PREDICTIONS, gather_table, table_experiments
-        from dorothie_gym.baselines.model_zoo import ROWS, find_row
+        from dorothie_gym.baselines.model_entries import ROWS, find_row
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
@@ -258,7 +258,7 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
 
 def _name_former_trainings(jobs: Sequence[Experiment]) -> None:
     """Names on standard error the trainings of former versions whose rows are called otherwise, and are not resumed."""
-    from dorothie_gym.baselines.model_zoo import FORMER_COMMANDS
+    from dorothie_gym.baselines.model_entries import FORMER_COMMANDS
 
     places = {job.model: job.out for job in jobs if not (job.out / job.model).exists()}
     for former, now in FORMER_COMMANDS.items():

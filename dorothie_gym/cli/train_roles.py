@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.cli.completion import ROLE_MODELS
 from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
 from dorothie_gym.support.processors import available_processors
 
@@ -90,7 +91,7 @@ def _fits(role: str, stages: Sequence[FinishedFit]) -> RoleReport:
 
 
 ROLES: Final[Mapping[str, Callable[[Request], RoleReport]]] = MappingProxyType(
-    {"co-wizard": _train_co_wizard, "participant": _train_participant}
+    dict(zip(ROLE_MODELS, (_train_co_wizard, _train_participant), strict=True))
 )
 """Training of each learned role by the name of the model."""
 

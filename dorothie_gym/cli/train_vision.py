@@ -9,9 +9,6 @@ from typing import Any, Final
 from dorothie_gym.cli.output import Facts, exit_interrupted, fail, print_json, stage_progress, stdout, wide_stdout
 from dorothie_gym.support.processors import available_processors
 
-VISION_MODELS: Final = ("segformer", "detr")
-"""Commands of the vision models."""
-
 _FIGURES: Final[Mapping[str, Mapping[str, str]]] = {
     "segformer": {"miou": "mIoU", "macc": "mAcc", "aacc": "aAcc", "depth_error": "depth error"},
     "detr": {

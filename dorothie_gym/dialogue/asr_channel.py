@@ -9,6 +9,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rapidfuzz import process
@@ -27,8 +28,10 @@ from dorothie_gym.dialogue.recognition_errors import (
     word_class,
 )
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6

@@ -7,12 +7,15 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, SlotValue
 from dorothie_gym.ontology.vocabulary import check_complete
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Utterance
 
 ANSWER_TIMEOUT = 10.0
 """Time without an answer after which an exchange is abandoned [s] (dialogue spec, phenomenon 21)."""

@@ -10,12 +10,14 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, walk
-from dorothie_gym.ontology.slots import SlotValue
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import SlotValue
 
 
 class CommunicativeFunction(enum.StrEnum):

@@ -10,6 +10,7 @@ import functools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +23,9 @@ from dorothie_gym.dialogue.slot_realizer import Draw, SlotRealizer, draws_of
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle, default_style
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.slots import Slot, SlotValue
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import Slot, SlotValue
 
 MAX_CHARACTERS = 160
 """Longest text [characters]."""

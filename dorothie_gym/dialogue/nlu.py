@@ -6,14 +6,13 @@ import functools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.slots import (
     SLOT_VALUES,
@@ -25,6 +24,9 @@ from dorothie_gym.ontology.slots import (
     StreetName,
 )
 from dorothie_gym.ontology.spellings import parse_slot
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.realization_context import Direction
 
 _Value = TypeVar("_Value")
 

@@ -7,7 +7,7 @@ import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from dorothie_gym.dialogue.numerals import cardinal, duration, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
-from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, in_label_order
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, GoalStatus, LandmarkName, Slot, SlotValue
 from dorothie_gym.ontology.world_exceptions import PropKind
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 
 _Option = TypeVar("_Option")
 _Kind = TypeVar("_Kind")

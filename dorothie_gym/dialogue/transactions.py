@@ -17,12 +17,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
-from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.dialogue.exchanges import Exchange, ExchangeTracker
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Utterance
 
 _AIMING = frozenset(
     {DialogueMove.INSTRUCT, DialogueMove.CHECK, DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.REPLY_W}

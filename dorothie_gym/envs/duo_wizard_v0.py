@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -23,20 +23,22 @@ from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.envs.turn_based_duo_wizard import TurnBasedDuoWizard
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES
-from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.live_session import LiveSession
-from dorothie_gym.session.recording.events import Event
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
 from dorothie_gym.session.spaces.fields import UNBOUNDED, SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import Restorable, taken
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.session.live_session import LiveSession
+    from dorothie_gym.session.recording.events import Event
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.session_log import SessionSummary
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
 

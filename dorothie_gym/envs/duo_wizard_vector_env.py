@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -23,14 +23,16 @@ from dorothie_gym.session.providers import OBSERVERS, picture_spaces
 from dorothie_gym.session.rewards import term_names
 from dorothie_gym.session.scenario import Scenario, scenario_option
 from dorothie_gym.session.session_batch import SessionBatch
-from dorothie_gym.session.session_engine import SessionEngine, StepOutcome
 from dorothie_gym.session.session_log import REFUSABLE
 from dorothie_gym.session.spaces.actions import ActionMapping, action_space
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import observation_space
 from dorothie_gym.sim.traffic_rules import INFRACTION_KINDS
 from dorothie_gym.support.vector_infos import Infos, mask_of, seeds_of
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.session_engine import SessionEngine, StepOutcome
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _AGENTS = {str(role): role for role in AGENT_ROLES}
 _KINDS = tuple(kind.value for kind in INFRACTION_KINDS)

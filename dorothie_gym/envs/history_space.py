@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from gymnasium import spaces
@@ -13,14 +13,11 @@ from dorothie_gym.archive.prediction_points import WAY_LENGTH, PointView, histor
 from dorothie_gym.archive.recorded_perception import ObjectKind, last_perceived
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, U_TURN_ANGLE, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.ontology.spellings import parse_landmark, parse_street
-from dorothie_gym.session.recording.events import MoveRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.spaces.actions import NO_MOVE, ActionMapping
 from dorothie_gym.session.spaces.fields import (
     TEXT_CHARACTERS,
@@ -37,6 +34,11 @@ from dorothie_gym.session.spaces.fields import (
 from dorothie_gym.session.spaces.observations import MAX_UTTERANCE, LandmarkColumn, Observation
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.action_values import as_array
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.events import MoveRecord
+    from dorothie_gym.session.recording.session import Session
 
 HISTORY_LENGTH: Final = 16
 """Number of latest moves and physical actions in an observation."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium import spaces
@@ -15,15 +16,17 @@ from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELD_SPE
 from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps.town import Town
-from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
-from dorothie_gym.session.scenario import ResetOptions
-from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.session.spaces.fields import FieldSpec, signal
 from dorothie_gym.support.action_values import real_numbers
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.navigation.observation_fields import Vector
+    from dorothie_gym.session.config import CameraConfig
+    from dorothie_gym.session.scenario import ResetOptions
+    from dorothie_gym.session.spaces.actions import StepInfo
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 __all__ = [
     "ACCELERATION_SPECS", "CONTINUOUS_FIELDS", "CONTINUOUS_FIELD_SPECS", "CONTROLS", "CONTROL_SPECS",

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.batched_env import Towns
 from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
 from dorothie_gym.session.config import CameraConfig, RenderView
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.batched_env import Towns
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class NavigationContinuousVectorEnv(DrivingVectorEnv):

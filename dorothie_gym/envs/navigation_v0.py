@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium import spaces
@@ -12,16 +13,18 @@ from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
-from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
-from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, navigation_space
-from dorothie_gym.session.config import CameraConfig
+from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUENCY, navigation_space
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
-from dorothie_gym.session.scenario import ResetOptions
-from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.support.action_values import whole_number
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.config import CameraConfig
+    from dorothie_gym.session.scenario import ResetOptions
+    from dorothie_gym.session.spaces.actions import StepInfo
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class NavigationEnv(DrivingEnv[np.int64]):

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.batched_env import Towns
-from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
-from dorothie_gym.policies.navigation.observation_vector import navigation_space
+from dorothie_gym.policies.navigation.observation_fields import navigation_space
 from dorothie_gym.session.config import CameraConfig, RenderView
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.support.action_values import as_array
 from dorothie_gym.support.vector_infos import Infos, masked_infos
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.batched_env import Towns
+    from dorothie_gym.envs.navigation.batch import DrivingBatch
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class NavigationVectorEnv(DrivingVectorEnv):

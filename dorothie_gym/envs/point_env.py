@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -31,16 +31,18 @@ from dorothie_gym.envs.history_space import (
     encode_view,
     history_space,
 )
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import LABELS
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.rewards import ACT_TERMS, DECISION_TERMS, act_terms, decision_terms
-from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import Restorable
 from dorothie_gym.support.input_files import settings_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.scenario import ResetOptions
 
 Label: TypeAlias = dict[str, int | NDArray[np.int8]]
 """Correct prediction of a point, in the action space of the task."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Final, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from dorothie_gym import pictures  # lazy: most sessions are never drawn
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import RenderView, checked_view
-from dorothie_gym.session.live_session import LiveSession
-from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import CachedViews
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.live_session import LiveSession
+    from dorothie_gym.session.spaces.observations import Observation
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""

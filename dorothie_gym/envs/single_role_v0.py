@@ -5,25 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import Restorable, Unchanged, taken
 from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -32,12 +32,14 @@ from dorothie_gym.evaluation.teacher_forced.predictions import (
     action_labels,
 )
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.scenario import ResetOptions, check_options
-from dorothie_gym.session.spaces.actions import ActionMapping, StepInfo
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.copying import CachedViews
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.actions import ActionMapping, StepInfo
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 DEFAULT: Final = "default"
 """Name of the corpus that is generated once and kept in the user's cache folder."""

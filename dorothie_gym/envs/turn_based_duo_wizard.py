@@ -8,10 +8,10 @@ from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
 from dorothie_gym.session.spaces.actions import ActionDict
 from dorothie_gym.session.spaces.observations import Observation
-from dorothie_gym.support.copying import State
 
 if TYPE_CHECKING:
     from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.support.copying import State
 
 
 class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | None]):

@@ -248,11 +248,22 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self.transport.abort()
 
     async def send(self, message: ASGISendEvent) -> None:
-        """Sends the application's message, unless the websocket has been refused."""
+        """Sends the application's message, unless the websocket has been refused or left.
+
+        A browser may close a websocket, and the server may stop, before the application has answered the handshake.
+        Nothing can be sent then (uvicorn 0.54 tries to, and fails an assertion of websockets 17).
+        """
         await self.writable.wait()
-        if self._refused:
+        if self._refused or (self.conn.eof_sent and not self.handshake_complete):
+            self.handshake_complete = True
             raise ClientDisconnected
         await super().send(message)
+
+    def send_500_response(self) -> None:
+        """Refuses a handshake that the application does not answer, at most once."""
+        if not self._refused and not self.conn.eof_sent:
+            super().send_500_response()
+        self._refused = self.handshake_complete = True
 
     def handle_parser_exception(self) -> None:
         """Sends the reason of a refusal; further data of the browser are dropped until it has read the reason."""

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import gzip
 from functools import lru_cache
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.town_map import MapPainter
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 SCALE: Final = 8.0
 """Scale for whose details the map has polygons [px/m]."""

@@ -31,6 +31,7 @@ from starlette.requests import ClientDisconnect
 from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Lifespan, Message, Receive, Scope, Send
 from uvicorn import Config, Server
+from uvicorn.protocols.utils import ClientDisconnected
 
 from dorothie_gym.lab.admission import MOST_KNOWN, MOST_STRANGERS, Turns, Visitors
 from dorothie_gym.lab.hosts import ForeignHosts
@@ -171,7 +172,7 @@ class Outermost:
 
         try:
             await self._app(scope, receive, note_start)
-        except ClientDisconnect:
+        except (ClientDisconnect, ClientDisconnected):
             logger.debug("a client has gone before its request was complete")
             status = 400
         except asyncio.CancelledError:  # uvicorn cancels what is not over when it stops

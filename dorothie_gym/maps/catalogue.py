@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -17,8 +18,10 @@ from dorothie_gym.maps import opendrive, yaml  # lazy: their parsers are slow to
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town, check_extent
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
 """Training towns (in the paper: CARLA's Town01, Town03 and Town05)."""

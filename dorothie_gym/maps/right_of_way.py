@@ -10,12 +10,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Lane, LaneLink, LinkType, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 CIRCLE_OFFSET = 1.7
 """Three circles of radius 1.3 m, one in the middle and one this far to either side, cover a car of 5 m x 2 m [m]."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.route_arrays import SETTLED, UNREACHED, PlaceRecord, RouteSearch
 from dorothie_gym.maps.routing_graph import (
     CHANGE_LEFT,
@@ -26,6 +26,9 @@ from dorothie_gym.maps.routing_graph import (
 )
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 # --- Start and goal of a search ---------------------------------------------------------------------------------------
 

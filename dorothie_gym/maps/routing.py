@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,10 @@ from dorothie_gym.maps.routing_graph import (
     joined,
     routing_graph,
 )
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records, fields, filled_records, plain
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 __all__ = [
     "CELL",

@@ -5,14 +5,13 @@ from __future__ import annotations
 import enum
 import math
 from functools import lru_cache
-from typing import NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import across, oncoming_lanes
 from dorothie_gym.maps.model import Array, IntArray, LaneTable, LinkType
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import (
     Flag,
@@ -25,6 +24,9 @@ from dorothie_gym.support.compilation.records import (
     record_dtype,
 )
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 
 class LaneEntry(enum.StrEnum):

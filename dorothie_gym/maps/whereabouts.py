@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dorothie_gym.maps.model import NO_STREET, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 CORNER_DISTANCE = 60.0
 """Distance to the middle of a junction within which a place is near the corner [m]: half a block of the towns."""

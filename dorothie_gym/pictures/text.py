@@ -5,13 +5,16 @@ from __future__ import annotations
 import importlib.util
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.palette import Colour
 
 _FILES = {False: "DejaVuSans.ttf", True: "DejaVuSans-Bold.ttf"}
 _loaded: dict[tuple[int, bool], pygame.font.Font] = {}

@@ -4,9 +4,9 @@ from .ad_wizard import ScriptedAdWizard as ScriptedAdWizard
 from .ad_wizard import Trick as Trick
 from .co_wizard.policy import ScriptedCoWizard as ScriptedCoWizard
 from .participant.policy import ScriptedParticipant as ScriptedParticipant
+from .policy import DESCRIPTION as DESCRIPTION
 from .policy import Policy as Policy
 from .policy_loader import ALL_SCRIPTED as ALL_SCRIPTED
-from .policy_loader import DESCRIPTION as DESCRIPTION
 from .policy_loader import LANGUAGE_MODEL as LANGUAGE_MODEL
 from .policy_loader import POLICY_NAMES as POLICY_NAMES
 from .policy_loader import Loader as Loader

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from dorothie_gym.policies.observation_parser import place_on_path, read_landmar
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
 from dorothie_gym.session.spaces.actions import ActionDict, AdWizardAction, LanePosition
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping, PropColumn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import Rows
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 
 class Trick(enum.StrEnum):

@@ -10,12 +10,16 @@ too little room.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.maps.model import LinkType
-from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.route_legs import SWITCH_ROOM
 from dorothie_gym.policies.route_progress import U_TURN_SPEED_SQUARED
 from dorothie_gym.sim.ego.limits import EGO_MOVING, LEAD, u_turn_braking
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import LinkType
+    from dorothie_gym.maps.town import Town
 
 
 def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
-from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ObjectClass
@@ -22,8 +21,11 @@ from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import DENSE, FAR_SIGHT, Limit
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 def _turned(azimuth: float) -> float:

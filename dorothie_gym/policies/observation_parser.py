@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
 from dorothie_gym.dialogue.nlu import ParsedText, understand
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
@@ -27,6 +25,10 @@ from dorothie_gym.session.spaces.observations import (
 )
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import Rows
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.roles import Role
 
 PARAMETERS = tuple(WeatherParameter)
 

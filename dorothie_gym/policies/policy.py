@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeA
 
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.spaces.actions import ActionDict
 from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
 
 if TYPE_CHECKING:
     from dataclasses import replace as replace
+
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 else:
 
     def replace(state, **changes):
@@ -43,6 +44,9 @@ State = TypeVar("State")
 
 DECISION_INTERVAL: Final = 0.5
 """Time between decisions at the default decision frequency of 2 Hz [s]."""
+
+DESCRIPTION: Final = "model.json"
+"""Name of the file that describes a trained policy in its folder."""
 
 _SEED_BRANCH: Final = 2
 """Branch of the session's seed that policies draw from; the environment uses other branches."""

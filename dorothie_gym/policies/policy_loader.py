@@ -21,7 +21,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies import language_model as model_policies
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.persona import parse_traits
-from dorothie_gym.policies.policy import AnyPolicy
+from dorothie_gym.policies.policy import DESCRIPTION, AnyPolicy
 from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
@@ -95,9 +95,6 @@ def _gives_traits(name: str, role: Role) -> bool:
 
 Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], AnyPolicy]
 """Function that reads a policy from a file or folder; defined in a module, so that it can be pickled."""
-
-DESCRIPTION: Final = "model.json"
-"""Name of the file that describes the policy of a folder."""
 
 _COSTS: Final = ("steps", "seconds")
 

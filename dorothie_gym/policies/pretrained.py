@@ -127,7 +127,7 @@ def pretrained_size(name: str) -> int:
 def check_fits(name: str) -> None:
     """Raises `PolicyLoadError` if a shipped driver was trained with other observations than this version makes."""
     # imported here: the list of names is needed without the simulation
-    from dorothie_gym.policies.navigation.observation_vector import FIELDS
+    from dorothie_gym.policies.navigation.observation_fields import FIELDS
 
     trained = pretrained_card(name).observation
     if trained is None or list(trained.items()) == list(FIELDS.items()):

@@ -5,11 +5,15 @@ A route is an array of legs; its first `count` rows are in use, and the car is o
 
 from __future__ import annotations
 
-from dorothie_gym.maps.route_arrays import LegRecord, PlaceRecord
+from typing import TYPE_CHECKING
+
 from dorothie_gym.maps.routing_graph import FOLLOW, NONE, U_TURN
-from dorothie_gym.policies.route_tables import RouteTables
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import RecordArray
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.route_arrays import LegRecord, PlaceRecord
+    from dorothie_gym.policies.route_tables import RouteTables
 
 PASSED = 3.0
 """Distance behind the car from which on a goal has been passed [m]."""

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import PolicyStateError
@@ -13,7 +14,6 @@ from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, place_records
 from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
 from dorothie_gym.maps.routing_graph import LANE_ENTRIES
-from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
@@ -26,10 +26,13 @@ from dorothie_gym.policies.route_legs import (
     needs_switch,
 )
 from dorothie_gym.policies.route_tables import default_successor, is_choice, route_tables
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import LightColour, Town
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 ASTRAY = 3
 """Number of decisions off the route after which it has been left."""

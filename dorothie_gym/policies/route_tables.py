@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import IntArray
 from dorothie_gym.maps.routing_graph import NONE, RoutingLane, routing_graph
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support.compilation.records import Int32, RecordArray, argument, by_reference, filled_records
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 
 class ExitRecord:

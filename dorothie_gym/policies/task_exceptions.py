@@ -5,16 +5,19 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal, read_landmarks, read_subgoals
 from dorothie_gym.session.spaces.actions import AdWizardAction
 from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.parsing import is_shipped_story
 from dorothie_gym.tasks.storyboard import BECAUSE
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 PRESSING_DISTANCE = 150.0
 """Distance of the car from the place of a subgoal within which its exceptions are not postponed [m]."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import statistics
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
 from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
-from dorothie_gym.policies.route_progress import RouteProgress
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.route_progress import RouteProgress
 
 # Fitted to 3,600 lanes that cars of 183 scripted sessions have passed without standing, delays and pulling up by hand.
 # Of 408 times in 20 of these sessions, 83 % are right within a factor of 1.5, with a median ratio of 0.96.

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical, action_space, noop
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,16 @@ A lane before a junction offers a choice where it has several exits. On roads wi
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.routing import LaneEntry, Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, RouteProgress, lanes_beside
 from dorothie_gym.policies.route_tables import default_successor, is_choice
 from dorothie_gym.sim.network.network import side_by_side, ways_part
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 
 @lru_cache(maxsize=16)

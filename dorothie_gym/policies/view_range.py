@@ -9,13 +9,15 @@ from __future__ import annotations
 import enum
 import math
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, scalar
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.sensing.visibility import SHORTEST_SIGHT
 from dorothie_gym.sim.weather import Weather
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 FAR_SIGHT: Final = 60.0
 """Range of sight from which on an agent sees far enough [m]: it stops in time from 45 km/h."""

@@ -5,24 +5,27 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, Slot, StreetName
-from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.session.session_log import Outcome
-from dorothie_gym.session.spaces.actions import Mental
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
-from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.perception import RANGE_SCALE
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.session_log import Outcome
+    from dorothie_gym.session.spaces.actions import Mental
+    from dorothie_gym.sim.sensing.localizer import Localizer
 
 GATE = 13.82
 """Squared Mahalanobis distance that one in a thousand true statements exceeds (chi-square, 2 degrees of freedom)."""

@@ -18,17 +18,17 @@ from dorothie_gym.dialogue.conversation import Conversation, Span, Utterance
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.providers import SpokenChannel, speak_aloud
-from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.session.spaces.actions import Speech
 from dorothie_gym.session.spaces.fields import UTTERANCE_LENGTH, plain_text
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.actions import Speech
     from dorothie_gym.sim.world import World
     from dorothie_gym.support.audio import Samples
 

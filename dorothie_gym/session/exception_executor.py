@@ -4,24 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.routing import crowds, cuts_off
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind
-from dorothie_gym.session.session_log import Outcome
-from dorothie_gym.session.spaces.actions import AdWizardAction
-from dorothie_gym.sim.bodies import Prop
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.sim.population import kerb
-from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.tasks.storyboard import TaskState
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.session_log import Outcome
+    from dorothie_gym.session.spaces.actions import AdWizardAction
+    from dorothie_gym.sim.bodies import Prop
+    from dorothie_gym.sim.world import World
+    from dorothie_gym.tasks.storyboard import TaskState
 
 PROP_FROM_START = 30.0
 """Least distance of a prop from the start of its lane [m]; it leaves room for a U-turn in front of the prop."""

@@ -12,18 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from dorothie_gym.dialogue.conversation import Utterance
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.beliefs import BeliefTracker
-from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.dialogue_channel import DialogueChannel, cabin_of
 from dorothie_gym.session.exception_executor import ExceptionExecutor
 from dorothie_gym.session.observations import DeliveredMessages, SessionObserver
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
-from dorothie_gym.session.rewards import RewardTerms
 from dorothie_gym.session.scenario import Scenario, session_seeds
 from dorothie_gym.session.session_log import EventLog, SessionSummary, SubgoalTracker
 from dorothie_gym.session.spaces.actions import (
@@ -34,17 +30,21 @@ from dorothie_gym.session.spaces.actions import (
     Physical,
     RoleAction,
 )
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.sim.ego.limits import EGO_STANDING
-from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.world_arrays import WorldArrays
-from dorothie_gym.sim.traffic_rules import WorldEvent
 from dorothie_gym.sim.world import World
 from dorothie_gym.tasks.storyboard import TaskState
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Utterance
+    from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+    from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.session.rewards import RewardTerms
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import Observation
+    from dorothie_gym.sim.network.network import TownNetwork
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
+    from dorothie_gym.sim.traffic_rules import WorldEvent
 
 
 class StepBegun(NamedTuple):

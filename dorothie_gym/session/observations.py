@@ -15,10 +15,8 @@ from dorothie_gym.ontology.dialogue_acts import encode_slots
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor
-from dorothie_gym.session.beliefs import BeliefTracker
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.providers import Pictures, VisiblePerception, draw_pictures, see_by_camera
-from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import NO_MOVE
 from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH, STORY_LENGTH, SpaceLimits, plain_text
 from dorothie_gym.session.spaces.observations import (
@@ -32,13 +30,15 @@ from dorothie_gym.session.view_arrays import Mask, RoleArrays
 from dorothie_gym.session.view_steps import EVERYTHING, SessionViews
 from dorothie_gym.sim.ego.motion_control import motion_of
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.copying import CachedViews
-from dorothie_gym.tasks.storyboard import Landmark, TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+    from dorothie_gym.session.beliefs import BeliefTracker
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.sim.world import World
+    from dorothie_gym.tasks.storyboard import Landmark, TaskState
 
 
 # --- Action masks -----------------------------------------------------------------------------------------------------

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 from gymnasium import spaces
 
-from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import CameraConfig, CameraOutput
-from dorothie_gym.session.spaces.observations import Observation
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Utterance
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
     from dorothie_gym.session.dialogue_channel import CabinState
     from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.observations import Observation
     from dorothie_gym.sim.world import World
     from dorothie_gym.support.audio import Samples
 

@@ -6,26 +6,29 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps.town import LightColour, LightProgramme, Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.action_log import Decision
-from dorothie_gym.session.recording.events import Event
 from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind
-from dorothie_gym.session.recording.writer import SessionWriter
-from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, action_space, noop
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.world import World
 from dorothie_gym.support.audio import encode_flac
 from dorothie_gym.support.compilation.records import plain
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import LightColour, LightProgramme, Town
+    from dorothie_gym.session.recording.action_log import Decision
+    from dorothie_gym.session.recording.events import Event
+    from dorothie_gym.session.recording.writer import SessionWriter
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.sim.world import World
 
 _ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
 _ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST

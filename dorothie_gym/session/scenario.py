@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import gymnasium
 import numpy as np
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
 from dorothie_gym.errors import did_you_mean, short_repr
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import StreetName
-from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.config import EnvConfig
 
 STREET_NAMES = tuple(
     name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)

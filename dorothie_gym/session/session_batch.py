@@ -8,19 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.providers import FIELDS, picture_spaces
-from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.session_engine import SessionEngine, StepOutcome
-from dorothie_gym.session.spaces.actions import ActionMapping, RoleAction
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.view_arrays import RoleArrays, turn_options
 from dorothie_gym.session.view_steps import EVERYTHING, observe_share
 from dorothie_gym.sim.batch.world_rows import WorldRows
@@ -29,7 +23,15 @@ from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, taken
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.actions import ActionMapping, RoleAction
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _observe_share = direct(observe_share)
 

@@ -25,21 +25,21 @@ from dorothie_gym.session.live_session import LiveSession, StepBegun
 from dorothie_gym.session.observations import LazyObservations, RoleMask
 from dorothie_gym.session.providers import OBSERVERS, picture_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.rewards import RewardTerms, term_names
 from dorothie_gym.session.scenario import Scenario, draw_scenario, header_of, template_option
-from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDecoder, ActionMapping, RoleAction, StepInfo
 from dorothie_gym.session.spaces.fields import SpaceLimits, dict_space
 from dorothie_gym.session.spaces.observations import camera_perception_fields, observation_space
 from dorothie_gym.sim.network.network import network_of
-from dorothie_gym.sim.traffic_rules import WorldEvent
 from dorothie_gym.support.copying import Restorable
 from dorothie_gym.support.input_files import settings_of
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 if TYPE_CHECKING:
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.session_log import SessionSummary
+    from dorothie_gym.sim.traffic_rules import WorldEvent
     from dorothie_gym.support.audio import Samples
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class StepOutcome(NamedTuple):

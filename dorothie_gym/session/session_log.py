@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final, NotRequired, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Final, NotRequired, TypeAlias, TypedDict
 
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
-from dorothie_gym.session.dialogue_channel import DialogueChannel
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.sim.traffic_rules import INFRACTION_KINDS, WorldEvent, WorldEventKind
-from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.tasks.storyboard import TaskState
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.dialogue_channel import DialogueChannel
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.sim.world import World
+    from dorothie_gym.tasks.storyboard import TaskState
 
 _WORLD_EVENTS = {
     WorldEventKind.HAZARD_STOP: EventType.HAZARD_STOP,

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.actions import action_space
 from dorothie_gym.session.spaces.fields import AnySpace, Arrays, FieldBuffer, Shape, SpaceLimits
 from dorothie_gym.session.spaces.observations import ExitColumn, Observation, observation_space
 from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import CachedViews, shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 Integers: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.int8]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.observations import ExitColumn, Observation
@@ -32,17 +31,18 @@ from dorothie_gym.sim.ego.path_builder import SEARCH, last_point_before, progres
 from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
-from dorothie_gym.sim.state.records import CoursePointRecord
 from dorothie_gym.sim.state.world_arrays import WorldArrays, world_of
-from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, concurrent, direct
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.copying import CachedViews
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.records import CoursePointRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+    from dorothie_gym.sim.world import World
 
 WAYPOINT_SPACING: Final = 5.0
 """Distance between the observed waypoints of the planned path [m]."""

@@ -12,7 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numba.core import event
@@ -35,10 +35,12 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step_share
 from dorothie_gym.sim.town_env import TownEnv
-from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation.dispatcher import CompiledFunction
 from dorothie_gym.support.interruption import starting_process
 from dorothie_gym.support.processors import available_processors
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.world import World
 
 TOWN: Final = "brookside"
 """Town of the short session that is played; machine code is the same for all towns."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
 from dorothie_gym.sim.population import (
     SPEEDS,
@@ -19,13 +18,16 @@ from dorothie_gym.sim.population import (
     move_prop,
     remove_prop,
 )
-from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Walk
-from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
 from dorothie_gym.sim.traffic.respawn import is_free
 from dorothie_gym.support.copying import CachedViews
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.world_exceptions import PropKind
+    from dorothie_gym.sim.road import TownRoad
+    from dorothie_gym.sim.state.town_arrays import TownArrays
 
 MORE = 8
 """Rows by which the arrays grow when all are taken."""

@@ -19,10 +19,7 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.objects import Obstacle, RoadObject
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.world_exceptions import PropKind
-from dorothie_gym.sim.network.lane import PolylineLane
-from dorothie_gym.sim.network.network import LaneIndex, Route
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.record_views import (
@@ -39,13 +36,15 @@ from dorothie_gym.sim.state.record_views import (
 )
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED
-from dorothie_gym.sim.traffic.vehicle_models import extend, slip_of, steering_angle, take
+from dorothie_gym.sim.traffic.vehicle_models import extend, slip_of, steering_angle, take, update_lane
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import record_dtype
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.network.lane import PolylineLane
+    from dorothie_gym.sim.network.network import LaneIndex, Route
     from dorothie_gym.sim.road import TownRoad
 
 VEHICLE, PEDESTRIAN, PROP = (record_dtype(kind) for kind in (VehicleRecord, PedestrianRecord, PropRecord))

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.pedestrians.pacing import WALKER_RADIUS, WALKER_SIZE
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Walk
-from dorothie_gym.sim.state.records import PlacedBody, VehicleRecord
 from dorothie_gym.sim.state.world_arrays import log
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
@@ -21,6 +20,7 @@ from dorothie_gym.support.compilation import compiled, inlined
 if TYPE_CHECKING:
     from highway_env.vehicle.objects import RoadObject
 
+    from dorothie_gym.sim.state.records import PlacedBody, VehicleRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

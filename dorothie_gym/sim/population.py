@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import rightmost
-from dorothie_gym.maps.model import Array, Lane
-from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.world_exceptions import PropKind
-from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
@@ -35,6 +32,12 @@ from dorothie_gym.sim.traffic.respawn import SHORTEST, is_clear_of_people, is_fr
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, direct
 from dorothie_gym.support.compilation.records import RecordArray, empty_records, plain
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array, Lane
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.world_exceptions import PropKind
+    from dorothie_gym.sim.network.network import TownNetwork
 
 STREET_WAY_REACH = 1.0
 """Distance to the way beside a street within which a pedestrian is placed on it [m]."""

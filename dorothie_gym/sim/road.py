@@ -6,7 +6,7 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from highway_env.road.road import Road
@@ -18,17 +18,20 @@ from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.network.ahead import LaneChains, Neighbours, lane_zones, neighbours_on
-from dorothie_gym.sim.network.network import LaneIndex, Route, TownNetwork
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.record_views import BodyView
-from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import step_around, update_lane
+from dorothie_gym.sim.step import step_around
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.respawn import new_key, put_on_lane
+from dorothie_gym.sim.traffic.vehicle_models import update_lane
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.copying import CachedViews
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.network.network import LaneIndex, Route, TownNetwork
+    from dorothie_gym.sim.state.records import VehicleRecord
 
 
 class TownRoad(CachedViews, Road):

@@ -7,28 +7,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.collisions import collide
 from dorothie_gym.sim.ego.decision_setup import prepare
 from dorothie_gym.sim.ego.manoeuvres import note_place
 from dorothie_gym.sim.ego.motion_control import guide
-from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.sensing.localizer import localize
 from dorothie_gym.sim.state.codes import NO_SPACE, Kind, Refusal, Wait
-from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.world_arrays import note_pose, trace, world_of
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
 from dorothie_gym.sim.traffic.respawn import tow
-from dorothie_gym.sim.traffic.vehicle_models import locate, move, slip_of
+from dorothie_gym.sim.traffic.vehicle_models import move, slip_of, update_lane
 from dorothie_gym.sim.traffic_rules import watch
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.records import VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
@@ -157,24 +156,6 @@ def _go_on(town: TownArrays, vehicle: VehicleRecord, dt: float) -> None:
         return  # it stands: its lane is unchanged
     move(vehicle, dt)
     update_lane(town, vehicle)
-
-
-@inlined
-def update_lane(town: TownArrays, vehicle: VehicleRecord) -> None:
-    """Updates the closest lane of a vehicle, and its place on the lane that it follows."""
-    lane, station, lateral, segment = closest_lane(
-        town, vehicle.x, vehicle.y, vehicle.heading, vehicle.cos, vehicle.sin, vehicle.height, vehicle.lane
-    )
-    vehicle.lane, vehicle.own_station, vehicle.own_lateral = lane, station, lateral
-    if vehicle.kind == Kind.EGO:
-        vehicle.plan[0], vehicle.planned = lane, 1
-        vehicle.inside = lane if town.lanes[lane].junction >= 0 else -1
-    if lane == vehicle.plan[0]:
-        vehicle.station, vehicle.lateral, vehicle.segment = station, lateral, segment
-    else:
-        locate(town, vehicle)
-    if not town.flat and vehicle.kind != Kind.DRIVEN:
-        vehicle.height = value_near(town.points, town.lanes[lane], segment, 4, station)
 
 
 @compiled

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, TypedDict
+from typing import TYPE_CHECKING, ClassVar, TypedDict
 
 import gymnasium
 import numpy as np
@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.catalogue import load_town
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.network import LARGEST_COORDINATE, TownNetwork
 from dorothie_gym.sim.population import free_places, populate
 from dorothie_gym.sim.road import CompiledRoad
@@ -41,6 +40,9 @@ from dorothie_gym.support.action_values import real_numbers, whole_number
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, Restorable
 from dorothie_gym.support.time_limit import TimeLimited, steps_until
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 ROUNDS = 8
 """Largest number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
@@ -104,9 +106,8 @@ class Kinematics(KinematicObservation):
             vehicles_only=not self.include_obstacles,
         )
         origin = None if self.absolute else observer
-        rows_of = [observer.to_dict()]
-        for other in close[: self.vehicles_count - 1]:
-            rows_of.append(other.to_dict(origin, observe_intentions=self.observe_intentions))
+        near, intentions = close[: self.vehicles_count - 1], self.observe_intentions
+        rows_of = [observer.to_dict(), *(other.to_dict(origin, observe_intentions=intentions) for other in near)]
         rows = np.zeros((self.vehicles_count, len(self.features)))
         rows[: len(rows_of)] = [[row.get(feature, math.nan) for feature in self.features] for row in rows_of]
         if self.normalize:

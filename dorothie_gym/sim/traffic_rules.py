@@ -15,12 +15,9 @@ from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import LOOKUP_CELL, closest_segment, coordinates, value_near
-from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.codes import COLLISION, NOBODY, OFF_ROAD, RED_LIGHT, STOP_SIGN, WRONG_WAY, Colour, EventCode
-from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.records import POSE, BreachRecord, EventRecord
 from dorothie_gym.sim.state.town_arrays import OFF_ROAD_MARGIN
-from dorothie_gym.sim.state.town_records import LaneRecord, StopLineRecord
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.traffic.junctions import colour_at
 from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
@@ -30,7 +27,10 @@ from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.network.network import TownNetwork
+    from dorothie_gym.sim.state.record_views import ArrayHolder
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import LaneRecord, StopLineRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 AGAINST = pm.cos(math.radians(120.0))

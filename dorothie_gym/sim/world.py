@@ -10,15 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.batch.threads import turns_of
@@ -31,7 +28,7 @@ from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
-from dorothie_gym.sim.sensing.visibility import Visibility
+from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.sim.state.codes import NO_SPACE
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
@@ -44,13 +41,15 @@ from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, Restorable
 
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.sim.sensing.visibility import Visibility
+
 _step_share = direct(step_share)
 
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""
-
-CLARITY = complete({Sensor.BLUR: 0.25, Sensor.GPS: 1.0, Sensor.VIEW: 0.0}, Sensor, "CLARITY", __name__)
-"""Share of the signal of the view that the fault of a sensor leaves: blur halves the sight."""
 
 
 def parts_of(frames: int) -> list[int]:

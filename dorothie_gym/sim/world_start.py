@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.ego_controller import request_path
 from dorothie_gym.sim.ego.manoeuvres import BEGIN
-from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car, populate
 from dorothie_gym.sim.sensing.localizer import switch_on
-from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world, sow
 from dorothie_gym.support.compilation.records import plain
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.network.network import TownNetwork
+    from dorothie_gym.sim.state.record_views import ArrayHolder
 
 POPULATION_SEEDS = 1 << 62
 """Upper bound of the seeds of populations."""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.errors import SpeechError, did_you_mean
 from dorothie_gym.speech.flite_synthesizer import FliteSynthesizer
 from dorothie_gym.speech.hibari_synthesizer import hibari
-from dorothie_gym.speech.recognizer import Recognizer
 from dorothie_gym.speech.sphinx_recognizer import SphinxRecognizer
-from dorothie_gym.speech.synthesizer import Synthesizer
+
+if TYPE_CHECKING:
+    from dorothie_gym.speech.recognizer import Recognizer
+    from dorothie_gym.speech.synthesizer import Synthesizer
 
 _SYNTHESIZERS: Final[Mapping[str, Callable[[], Synthesizer]]] = {"hibari": hibari, "flite": FliteSynthesizer}
 

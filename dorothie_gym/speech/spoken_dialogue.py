@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.dialogue.asr_channel import UNCLASSIFIED, OpenMoves
 from dorothie_gym.dialogue.conversation import SHORTEST_SPAN, Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.dialogue_channel import CabinState, signal_to_noise
 from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
 from dorothie_gym.speech.cabin_noise import cabin_noise, mixed
-from dorothie_gym.speech.recognizer import Recognition
 from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.spoken_understanding import audible, readable
 from dorothie_gym.speech.synthesizer import Voice, say
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.audio import SAMPLE_RATE, Samples
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
+    from dorothie_gym.speech.recognizer import Recognition
 
 VOICE_RATE: Final = 3.6
 """Speaking rate of the synthesised voice [words/s], by which the rate of a session is divided; measured on 150 spans of

@@ -6,16 +6,18 @@ import functools
 from collections import defaultdict
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.conversation import INAUDIBLE
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, SlotValue
 from dorothie_gym.speech.language import punctuation_model
-from dorothie_gym.speech.recognizer import Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import written_form
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.speech.recognizer import Recognition, RecognizedWord
 
 DOUBTFUL: Final = 0.2
 """Confidence of a word below which it is probably wrong. Of the 256 shortest of 400 spans in the noise of the car, 9

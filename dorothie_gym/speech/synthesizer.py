@@ -5,13 +5,15 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
 from dorothie_gym.errors import SpeechError, did_you_mean, short_repr
-from dorothie_gym.support.audio import Samples
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.audio import Samples
 
 SLOWEST, FASTEST = 0.5, 2.0
 """Range of relative speaking rates; beyond it, synthesisers drop or smear sounds."""

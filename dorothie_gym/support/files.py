@@ -12,8 +12,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from dorothie_gym.errors import OutputFolderError
-
 PART: Final = ".part"
 """Ending of the name of a file or folder that is being written."""
 
@@ -137,30 +135,3 @@ def new_folder(folder: Path, *, hidden: bool = False) -> Iterator[Path]:
         raise
     finally:
         shutil.rmtree(part, ignore_errors=True)
-
-
-@contextmanager
-def noticing_deletion(folder: Path) -> Iterator[None]:
-    """Raises `OutputFolderError` if a folder was deleted or replaced inside the block, whatever else failed there."""
-    deleted = f"{folder}: the folder was deleted or replaced while it was being written; run the command again"
-    before = _identity(folder)
-    try:
-        yield
-    except Exception as error:
-        if _identity(folder) == before:
-            raise
-        raise OutputFolderError(deleted) from error
-    if _identity(folder) != before:
-        raise OutputFolderError(deleted)
-
-
-def _identity(folder: Path) -> tuple[int, int] | None:
-    """Returns numbers that belong to a folder as long as it exists; None without a folder."""
-    try:
-        found = folder.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    return found.st_dev, found.st_ino
-
-
-# --- Processors -------------------------------------------------------------------------------------------------------

@@ -25,8 +25,10 @@ from typing import Final, TypeVar
 import msgspec
 
 from dorothie_gym.errors import DorothieGymError, InputFileError, one_line
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.libraries import pa, pc, pq
+
+if typing.TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 _T = TypeVar("_T")
 

@@ -22,7 +22,7 @@ from typing import Final, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.support.compilation import portable
+from dorothie_gym.support.compilation.dispatcher import portable
 
 __all__ = [
     "acos",

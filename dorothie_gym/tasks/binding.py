@@ -6,11 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.errors import StoryboardError
-from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in, map_labels
 from dorothie_gym.tasks.storyboard import (
@@ -25,6 +25,9 @@ from dorothie_gym.tasks.storyboard import (
     fill,
     variable_of,
 )
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import LandmarkName
 
 
 def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -> dict[str, LandmarkName]:

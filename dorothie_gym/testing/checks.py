@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import tempfile
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from dorothie_gym.archive.comparison import first_difference
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
@@ -18,10 +18,12 @@ from dorothie_gym.policies.policy import AnyPolicy, Policy, policy_inputs
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.observations import ObservationMapping
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.testing.playing import first_unequal, play_scripted
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.observations import ObservationMapping
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 State = TypeVar("State")
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
@@ -28,6 +27,9 @@ from dorothie_gym.testing.playing import (
     play_random,
     play_scripted,
 )
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 CO_WIZARD = str(Role.CO_WIZARD)
 AD_WIZARD = str(Role.AD_WIZARD)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.scenario import Scenario
 
 ByAgent: TypeAlias = dict[str, ActionDict]
 """Observations, infos or actions of all agents."""

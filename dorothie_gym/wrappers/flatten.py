@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, SupportsFloat, TypeAlias
+from typing import TYPE_CHECKING, Any, SupportsFloat, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -12,10 +12,12 @@ from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from dorothie_gym.session.spaces.actions import StepInfo
-from dorothie_gym.session.spaces.fields import AnySpace
 from dorothie_gym.session.spaces.flat import Flat, FlatActions, FlatMask, FlatObservations, Unflattened
 from dorothie_gym.support.action_values import whole_numbers
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.spaces.actions import StepInfo
+    from dorothie_gym.session.spaces.fields import AnySpace
 
 AnyEnv: TypeAlias = gym.Env[Any, Any]
 """Environment whose spaces are not known statically."""

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.spaces.actions import ActionDict, StepInfo, noop
 from dorothie_gym.session.spaces.flat import Flat, FlatActions, FlatObservations
-from dorothie_gym.session.spaces.observations import Observation
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.session.spaces.observations import Observation
 
 FlatVector: TypeAlias = NDArray[np.float32]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Protocol, TypeAlias, cast
+from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,13 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.session.recorder import SessionRecorder
-from dorothie_gym.session.recording.events import Event
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.writer import SessionWriter
 from dorothie_gym.session.spaces.actions import ActionDict, StepInfo
 from dorothie_gym.session.spaces.observations import Observation
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import Event
+    from dorothie_gym.session.recording.header import SessionHeader
 
 ResetResult: TypeAlias = tuple[dict[str, Observation], dict[str, StepInfo]]
 StepResult: TypeAlias = tuple[

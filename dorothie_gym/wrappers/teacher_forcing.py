@@ -5,27 +5,29 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.archive.prediction_points import Point, task_points
 from dorothie_gym.archive.visibility import Task
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError, StateError
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.recorder import LightStates, actors_around
-from dorothie_gym.session.recording.events import Event
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
 from dorothie_gym.session.recording.trajectory import trajectory_of
-from dorothie_gym.session.spaces.actions import StepInfo
-from dorothie_gym.session.spaces.fields import SpaceLimits
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.events import Event
+    from dorothie_gym.session.spaces.actions import StepInfo
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 MAX_SILENT_SESSIONS = 20
 """Largest number of consecutive sessions without a point of the task before an error is raised."""

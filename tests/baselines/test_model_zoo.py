@@ -2,7 +2,15 @@ import re
 
 import pytest
 
-from dorothie_gym.baselines.model_zoo import ALL_ROWS, CAMERA_ROWS, FORMER_COMMANDS, ROWS, SIZES, find_row, stored_row
+from dorothie_gym.baselines.model_entries import (
+    ALL_ROWS,
+    CAMERA_ROWS,
+    FORMER_COMMANDS,
+    ROWS,
+    SIZES,
+    find_row,
+    stored_row,
+)
 from dorothie_gym.baselines.toto import ALL_CHANNELS, Channel
 from dorothie_gym.evaluation.teacher_forced import paper_figures
 from dorothie_gym.evaluation.teacher_forced.paper_comparison import COUNTERPARTS, paper_name

@@ -3,8 +3,8 @@ from dataclasses import replace
 import pytest
 import torch
 
+from dorothie_gym.baselines.model_entries import ROWS, find_row
 from dorothie_gym.baselines.model_io import NFD, Outputs, allowed_angle, decode
-from dorothie_gym.baselines.model_zoo import ROWS, find_row
 from dorothie_gym.baselines.toto import (
     ABLATIONS,
     ALL_CHANNELS,

@@ -20,7 +20,7 @@ EDITS = (
         "dorothie_gym/sim/world.py",
         "Sensor.VIEW: 0.0}, Sensor",
         "Sensor.VIEW: 0.0, Sensor.GLARE: 0.5}, Sensor",
-        r"CLARITY of dorothie_gym/sim/world\.py .* Sensor\.GLARE",
+        r"CLARITY of dorothie_gym/sim/sensing/visibility\.py .* Sensor\.GLARE",
     ),
     Edit(
         "dorothie_gym/dialogue/data/talk/36_around.talk",
@@ -84,4 +84,4 @@ def test_first_error_names_the_effect_of_a_fault(tmp_path: Path) -> None:
     copy = WorkingCopy(tmp_path)
     copy.edit(EDITS[0])
     error = copy.first_error("import dorothie_gym.sim.world")
-    assert "CLARITY of dorothie_gym/sim/world.py" in error and "Sensor.GLARE" in error
+    assert "CLARITY of dorothie_gym/sim/sensing/visibility.py" in error and "Sensor.GLARE" in error

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.navigation.dashboard import AHEAD, FAR, FASTEST, NEAR, PANEL, PASSED, Readings, draw_dashboard
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.navigation import NavigationAction
-from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from tests.envs.navigation_drivers import stops_in_time
 
 Panel = NDArray[np.uint8]

@@ -8,8 +8,9 @@ import torch
 
 from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel
 from dorothie_gym.baselines.checkpoints import restore
-from dorothie_gym.baselines.dataset import TEST, Dataset
+from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.experiment import Experiment, task_predictions
+from dorothie_gym.baselines.model_io import TEST
 from dorothie_gym.baselines.model_zoo import build_model
 from dorothie_gym.baselines.trainer import predict
 from dorothie_gym.evaluation.teacher_forced import write_predictions

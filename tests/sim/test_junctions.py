@@ -20,8 +20,8 @@ from dorothie_gym.sim.state.codes import Kind, Wait
 from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
-from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
+from dorothie_gym.sim.traffic.vehicle_models import update_lane
 from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventKind
 from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation.records import RecordArray

@@ -9,9 +9,10 @@ import stat
 import struct
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.session.recording.validation import ReadReport
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.validation import ReadReport
 
 AUDIO_FOLDERS: Final = ("utterance", "audio")
 """Folders of a session with its utterances, in the release and in the sample layout."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.archive.sdn.files import (
     CONFIG_FILE,
@@ -19,12 +19,14 @@ from dorothie_gym.archive.sdn.files import (
     whole_of,
 )
 from dorothie_gym.archive.sdn.landmark_names import landmark_name
-from dorothie_gym.archive.sdn.trajectory import SdnMap
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.spellings import parse_street
 from dorothie_gym.session.recording.header import LandmarkRow, SessionHeader, SubgoalRow
-from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.sdn.trajectory import SdnMap
+    from dorothie_gym.session.recording.validation import ReadReport
 
 _KNOWN: Final = {
     "environment", "map", "street_names", "departure", "landmarks", "start_frame", "end_frame", "weather", "npc_count",

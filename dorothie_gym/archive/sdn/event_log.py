@@ -6,9 +6,8 @@ import itertools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.archive.sdn.audio import AudioFiles
 from dorothie_gym.archive.sdn.files import (
     MORE,
     OURS,
@@ -37,6 +36,9 @@ from dorothie_gym.ontology.vocabulary import normalise
 from dorothie_gym.session.recording.events import Event, EventType, check_event
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.recording.validation import ReadReport
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.sdn.audio import AudioFiles
 
 RIGHT: Final = 2
 """Value of a LaneSwitch to the right; 1 and 3 are left (spec: sdn-format)."""

@@ -9,12 +9,14 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.session.recording.files import MAX_EVENTS, MAX_FRAME, decode_text, read_bytes
-from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support.input_files import LONG_NUMBER, MAX_DEPTH, MAX_DIGITS, check_value_count, raising
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.validation import ReadReport
 
 CONFIG_FILE: Final = "config.json"
 LOG_FILE: Final = "annotated_log.json"

@@ -6,9 +6,8 @@ import bisect
 from collections import defaultdict
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.archive.sdn.audio import AudioFiles
 from dorothie_gym.archive.sdn.files import (
     MORE,
     JsonObject,
@@ -24,7 +23,10 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_act, parse_move
 from dorothie_gym.session.recording.trajectory import TENTHS
-from dorothie_gym.session.recording.validation import ReadReport
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.sdn.audio import AudioFiles
+    from dorothie_gym.session.recording.validation import ReadReport
 
 SDN_WORDS_PER_SECOND: Final = 2.5
 """Speech rate of people, for utterances without a recorded duration [words/s] (spec: design, Time)."""

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.archive.sdn.event_log import goals_of, plan_of
 from dorothie_gym.archive.sdn.files import (
@@ -32,7 +32,9 @@ from dorothie_gym.session.recording.events import Event, EventType
 from dorothie_gym.session.recording.files import MAX_EVENTS
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.session.recording.validation import ReadReport
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.validation import ReadReport
 
 _PROP: Final = ("id", "x", "y", "z", "pitch", "yaw", "roll")
 _AREA: Final = ("x0", "x1", "y0", "y1")

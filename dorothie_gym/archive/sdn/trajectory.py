@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,17 @@ from numpy.typing import NDArray
 from dorothie_gym.archive.sdn.files import number_of, read_csv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.model import NO_STREET, LinkType
-from dorothie_gym.maps.town import Town
 from dorothie_gym.session.recording.files import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.session.recording.frames import read_frames, write_frames
 from dorothie_gym.session.recording.header import NO_LANE
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import Surroundings
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TENTHS, TRAJECTORY_DTYPE, Trajectory
-from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.recording.validation import ReadReport
 
 MAX_LANE_DISTANCE: Final = 10.0
 """Largest distance of a position from the lane that it is assigned to [m]."""

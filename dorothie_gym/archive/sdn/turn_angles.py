@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dorothie_gym.archive.sdn.trajectory import CarPoses, SdnMap
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.session.recording.events import Event, EventType
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.sdn.trajectory import CarPoses, SdnMap
 
 MIN_CLEAR_TURN: Final = 30.0
 """Angles and turns from here to `MAX_CLEAR_TURN` distinguish left from right [degrees]."""

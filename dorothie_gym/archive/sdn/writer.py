@@ -8,7 +8,7 @@ import re
 import shutil
 from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -29,18 +29,20 @@ from dorothie_gym.archive.sdn.landmark_names import asset_of
 from dorothie_gym.archive.sdn.trajectory import CSV_COLUMNS, write_scene
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import SPEED_STEP, ArgumentKind, MentalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_mental_action, parse_physical_action, parse_prop
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import Event, EventType
 from dorothie_gym.session.recording.files import AUDIO_FOLDER, EVENTS_FILE, canonical
-from dorothie_gym.session.recording.header import LandmarkRow, SessionHeader
 from dorothie_gym.session.recording.session import Session, new_session_folder
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 from dorothie_gym.support.audio import encode_flac, read_audio
 from dorothie_gym.support.files import write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.header import LandmarkRow, SessionHeader
 
 _ACT: Final = ("move", "slots", "exchange", "transaction", "span", "utterance", "start", "end")
 _SAID: Final = (*_ACT, "text", "recognised", "sdn", "sdn_act")

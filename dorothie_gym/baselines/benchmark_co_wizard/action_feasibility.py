@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit, LinkType
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
 from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import Choice, direction_of, lanes_beside
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 AT_END: Final = 6.0
 """Distance to a junction below which a standing car has no room to drive up to it [m]."""

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import DECISION_INTERVAL
 from dorothie_gym.policies.route_progress import Choice, stopping_distance
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 BEFORE_JUNCTION: Final = 40.0
 """Distance to a junction without a planned turn at which a decision is triggered [m]."""

@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from dorothie_gym.baselines.benchmark_co_wizard.observation_frames import header_of, observed_frame
 from dorothie_gym.dialogue.conversation import Span, speech_seconds
-from dorothie_gym.evaluation.teacher_forced.features.batch import HistorySizes
 from dorothie_gym.evaluation.teacher_forced.features.incremental import IncrementalColumns, ObservedFrame
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, ArgumentKind, PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.session.recording.events import ActionRecord, MoveRecord, UtteranceRecord
 from dorothie_gym.session.spaces.actions import Physical, Speech
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.batch import HistorySizes
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 _TAKES_ANGLE = (ArgumentKind.ANGLE, ArgumentKind.SIDE)
 _TAKES_UP = (ArgumentKind.SPEED_STEP, ArgumentKind.SWITCH)

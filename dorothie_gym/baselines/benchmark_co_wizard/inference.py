@@ -7,28 +7,31 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import torch
 
 from dorothie_gym.archive.visibility import Task
-from dorothie_gym.baselines.benchmark_co_wizard.history import History
 from dorothie_gym.baselines.checkpoints import ModelCard, restore, sha256_of
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.encoders import text_encoder
 from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
-from dorothie_gym.baselines.encoders.encoder import TextEncoder, Vectors
+from dorothie_gym.baselines.model_entries import stored_row
 from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
-from dorothie_gym.baselines.model_zoo import build_model, refresh_text_tables, stored_row
+from dorothie_gym.baselines.model_zoo import build_model, refresh_text_tables
 from dorothie_gym.baselines.toto.config import TOTOConfig
-from dorothie_gym.baselines.toto.model import TOTO
 from dorothie_gym.errors import CheckpointError, DorothieGymError, ModelFileError, one_line
-from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
 from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable, points
 from dorothie_gym.evaluation.teacher_forced.features.session_columns import town_graph
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support.input_files import MAX_WEIGHTS, check_file, raising
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.benchmark_co_wizard.history import History
+    from dorothie_gym.baselines.encoders.encoder import TextEncoder, Vectors
+    from dorothie_gym.baselines.toto.model import TOTO
+    from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+    from dorothie_gym.maps.town import Town
 
 _TOWNS: Final = 4
 """Largest number of towns that a model is kept ready for."""

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.teacher_forced.features.incremental import ObservedFrame
-from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.session.recorder import LightStates
 from dorothie_gym.session.recording.header import LandmarkRow, SessionHeader
 from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, WEATHER_DTYPE, ActorKind, Rows, light_rows
 from dorothie_gym.session.spaces.observations import LandmarkColumn, ObjectColumn, ObservationMapping
 from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import LightColour, Town
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _KINDS: Final = {
     ObjectClass.VEHICLES.value: ActorKind.VEHICLE,

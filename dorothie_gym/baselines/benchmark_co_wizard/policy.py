@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines.benchmark_co_wizard.action_feasibility import FeasibleAction, feasible_action
 from dorothie_gym.baselines.benchmark_co_wizard.decision_trigger import TriggerState
 from dorothie_gym.baselines.benchmark_co_wizard.history import History, HistoryTracker
-from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel, TownModel
-from dorothie_gym.baselines.model_io import Predicted
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act, guess_spans
 from dorothie_gym.dialogue.realization_context import Wording
@@ -33,9 +31,13 @@ from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping, heard_acts
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel, TownModel
+    from dorothie_gym.baselines.model_io import Predicted
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 _DIRECTION_VALUES: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 """Slot values whose wording contains a direction."""

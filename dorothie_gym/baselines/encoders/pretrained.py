@@ -10,15 +10,17 @@ import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.encoders.encoder import Vectors
 from dorothie_gym.errors import EncoderError
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.encoders.encoder import Vectors
 
 BATCH: Final = 64
 """Number of items that are encoded at once, of similar length to reduce padding."""

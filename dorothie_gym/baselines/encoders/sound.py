@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 import torch
@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.encoders.encoder import Vectors
 from dorothie_gym.errors import EncoderError
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.encoders.encoder import Vectors
 
 RATE: Final = 16000
 """Samples per second of all sounds."""

@@ -4,4 +4,3 @@ from .features import ExitTable as ExitTable
 from .features import exit_table as exit_table
 from .features import mentions as mentions
 from .model import JunctionReader as JunctionReader
-from .model import reader_config as reader_config

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import torch
@@ -15,11 +15,13 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders.byte_pairs import words
-from dorothie_gym.baselines.model_io import Inputs
-from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LENGTH, EdgeType
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.model_io import Inputs
+    from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 
 _PARTS: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+")
 

@@ -6,8 +6,7 @@ Letters in shapes: B points, X exits of the next junction, P pieces of a text, d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import torch
 from torch import Tensor, nn
@@ -35,14 +34,16 @@ from dorothie_gym.baselines.model_io import (
     allowed_angle,
     likeliest,
 )
-from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.losses import angle_error
 from dorothie_gym.baselines.toto.model import TOTO, Tokens
-from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.toto.towns import POSITION_UNIT, Towns
 from dorothie_gym.evaluation.teacher_forced.features.columns import CO_WIZARD, PARTICIPANT, Columns
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.toto.config import TOTOConfig
+    from dorothie_gym.baselines.toto.texts import FrozenTexts
 
 WORD_BY_WORD: Final = 3
 """Number of utterances that are encoded piece by piece: the current one and the two before it."""
@@ -356,12 +357,6 @@ class JunctionReader(TOTO):
              there.sum(1) / EXITS, (ahead / 30.0).clamp(max=3.0), (inputs["current_text"] >= 0).float(),
              known.float(), torch.exp(-far / _AT_PLACE) * known), dim=-1,
         )  # fmt: skip
-
-
-def reader_config(config: TOTOConfig) -> TOTOConfig:
-    """Returns the reader's config from TOTO's: equal sizes, times back from the point, and a larger weight of slots."""
-    channels = tuple(channel for channel in config.channels if channel is not Channel.SPEECH)
-    return replace(config, channels=channels, clock="point", loss=replace(config.loss, slot_values=0.3))
 
 
 def _newest(values: Tensor, mask: Tensor, back: int = 1) -> Tensor:

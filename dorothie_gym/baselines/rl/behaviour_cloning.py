@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import torch
@@ -14,19 +14,21 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines.gradients import backpropagate
-from dorothie_gym.baselines.rl.checkpoint import Model, Network
 from dorothie_gym.baselines.rl.run import OnStage, ignore_stage
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.rollout.replay import watch_session
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.actions import NavigationAction
 from dorothie_gym.policies.navigation.demonstrations import Demonstration, DemonstrationRecorder
-from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
-from dorothie_gym.session.recording.session import Session
+from dorothie_gym.policies.navigation.observation_fields import MAX_SECONDS, Vector
 from dorothie_gym.session.spaces.actions import CoWizardAction
 from dorothie_gym.session.spaces.fields import SpaceLimits
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.rl.checkpoint import Model, Network
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 NOTHING: Final = int(NavigationAction.NOTHING)
 """Number of the action "nothing" in every action space."""

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import torch
 from stable_baselines3.common.vec_env import VecEnv
@@ -27,7 +27,6 @@ from dorothie_gym.baselines.rl.settings import (
     Page,
     TrainingSettings,
 )
-from dorothie_gym.baselines.rl.vector_env import AnyEnv
 from dorothie_gym.baselines.tensor_files import (
     check_optimiser,
     check_tensors,
@@ -37,9 +36,12 @@ from dorothie_gym.baselines.tensor_files import (
     save_tensors,
 )
 from dorothie_gym.errors import ModelFileError, SettingsError, one_line, short_repr
-from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.policies.policy import DESCRIPTION
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, raising, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.rl.vector_env import AnyEnv
 
 Model: TypeAlias = Any
 """Algorithm of stable-baselines3 or sb3-contrib: algorithms differ in attributes, and sb3-contrib has no types."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, SupportsFloat
+from typing import TYPE_CHECKING, Any, Final, SupportsFloat
 
 import gymnasium as gym
 import numpy as np
@@ -19,13 +19,15 @@ import dorothie_gym
 from dorothie_gym._registration import environments
 from dorothie_gym.baselines.rl.repeatable_batch import RepeatableVecEnv
 from dorothie_gym.baselines.rl.sb3_vec_env import unrelated_seeds
-from dorothie_gym.baselines.rl.settings import Arguments, Page, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv, make_vector_env
 from dorothie_gym.errors import ModelFileError, SettingsError, short_repr
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.policies.navigation.observation_fields import Vector
 from dorothie_gym.policies.policy_loader import find_player
 from dorothie_gym.session.spaces.fields import UNBOUNDED, SpaceLimits
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.rl.settings import Arguments, Page, TrainingSettings
 
 ENVIRONMENTS_OF_MODELS: Final = frozenset(
     f"dorothie_gym/{name}-v0"

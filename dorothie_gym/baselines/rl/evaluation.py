@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.rl.checkpoint import Model
 from dorothie_gym.baselines.rl.environments import EnvFactory, each_town, has_batch, make_batch, masks_of
-from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.rl.vector_env import MakeEnv
 from dorothie_gym.evaluation.analysis.intervals import wilson_interval
-from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.policies.navigation.observation_fields import Vector
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.rl.checkpoint import Model
+    from dorothie_gym.baselines.rl.settings import TrainingSettings
+    from dorothie_gym.baselines.rl.vector_env import MakeEnv
 
 FIRST_SEED: Final = 1_000_000
 """Seed of the first episode of an evaluation; training uses smaller seeds."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -13,15 +14,17 @@ from dorothie_gym.baselines.rl.environments import ROLE_ENVIRONMENTS, squashed
 from dorothie_gym.baselines.rl.evaluation import greedy_policy
 from dorothie_gym.baselines.rl.settings import NAVIGATION, TrainingSettings
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
-from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
+from dorothie_gym.policies.navigation.observation_fields import MAX_SECONDS, Vector
 from dorothie_gym.policies.policy import AnyPolicy, Policy
 from dorothie_gym.session.spaces.actions import ActionDict, action_space, noop
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.flat import FlatActions, FlatObservations
 from dorothie_gym.session.spaces.observations import ObservationMapping, observation_space
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 
 def make_player(path: Path, role: Role, limits: SpaceLimits) -> AnyPolicy:

@@ -16,7 +16,7 @@ from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics
 from dorothie_gym.baselines.rl.resumption import CHECKPOINT, Checkpoint, Tensors, read_checkpoint, write_checkpoint
 from dorothie_gym.baselines.rl.settings import Page, TrainingSettings
 from dorothie_gym.errors import ModelFileError, one_line
-from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.policies.policy import DESCRIPTION
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import checked, raising
 

@@ -31,7 +31,7 @@ from dorothie_gym.baselines.rl.run import (
 )
 from dorothie_gym.baselines.rl.settings import FINAL_ENTROPY, TrainingSettings
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
+from dorothie_gym.policies.navigation.observation_fields import MAX_SECONDS
 
 LOGGED_STEPS: Final = 1024
 """Approximate number of steps between TensorBoard records of on-policy algorithms."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
 from dorothie_gym.baselines.model_io import NFD, RFN, Labels, Outputs
-from dorothie_gym.baselines.toto.config import LossWeights, TOTOConfig
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS, VECTOR_SLOTS
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.toto.config import LossWeights, TOTOConfig
 
 _ROOT_OFFSET: Final = 1e-6
 """Summand under a root, so that its slope stays finite at 0."""

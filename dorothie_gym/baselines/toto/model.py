@@ -7,7 +7,7 @@ that is True where there is a token, and times (B, n) [s].
 
 from __future__ import annotations
 
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import torch
 from torch import Tensor, nn
@@ -17,12 +17,14 @@ from dorothie_gym.baselines.model_io import Inputs, Labels, Outputs, Predicted, 
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import Block, GraphAttention, segment_softmax, time_encoding
 from dorothie_gym.baselines.toto.losses import point_losses
-from dorothie_gym.baselines.toto.texts import Texts
 from dorothie_gym.baselines.toto.towns import ANGLE_UNIT, POSITION_UNIT, Towns
 from dorothie_gym.baselines.trainer import Model
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import LABELS, SLOT_SPANS, VECTOR_SLOTS, DialogueMove
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.toto.texts import Texts
 
 Tokens: TypeAlias = tuple[Tensor, Tensor, Tensor]
 """Tokens (B, n, d), their mask (B, n), their times (B, n) [s]."""

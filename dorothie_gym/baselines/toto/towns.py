@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.model_io import tensor
-from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 from dorothie_gym.maps.lane_graph import FEATURES
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 
 POSITION_UNIT: Final = 100.0
 """Unit of places in a model [m]: towns are some hundred metres wide."""

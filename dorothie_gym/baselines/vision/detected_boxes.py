@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import torch
@@ -21,23 +21,25 @@ from numpy.typing import NDArray
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.trainer import BEST_FILE
 from dorothie_gym.baselines.vision.detector import KINDS, Detector
-from dorothie_gym.baselines.vision.experiment import load_detector, load_segformer
 from dorothie_gym.baselines.vision.object_learner import distinct_queries, focals_of
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import spaces_of
+from dorothie_gym.baselines.vision.trained import load_detector, load_segformer
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.evaluation.teacher_forced.features.sight import drawing_digest
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.session.config import CameraConfig, CameraOutput
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind, Rows, SceneTable
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.portable_math import wrap_radians
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.camera.pose import View
+    from dorothie_gym.session.recording.session import Session
 
 CYCLIST_WIDTH: Final = 1.0
 """Width below which a vehicle counts as a cyclist: the detector does not distinguish them [m]."""

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import torch
 
@@ -16,16 +16,16 @@ from dorothie_gym._version import __version__
 from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.trainer import BEST_FILE
-from dorothie_gym.baselines.vision.detector import Detector, DetectorConfig
+from dorothie_gym.baselines.vision.detector import DetectorConfig
 from dorothie_gym.baselines.vision.frames import FrameSampling, FrameSet, OnFrames, load_frames
 from dorothie_gym.baselines.vision.object_learner import LEAST_PIXELS, ObjectLearner, detected_boxes, object_figures
 from dorothie_gym.baselines.vision.pixel_learner import PixelLearner, pixel_scores
 from dorothie_gym.baselines.vision.predicted_pixels import with_predictions
 from dorothie_gym.baselines.vision.segformer import SegFormer, SegFormerConfig
+from dorothie_gym.baselines.vision.trained import load_segformer, stored_config
 from dorothie_gym.baselines.vision.training import OnStep, train_learner
-from dorothie_gym.errors import CheckpointError, SessionError, one_line
+from dorothie_gym.errors import SessionError, one_line
 from dorothie_gym.support.files import write_atomically
-from dorothie_gym.support.input_files import checked, raising
 
 MODELS: Final = ("segformer", "detr")
 """Commands of the vision models."""
@@ -103,7 +103,7 @@ def check_experiment(job: VisionExperiment) -> None:
     except (RuntimeError, AssertionError) as error:
         raise ValueError(f"the device {job.device!r} cannot be used ({one_line(error)}); choose another") from None
     if job.reads_predictions:
-        _config(job.segformer, SegFormerConfig)
+        stored_config(job.segformer, SegFormerConfig)
 
 
 def run_vision_experiment(
@@ -196,37 +196,6 @@ def sampling_of(config: SegFormerConfig | DetectorConfig) -> FrameSampling:
         most=_OBJECT_MOST,
         pixels=LEAST_PIXELS,
     )
-
-
-def load_segformer(folder: Path, device: torch.device) -> SegFormer:
-    """Returns a trained SegFormer.
-
-    Raises:
-        CheckpointError: the folder holds none.
-    """
-    model = SegFormer(_config(folder, SegFormerConfig))
-    checkpoints.restore(folder / BEST_FILE, model)
-    return model.to(device).eval()
-
-
-def load_detector(folder: Path, device: torch.device) -> Detector:
-    """Returns a trained Deformable DETR.
-
-    Raises:
-        CheckpointError: the folder holds none.
-    """
-    model = Detector(_config(folder, DetectorConfig))
-    checkpoints.restore(folder / BEST_FILE, model)
-    return model.to(device).eval()
-
-
-def _config(folder: Path, kind: Any) -> Any:
-    path = folder / BEST_FILE
-    if not path.is_file():
-        name = "segformer" if kind is SegFormerConfig else "detr"
-        raise CheckpointError(f"{path}: is missing; run first: dorothie-gym train {name} with the same --out")
-    with raising(lambda message: CheckpointError(f"{message}; delete it")):
-        return checked(checkpoints.about(path).get("config"), kind, path)
 
 
 def _check_folds(folds: Mapping[str, FrameSet], corpus: Path) -> None:

@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +25,14 @@ from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.maps.cache import pack, package_sources
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.spellings import parse_sensor
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.pictures.camera.array_cache import builder_digest
-from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes
 from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.recording.events import EventType
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.world import CLARITY
+from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import MIB
 from dorothie_gym.support.portable_math import wrap_radians
@@ -50,6 +46,12 @@ from dorothie_gym.support.user_cache import (
     remove_least_used,
     seal,
 )
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+    from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes
+    from dorothie_gym.session.recording.session import Session
 
 OnFrames: TypeAlias = Callable[[int, int], None]
 """Called with the numbers of finished and of all sessions."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import torch
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.vision.frames import FrameSet, Pictures
 from dorothie_gym.baselines.vision.metrics import PixelScores
 from dorothie_gym.baselines.vision.segformer import SegFormer, SegFormerConfig, normalised
 from dorothie_gym.baselines.vision.training import Learner
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.vision.frames import FrameSet, Pictures
 
 VALIDATED: Final = 120
 """Largest number of validation pictures after an epoch, evenly chosen."""

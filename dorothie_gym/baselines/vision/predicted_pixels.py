@@ -5,14 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.baselines.vision.frames import FrameSet, SessionFrames
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
-from dorothie_gym.baselines.vision.segformer import SegFormer
 from dorothie_gym.support.files import replacing
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.vision.segformer import SegFormer
 
 _AT_ONCE: Final = 8  # pictures
 

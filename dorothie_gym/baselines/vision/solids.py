@@ -10,7 +10,7 @@ picture.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import torch
@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dorothie_gym.baselines.vision.frames import SPACE_COLUMNS
-from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.support.portable_math import wrap_radians
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.config import CameraConfig
 
 SOLID: Final = 8
 """Number of columns of a solid."""

@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.routing_graph import RoutingLane
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import (
     KINDS,
@@ -26,24 +24,26 @@ from dorothie_gym.policies.ad_wizard import (
     idle_until,
     suits_roadblock,
 )
-from dorothie_gym.policies.navigation.instructor_arrays import MarkRecord
 from dorothie_gym.policies.observation_parser import place_ahead
 from dorothie_gym.policies.policy import policy_seed, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception
-from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import ActionDecoder, RoleAction
 from dorothie_gym.session.spaces.fields import STORY_LENGTH, SpaceLimits, plain_text
-from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.session.view_steps import write_lanes
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.path_builder import last_point_before
 from dorothie_gym.sim.randomness import POOL, draw_share, seed_stream
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
-from dorothie_gym.tasks.storyboard import TaskState
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.routing_graph import RoutingLane
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.navigation.instructor_arrays import MarkRecord
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.observations import Observation
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+    from dorothie_gym.tasks.storyboard import TaskState
 
 _CONFIG: Final = AdWizardConfig()
 _SPACING, _EXPIRES, _MOST_ROADBLOCKS = _CONFIG.spacing, _CONFIG.expires_after, _CONFIG.most_roadblocks

@@ -9,17 +9,15 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELDS
 from dorothie_gym.envs.navigation.dashboard import Readings, show_dashboard
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.pictures import camera  # lazy: most environments have no camera
 from dorothie_gym.policies.navigation.junction_exits import nearest_sector
-from dorothie_gym.policies.navigation.observation_vector import SPEED_UNIT, Vector, layout
+from dorothie_gym.policies.navigation.observation_fields import SPEED_UNIT, Vector, layout
 from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.providers import FIELDS, picture_spaces
-from dorothie_gym.sim.batch.threads import ThreadPool
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.weather import Weather
@@ -27,7 +25,9 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import plain
 
 if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.config import NavigationConfig
     from dorothie_gym.envs.navigation.rows import DrivingFace, DrivingRows
+    from dorothie_gym.sim.batch.threads import ThreadPool
 
 DriverObservation: TypeAlias = "NDArray[np.float32] | NDArray[np.uint8]"
 """Vector (n,), or picture (h, w, 3)."""

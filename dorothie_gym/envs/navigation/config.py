@@ -9,7 +9,7 @@ from typing import Final
 
 from dorothie_gym.policies.ad_wizard import MOST_TRICKS
 from dorothie_gym.policies.navigation.instructor import Guidance
-from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, MAX_SECONDS
+from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUENCY, MAX_SECONDS
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.rewards import NavigationWeights
 from dorothie_gym.sim.config import WorldConfig

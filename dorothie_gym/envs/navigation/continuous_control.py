@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
-from dorothie_gym.policies.navigation.driver_view import DriverArrays, DriverView, HeardRecord
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays
-from dorothie_gym.policies.navigation.observation_vector import (
+from dorothie_gym.policies.navigation.observation_fields import (
     CLOSE_UNIT,
     DISTANCE_UNIT,
     KINDS,
+    SECTORS,
     SPEED_UNIT,
     Vector,
-    put,
 )
+from dorothie_gym.policies.navigation.observation_vector import put
 from dorothie_gym.session.spaces.fields import share, signal, sizes
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.limits import KMH
@@ -30,6 +29,8 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.policies.navigation.driver_view import DriverArrays, DriverView, HeardRecord
+    from dorothie_gym.policies.navigation.junction_exits import ExitArrays
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

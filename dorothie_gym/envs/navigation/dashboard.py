@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.support import portable_math as pm
 
 WIDTH, HEIGHT = 84, 12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
-from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.episode import Ending
 from dorothie_gym.envs.navigation.render import DrivingView
 from dorothie_gym.envs.navigation.rows import INFRACTIONS
@@ -20,13 +19,16 @@ from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option, template_option
-from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.config import NavigationConfig
+    from dorothie_gym.session.live_session import LiveSession
+    from dorothie_gym.session.spaces.actions import StepInfo
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 Action = TypeVar("Action")
 

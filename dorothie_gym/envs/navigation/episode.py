@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.session.rewards import NAVIGATION_TERMS, write_navigation_terms
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import COLLISION
@@ -17,6 +16,7 @@ from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, by_reference, empty_records
 
 if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.config import NavigationConfig
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NEARER = 1.0

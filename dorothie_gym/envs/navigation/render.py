@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from dorothie_gym.envs.navigation.batch import DrivingBatch
-from dorothie_gym.envs.session_view import Notes, SessionView
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.instructor import words_of
-from dorothie_gym.session.live_session import LiveSession
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.batch import DrivingBatch
+    from dorothie_gym.envs.session_view import Notes, SessionView
+    from dorothie_gym.session.live_session import LiveSession
 
 
 class DrivingView:

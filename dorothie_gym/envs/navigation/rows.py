@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Final, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Final, cast
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.ad_wizard_trigger import AdWizardTrigger
 from dorothie_gym.envs.navigation.arrays import CRUISE_LIMIT, DriveArrays, DrivingTown, row_of
-from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.episode import EpisodeArrays
 from dorothie_gym.envs.navigation.start import Blanks, blank_parts, blank_world, copy_row, stacked, with_room
 from dorothie_gym.maps.route_arrays import empty_search
-from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.routing_graph import routing_graph
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.navigation.cost_to_go import cost_table
@@ -27,7 +24,7 @@ from dorothie_gym.policies.navigation.driver_view import DriverArrays
 from dorothie_gym.policies.navigation.instructor import exit_sectors, instruction_of
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import exit_arrays
-from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, Vector
+from dorothie_gym.policies.navigation.observation_vector import HeardInstruction
 from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.observations import LazyObservations
@@ -43,7 +40,13 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, with_room_of
 from dorothie_gym.sim.traffic_rules import INFRACTION_KINDS
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, taken
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.config import NavigationConfig
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.navigation.observation_fields import Vector
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
 """Arrays of a world whose lengths differ between worlds of a town."""

@@ -4,31 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.ad_wizard_trigger import PlansRecord
 from dorothie_gym.envs.navigation.arrays import DriveArrays, DriveRecord, Stage, row_of
-from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELDS
 from dorothie_gym.envs.navigation.episode import EpisodeArrays, episode_arrays
-from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.ad_wizard import AdWizardConfig
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
-from dorothie_gym.policies.navigation.observation_vector import FIELDS
-from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.policies.navigation.observation_fields import FIELDS
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown, with_room_of
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world_start import OwnArrays
 from dorothie_gym.support.compilation.records import empty_records, plain
+
+if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.config import NavigationConfig
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.sim.network.network import TownNetwork
 
 Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 

@@ -26,19 +26,13 @@ from dorothie_gym.envs.navigation.arrays import (
 )
 from dorothie_gym.envs.navigation.continuous_control import find_path, has_lost_path, instructed_manoeuvre, observe_path
 from dorothie_gym.envs.navigation.episode import EpisodeArrays, judge
-from dorothie_gym.maps.route_arrays import RouteSearch
-from dorothie_gym.maps.routing_graph import RoutingGraph
 from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
 from dorothie_gym.policies.navigation.actions import NavigationAction, order_of
 from dorothie_gym.policies.navigation.cost_to_go import cost_from
-from dorothie_gym.policies.navigation.driver_view import DriverArrays
 from dorothie_gym.policies.navigation.guidance_steps import attend, instruct
-from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
-from dorothie_gym.policies.navigation.junction_exits import ExitArrays
 from dorothie_gym.policies.navigation.observation_vector import observe
-from dorothie_gym.policies.route_tables import RouteTables
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.decision_setup import note_props
@@ -52,6 +46,12 @@ from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from dorothie_gym.support.compilation import compiled, concurrent
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.route_arrays import RouteSearch
+    from dorothie_gym.maps.routing_graph import RoutingGraph
+    from dorothie_gym.policies.navigation.driver_view import DriverArrays
+    from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
+    from dorothie_gym.policies.navigation.junction_exits import ExitArrays
+    from dorothie_gym.policies.route_tables import RouteTables
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

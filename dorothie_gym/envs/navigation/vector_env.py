@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import gymnasium as gym
 import numpy as np
@@ -30,7 +30,9 @@ from dorothie_gym.session.config import checked_view
 from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import Scenario, check_options, scenario_option, template_option
 from dorothie_gym.support.vector_infos import Infos, mask_of, masked_infos, seeds_of
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 LARGEST_SEED: Final = 2**31
 """Seeds of sessions that follow without a seed of their own are below."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.analysis.diversity import plain, words_of
 from dorothie_gym.evaluation.analysis.span_agreement import Agreement, LabelledSpan, LabelledUtterance, agreement_of
 from dorothie_gym.evaluation.analysis.units import Units, is_initiating
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.session.recording.events import MoveRecord, UtteranceRecord
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import MoveRecord, UtteranceRecord
+    from dorothie_gym.session.recording.session import Session
 
 
 def agreement(first: Session, second: Session) -> Agreement:

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import Slot
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 MAX_UNDEFINED_SHARE: Final = 0.5
 """Share of undefined bootstrap samples from which on the interval is undefined."""

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Any, Final, NotRequired, TypedDict
 
 from dorothie_gym.archive.corpus import Corpus, Fold
 from dorothie_gym.evaluation.analysis.agreement import inconsistencies
@@ -25,8 +25,10 @@ from dorothie_gym.evaluation.analysis.profiles import Profiles, counted
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.recording.events import ActionRecord
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import ActionRecord
+    from dorothie_gym.session.recording.session import Session
 
 _STEADY = (PhysicalAction.STOP, PhysicalAction.LANE_FOLLOW)
 """Navigation actions without an effect when repeated."""

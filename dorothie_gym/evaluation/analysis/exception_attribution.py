@@ -29,21 +29,23 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, partial
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.evaluation.analysis.exception_mentions import mentions
-from dorothie_gym.evaluation.analysis.units import SaidUnit, Units
 from dorothie_gym.ontology.dialogue_acts import MoveGroup
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, SlotValue
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.analysis.units import SaidUnit, Units
+    from dorothie_gym.session.recording.session import Session
 
 HANDLING_WINDOW: Final = 60.0
 """Time within which an exception is handled [s]."""

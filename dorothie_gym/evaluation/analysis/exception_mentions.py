@@ -14,13 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.slots import ActionValue, ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, Sensor
 from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
-from dorothie_gym.session.recording.events import Event
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import Event
 
 _FOG: Final = frozenset({W.FOG_DENSITY, W.FOG_DISTANCE, W.FOG_FALLOFF})
 _RAIN: Final = frozenset({W.PRECIPITATION, W.PRECIPITATION_DEPOSITS, W.WETNESS})

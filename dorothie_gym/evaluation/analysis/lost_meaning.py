@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import SlotValue
 from dorothie_gym.session.recording.events import UtteranceRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.spoken_understanding import readable
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 REPAIRED_WITHIN: Final = 30.0
 """Time after an utterance within which its meaning is repaired [s]; the car drives about 250 m in this time."""

@@ -6,17 +6,19 @@ import itertools
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.evaluation.analysis.lost_meaning import lost_meanings
 from dorothie_gym.evaluation.analysis.word_errors import WordErrorCounts
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.recording.events import UtteranceRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.speech.spoken_form import spoken_words
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import Corpus
+    from dorothie_gym.session.recording.events import UtteranceRecord
+    from dorothie_gym.session.recording.session import Session
 
 QUANTILES: Final = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Quantiles of the distributions."""

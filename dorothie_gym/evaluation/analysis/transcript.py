@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.evaluation.analysis.exception_attribution import Handled, handling
 from dorothie_gym.evaluation.analysis.phenomena.catalogue import PHENOMENA
@@ -15,7 +15,9 @@ from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import INFRACTIONS, Event, EventType, UtteranceRecord, action_record
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 NAMES: Final[Mapping[Role, str]] = {
     Role.PARTICIPANT: "Participant",

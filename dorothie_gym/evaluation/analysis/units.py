@@ -8,17 +8,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, SlotValue
 from dorothie_gym.ontology.spellings import parse_goal_status, parse_landmark
 from dorothie_gym.session.recording.events import EXCHANGE_UNIT, Event, EventType, MoveRecord, UtteranceRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, SlotValue
+    from dorothie_gym.session.recording.session import Session
 
 SPEAKERS = (Role.PARTICIPANT, Role.CO_WIZARD)
 

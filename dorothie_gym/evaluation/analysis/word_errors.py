@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from rapidfuzz.distance import Levenshtein
@@ -15,9 +15,11 @@ from dorothie_gym.dialogue.recognition_errors import Loudness, WordClass, word_c
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.session.dialogue_channel import CabinState, signal_to_noise
-from dorothie_gym.session.recording.events import MoveRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.speech.spoken_form import spoken_words
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import MoveRecord
+    from dorothie_gym.session.recording.session import Session
 
 _Key = TypeVar("_Key", Role, Loudness, WordClass)
 

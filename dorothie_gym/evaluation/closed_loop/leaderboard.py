@@ -8,11 +8,10 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.errors import RolloutError, printable
 from dorothie_gym.evaluation.closed_loop.claims import Claim, claims_of
-from dorothie_gym.evaluation.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
 from dorothie_gym.evaluation.closed_loop.results import (
     ALL_METRICS,
     NO_EXCEPTION,
@@ -30,6 +29,9 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, raising, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
 
 IMPORTED: Final = "imported"
 """Part of the leaderboard for rollouts in towns from OpenDRIVE files."""

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, read_result
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, roll_out
-from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.recording.files import safe_name
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.policies.policy_loader import Player
 
 
 def roll_out_all(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, Final, NotRequired, TypedDict
 
 from msgspec import Meta
 from rich.console import Console
@@ -33,8 +33,10 @@ from dorothie_gym.evaluation.closed_loop.usage import (
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.language_model.usage import UsagePage
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import MAX_RESULT_JSON, checked, raising, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 RESULT_FILE: Final = "rollout.json"
 """File of rows and table in the folder of a rollout."""

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.archive.comparison import first_difference
 from dorothie_gym.errors import DorothieGymError, SessionError, one_line, short_repr
@@ -23,7 +23,6 @@ from dorothie_gym.evaluation.rollout.play import USAGE_FILE, play_session, with_
 from dorothie_gym.evaluation.rollout.recorded_policy import RecordedPolicy, recorded_persona
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed
-from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recording.events import EndReason, EventType
 from dorothie_gym.session.recording.files import (
@@ -35,9 +34,12 @@ from dorothie_gym.session.recording.files import (
     SessionState,
     same_json,
 )
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.policy_loader import Player
+    from dorothie_gym.session.recording.header import SessionHeader
 
 _FILES: Final = frozenset({HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE})
 """Files of every session of a rollout."""

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Final, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Annotated, Final, TypeAlias, TypedDict
 
 import numpy as np
 from msgspec import Meta
@@ -25,14 +25,16 @@ from dorothie_gym.evaluation.closed_loop.task_progress import (
     task_at_end,
     without_reached,
 )
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, lt=2**31)]
 """Number in JSON."""

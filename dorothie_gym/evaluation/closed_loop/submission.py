@@ -15,7 +15,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -40,8 +40,10 @@ from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import same_json, to_line
 from dorothie_gym.session.recording.header import FORMAT_VERSION
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import MAX_RESULT_JSON, MAX_SMALL_JSON, checked, raising, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 FORMAT: Final = "dorothie_gym-submission"
 VERSION: Final = "1.1"

@@ -5,21 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.analysis.exception_attribution import kind_of
 from dorothie_gym.maps.routing import Place, router
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.session.recording.events import Event, EventType
 from dorothie_gym.session.recording.header import NO_LANE, LandmarkRow
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 
 @dataclass(frozen=True, kw_only=True)

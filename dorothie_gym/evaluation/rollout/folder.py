@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from dorothie_gym._version import __version__
-from dorothie_gym.errors import SessionError, short_repr
+from dorothie_gym.errors import OutputFolderError, SessionError, short_repr
 from dorothie_gym.session.recording.header import FORMAT_VERSION
-from dorothie_gym.support.files import PART, noticing_deletion, write_atomically
+from dorothie_gym.support.files import PART, write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, raising, read_json
 
 if sys.platform != "win32":
@@ -103,3 +103,27 @@ def _lock(root: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def noticing_deletion(folder: Path) -> Iterator[None]:
+    """Raises `OutputFolderError` if a folder was deleted or replaced inside the block, whatever else failed there."""
+    deleted = f"{folder}: the folder was deleted or replaced while it was being written; run the command again"
+    before = _identity(folder)
+    try:
+        yield
+    except Exception as error:
+        if _identity(folder) == before:
+            raise
+        raise OutputFolderError(deleted) from error
+    if _identity(folder) != before:
+        raise OutputFolderError(deleted)
+
+
+def _identity(folder: Path) -> tuple[int, int] | None:
+    """Returns numbers that belong to a folder as long as it exists; None without a folder."""
+    try:
+        found = folder.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    return found.st_dev, found.st_ino

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,15 @@ from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.evaluation.rollout.replay import ReplaySources
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.ontology.spellings import parse_landmark
-from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.files import PART, write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 
 Page: TypeAlias = dict[str, Any]
 """Object of JSON."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -18,11 +18,13 @@ import pyarrow.parquet as pq
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.rollout.role_episodes import RoleEpisode, distinct_ids
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.spaces.actions import action_fields
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import observation_fields
 from dorothie_gym.support.files import new_folder, write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
 
 _PARQUET: Final = "data/train-00000-of-00001.parquet"
 """File of the decisions in a folder for Hugging Face, where `datasets.load_dataset` finds it."""

@@ -29,11 +29,12 @@ from dorothie_gym.maps.catalogue import town_names
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces.actions import noop
-from dorothie_gym.session.spaces.fields import AnySpace
 from dorothie_gym.session.spaces.flat import FlatActions, FlatObservations
 
 if TYPE_CHECKING:
     from minari.data_collector import EpisodeBuffer
+
+    from dorothie_gym.session.spaces.fields import AnySpace
 
 MINARI_FOLDER: Final = "MINARI_DATASETS_PATH"
 """Environment variable with the folder of Minari's datasets."""

@@ -6,18 +6,21 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
+from dorothie_gym.evaluation.rollout.folder import noticing_deletion
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.session.recorder import SessionRecorder
 from dorothie_gym.session.recording.files import to_page
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.writer import SessionWriter
-from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.session_log import SessionSummary
-from dorothie_gym.session.spaces.actions import ActionMapping
-from dorothie_gym.support.files import noticing_deletion, write_atomically
+from dorothie_gym.support.files import write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.session_log import SessionSummary
+    from dorothie_gym.session.spaces.actions import ActionMapping
 
 PERSONAS: Final = "personas"
 """Field of a header with the personas of the scripted speakers, by role; see `dorothie_gym.policies.persona`."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.rollout.play import PERSONAS
-from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.session.recorder import expand, idle_actions
-from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 class RecordedPolicy(Policy[int]):

@@ -8,21 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from dorothie_gym._version import __version__
 from dorothie_gym.archive.comparison import Difference, first_difference
-from dorothie_gym.archive.corpus import CorpusEntry
 from dorothie_gym.errors import SessionError, StoryboardError, TownError
 from dorothie_gym.evaluation.rollout.play import PERSONAS, pitches_of
 from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.maps.catalogue import find_town, load_town
-from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.session.recording.events import EndReason, EventType
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.writer import SessionWriter
 from dorothie_gym.session.scenario import Scenario, draw_scenario
@@ -32,7 +28,13 @@ from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.speech.synthesizer import HIGHEST_PITCH, LOWEST_PITCH
 from dorothie_gym.support.input_files import checked, raising
 from dorothie_gym.tasks.parsing import load_template, template_names
-from dorothie_gym.tasks.storyboard import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import CorpusEntry
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 Observations: TypeAlias = Mapping[str, Observation]
 """Observation of each agent."""

@@ -9,20 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from gymnasium import spaces
 
-from dorothie_gym.archive.corpus import CorpusEntry
 from dorothie_gym.evaluation.rollout.replay import ReplaySources, begin_replay, recorded_actions
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.observations import RoleMask
-from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, action_space
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import digest_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import CorpusEntry
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.session_engine import SessionEngine
 
 _ID_LENGTH: Final = 16
 """Hexadecimal digits of an id."""

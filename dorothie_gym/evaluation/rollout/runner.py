@@ -13,14 +13,13 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from dorothie_gym.errors import InputFileError, OutputFolderError, ProcessError, SessionError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
 from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.evaluation.rollout.processes import run_tasks
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
@@ -29,6 +28,9 @@ from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 COST_FILE: Final = "cost.json"
 """Wall time, processor time and number of workers of a rollout; not part of the result, which is reproducible."""

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,9 @@ from dorothie_gym.evaluation.teacher_forced.predictions import (
     joined_actions,
     joined_acts,
 )
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 Split: TypeAlias = Literal["train", "val", "test", "all"]
 SPLITS: Final[tuple[Split, ...]] = ("train", "val", "test", "all")

@@ -6,19 +6,21 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
-from dorothie_gym.ontology.slots import SlotValue
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.libraries import pa, pq
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint
+    from dorothie_gym.ontology.slots import SlotValue
 
 
 @dataclass(frozen=True, eq=False)

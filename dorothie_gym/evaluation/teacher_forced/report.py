@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.archive.visibility import Task
-from dorothie_gym.evaluation.analysis.intervals import Estimate
 from dorothie_gym.evaluation.teacher_forced.labels import ALL, UNSEEN
 from dorothie_gym.evaluation.teacher_forced.metrics import (
     COLUMNS,
@@ -34,7 +33,6 @@ from dorothie_gym.evaluation.teacher_forced.paper_comparison import (
     paper_source,
 )
 from dorothie_gym.evaluation.teacher_forced.scoring import class_labels
-from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 from dorothie_gym.pictures.charts import INK, SHEET, SOFT, dress_percent_axes, empty_figure
 from dorothie_gym.support.files import replacing, write_atomically
 
@@ -42,6 +40,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
+
+    from dorothie_gym.evaluation.analysis.intervals import Estimate
+    from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 
 NONE: Final = "–"
 """Placeholder for a missing figure."""

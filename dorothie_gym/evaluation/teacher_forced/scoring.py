@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.archive.prediction_points import Point
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.errors import PredictionError
 from dorothie_gym.evaluation.analysis.exception_attribution import Handled
@@ -18,6 +17,9 @@ from dorothie_gym.evaluation.teacher_forced.metrics import confusion_matrix, met
 from dorothie_gym.evaluation.teacher_forced.predictions import ActPredictions, Predictions, TaskPredictions
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.prediction_points import Point
 
 NEARBY_POINTS: Final = 3
 """Number of nearby points that a message names."""

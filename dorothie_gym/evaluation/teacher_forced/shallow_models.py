@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final, Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,12 @@ from dorothie_gym.archive.visibility import Task
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.teacher_forced.features.batch import Batch, BatchSpec, gather
 from dorothie_gym.evaluation.teacher_forced.features.columns import CO_WIZARD, PARTICIPANT, Columns
-from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 from dorothie_gym.evaluation.teacher_forced.predictions import ActionPredictions, ActPredictions, Predictions
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, ArgumentKind
 from dorothie_gym.ontology.dialogue_acts import LABELS
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 
 Inputs = TypeVar("Inputs")
 """Features of n points."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.evaluation.analysis.exception_attribution import Handled
 from dorothie_gym.evaluation.analysis.intervals import Estimate
@@ -30,9 +29,12 @@ from dorothie_gym.evaluation.teacher_forced.paper_comparison import (
     paper_source,
 )
 from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_predictions
-from dorothie_gym.evaluation.teacher_forced.predictions import TaskPredictions
 from dorothie_gym.evaluation.teacher_forced.scoring import RunScore, Scores, class_labels, score_runs
 from dorothie_gym.evaluation.teacher_forced.trivial_baselines import FLOORS
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import Corpus
+    from dorothie_gym.evaluation.teacher_forced.predictions import TaskPredictions
 
 TABLE_VERSION: Final = 1
 

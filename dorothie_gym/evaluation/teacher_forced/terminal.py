@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 from rich.table import Table
@@ -11,7 +11,6 @@ from rich.text import Text
 
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.evaluation.analysis.exception_attribution import Handled
-from dorothie_gym.evaluation.analysis.intervals import Estimate
 from dorothie_gym.evaluation.teacher_forced.labels import ALL
 from dorothie_gym.evaluation.teacher_forced.metrics import (
     COLUMNS,
@@ -43,7 +42,10 @@ from dorothie_gym.evaluation.teacher_forced.report import (
     row_title,
 )
 from dorothie_gym.evaluation.teacher_forced.scoring import class_labels
-from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.analysis.intervals import Estimate
+    from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 
 WIDE: Final = 110
 """Terminal width from which the tasks stand side by side [characters]."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint
 from dorothie_gym.archive.visibility import Task
-from dorothie_gym.evaluation.teacher_forced.labels import CorpusLabels, TaskLabels
 from dorothie_gym.evaluation.teacher_forced.predictions import (
     ActionPredictions,
     ActPredictions,
@@ -23,6 +21,10 @@ from dorothie_gym.evaluation.teacher_forced.predictions import (
 )
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint
+    from dorothie_gym.evaluation.teacher_forced.labels import CorpusLabels, TaskLabels
 
 
 class FloorModel(ABC):

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dorothie_gym.archive.corpus import CorpusEntry
 from dorothie_gym.errors import AnnotationError
 from dorothie_gym.evaluation.analysis.segmentation_agreement import (
     SegmentationAgreement,
@@ -19,6 +19,9 @@ from dorothie_gym.lab.annotation.log import ADJUDICATED, RECORDED, annotators_of
 from dorothie_gym.lab.annotation.marks import Annotation
 from dorothie_gym.lab.annotation.session_labels import recorded_annotation
 from dorothie_gym.lab.annotation.source_text import SourceText
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import CorpusEntry
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Final, NoReturn, TypeVar
 
 from lxml import etree
 
@@ -21,9 +21,11 @@ from dorothie_gym.lab.annotation.marks import Annotation, Change, ExchangeMark, 
 from dorothie_gym.lab.annotation.rows import read_label
 from dorothie_gym.lab.annotation.source_text import SPEAKERS, SourceLine, SourceText, UtteranceId
 from dorothie_gym.ontology.dialogue_acts import UnitEnd
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.session.recording.files import read_bytes
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
 
 MAX_ELEMENTS: Final = 500_000
 """Most elements of a file; each takes some 200 bytes of memory."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from lxml import etree
 
@@ -17,8 +17,10 @@ from dorothie_gym.errors import AnnotationError
 from dorothie_gym.lab.annotation.marks import Annotation, ExchangeMark, SpanMark, TransactionMark
 from dorothie_gym.lab.annotation.source_text import SPEAKERS, SourceLine, SourceText
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.support.files import write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
 
 Element: TypeAlias = etree._Element
 """XML element; the stubs of lxml name the class with an underscore."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dorothie_gym.archive.corpus import layout_of, read_session
 from dorothie_gym.archive.sdn.writer import write_sdn
@@ -11,10 +12,12 @@ from dorothie_gym.errors import AnnotationError
 from dorothie_gym.lab.annotation.elan_reader import read_elan
 from dorothie_gym.lab.annotation.elan_writer import write_elan
 from dorothie_gym.lab.annotation.jsonl_format import read_jsonl, write_jsonl
-from dorothie_gym.lab.annotation.marks import Annotation
 from dorothie_gym.lab.annotation.session_labels import recorded_annotation, relabelled
 from dorothie_gym.lab.annotation.source_text import SourceText
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.annotation.marks import Annotation
+    from dorothie_gym.session.recording.session import Session
 
 
 class Format(enum.StrEnum):

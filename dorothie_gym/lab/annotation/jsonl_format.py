@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 from msgspec import Struct
@@ -19,10 +19,12 @@ from dorothie_gym.lab.annotation.rows import (
     change_of,
     rows_of,
 )
-from dorothie_gym.lab.annotation.source_text import SourceText
 from dorothie_gym.session.recording.files import decode_text, read_lines
 from dorothie_gym.session.recording.header import parse_version
 from dorothie_gym.support.files import write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.annotation.source_text import SourceText
 
 VERSION: Final = "1.0"
 MAX_LINES: Final = 100_000

@@ -12,7 +12,7 @@ import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import msgspec
 from msgspec import Meta, Struct
@@ -21,10 +21,12 @@ from dorothie_gym.errors import AnnotationError, SessionError, one_line
 from dorothie_gym.lab.annotation.log_file import Extent, appending, check_place
 from dorothie_gym.lab.annotation.marks import Annotation, Change, check_change
 from dorothie_gym.lab.annotation.rows import ChangeRows, change_of, rows_of
-from dorothie_gym.lab.annotation.source_text import SourceText
 from dorothie_gym.session.recording.files import ANNOTATIONS_FOLDER, decode_text, read_bytes
 from dorothie_gym.session.recording.header import parse_version
 from dorothie_gym.support.files import make_folder, sync
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.annotation.source_text import SourceText
 
 ADJUDICATED: Final = "adjudicated"
 """Name of the log of the final version."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act, guess_spans
 from dorothie_gym.evaluation.analysis.units import Units
@@ -10,9 +11,11 @@ from dorothie_gym.lab.annotation.marks import Annotation, Change, SpanMark
 from dorothie_gym.lab.annotation.session_labels import with_labels
 from dorothie_gym.lab.annotation.source_text import SourceLine, SourceText, UtteranceId
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.header import NATIVE
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.recording.session import Session
 
 
 def pre_annotation(session: Session, text: SourceText) -> Annotation:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Meta, Struct
 
-from dorothie_gym.lab.annotation.rows import ChangeRows, Label
+if TYPE_CHECKING:
+    from dorothie_gym.lab.annotation.rows import ChangeRows, Label
 
 _Edit = Annotated[int, Meta(ge=0, lt=2**53)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.errors import AnnotationError, OntologyError, SessionError, short_repr
 from dorothie_gym.evaluation.analysis.exception_attribution import Handled
@@ -15,7 +15,9 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct, UnitEnd
 from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.session.recording.events import EXCHANGE_UNIT, TRANSACTION_UNIT, Event, UtteranceRecord
 from dorothie_gym.session.recording.header import ANNOTATION_FIELD
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 _OF_A_SPAN: Final = ("audio", "meaning", "fluent", "sdn_act")
 """Optional fields of a dialogue move that belong to its span; another span does not inherit them."""

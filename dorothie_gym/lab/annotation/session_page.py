@@ -13,18 +13,18 @@ from PIL import Image
 from dorothie_gym.archive.sdn.audio import AUDIO_FOLDERS
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.analysis.transcript import description_of
-from dorothie_gym.lab.annotation.source_text import SourceLine, SourceText
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.session.recording.events import EventType
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.input_files import read_file
 
 if TYPE_CHECKING:
+    from dorothie_gym.lab.annotation.source_text import SourceLine, SourceText
+    from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
+    from dorothie_gym.session.recording.session import Session
 
 POSE_STEP: Final = 6
 """Frames between two poses that a browser gets: 5 a second."""

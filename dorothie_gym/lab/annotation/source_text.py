@@ -6,11 +6,13 @@ import hashlib
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.recording.session import Session
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.session import Session
 
 SPEAKERS = (Role.PARTICIPANT, Role.CO_WIZARD)
 """Speakers whose utterances are annotated."""

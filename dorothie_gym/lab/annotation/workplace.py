@@ -10,9 +10,8 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from dorothie_gym.archive.corpus import CorpusEntry
 from dorothie_gym.errors import AnnotationError
 from dorothie_gym.lab.annotation.comparison import adopted, consensus, disagreements
 from dorothie_gym.lab.annotation.corpus_agreement import pair_agreement
@@ -31,6 +30,9 @@ from dorothie_gym.lab.annotation.pre_annotation import pre_annotation
 from dorothie_gym.lab.annotation.rows import change_of, rows_of, to_json
 from dorothie_gym.lab.annotation.session_page import SessionPage
 from dorothie_gym.lab.annotation.source_text import SourceText, UtteranceId
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import CorpusEntry
 
 MOST_OPEN: Final = 4
 """Most sessions that are kept in memory."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.lab.console import messages as m
-from dorothie_gym.lab.console.lane_lookup import LaneLookup
 from dorothie_gym.lab.console.messages import Command, MessageError
 from dorothie_gym.lab.console.speech_input import TypedAct, typed_acts
 from dorothie_gym.ontology.actions import MentalAction
@@ -35,7 +34,10 @@ from dorothie_gym.session.spaces.actions import (
     Speech,
 )
 from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH, SpaceLimits, plain_text
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.lane_lookup import LaneLookup
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 MOST_WAITING: Final = 24
 """Most commands of one kind that wait; more are refused."""

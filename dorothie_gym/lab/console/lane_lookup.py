@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.session.spaces.actions import LanePosition
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 SPACING: Final = 1.0
 """Distance between the sampled places of a lane [m]: places are whole metres."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 from concurrent.futures import Executor
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.lab.console.room import Room
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.room import Room
 
 logger = logging.getLogger(__name__)
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from dorothie_gym.lab.console.lane_lookup import LaneLookup
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.tasks.catalogue import catalogue, map_label
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.lane_lookup import LaneLookup
 
 
 class Pin(NamedTuple):

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.evaluation.rollout.play import with_personas
 from dorothie_gym.lab.console.seating import Occupancy, SeatPlan
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.spaces.actions import ActionMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.actions import ActionMapping
 
 
 class Players:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import Event, EventType
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
 
 
 class SpanRecordings:

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.lab.console.config import ConsoleConfig
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.seat_log import SeatEvent, SeatEventKind, read_seat_log
 from dorothie_gym.session.recording.session import Session, session_state
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.config import ConsoleConfig
+    from dorothie_gym.ontology.roles import Role
 
 SEATS = "seats"
 """Field of a header with the planned players of a session with people, by role."""

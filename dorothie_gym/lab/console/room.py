@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dorothie_gym.evaluation.rollout.replay import recorded_actions
 from dorothie_gym.lab.console import messages as m
@@ -31,8 +32,10 @@ from dorothie_gym.lab.console.windscreen import Windscreen
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.recording.events import EndReason
 from dorothie_gym.session.recording.seat_log import SeatEvent, SeatEventKind
-from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.spaces.actions import ActionMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.actions import ActionMapping
 
 logger = logging.getLogger(__name__)
 

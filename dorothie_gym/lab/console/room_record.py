@@ -5,15 +5,18 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dorothie_gym.lab.console.recordings import SpanRecordings
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recorder import SessionRecorder
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.seat_log import SeatEvent, SeatLogWriter
 from dorothie_gym.session.recording.writer import SessionWriter
-from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.spaces.actions import ActionMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.actions import ActionMapping
 
 
 class RoomRecord:

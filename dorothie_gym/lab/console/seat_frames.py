@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.lab.console.config import ConsoleConfig
 from dorothie_gym.lab.console.connection import Connection, changes, encode
-from dorothie_gym.lab.console.lane_lookup import LaneLookup
 from dorothie_gym.lab.console.seat import EXPERIMENTER, Outgoing, PauseReason, RoomState, Seat
 from dorothie_gym.lab.console.seating import SeatPlan
 from dorothie_gym.lab.console.spectator_view import spectator_view
 from dorothie_gym.lab.console.views import role_view, static_view
 from dorothie_gym.lab.console.vocabulary import vocabulary
-from dorothie_gym.lab.console.windscreen import Windscreen
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
 from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.recording.events import EndReason
-from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.config import ConsoleConfig
+    from dorothie_gym.lab.console.lane_lookup import LaneLookup
+    from dorothie_gym.lab.console.windscreen import Windscreen
+    from dorothie_gym.session.session_engine import SessionEngine
 
 
 @dataclass(frozen=True, kw_only=True)

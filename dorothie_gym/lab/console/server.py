@@ -9,7 +9,7 @@ import secrets
 from collections.abc import AsyncIterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -22,8 +22,6 @@ from dorothie_gym.dialogue.grammar import load_grammar
 from dorothie_gym.lab.console.connection import CloseCode, Closing, Connection, encode
 from dorothie_gym.lab.console.messages import Join, MessageError, decode_message
 from dorothie_gym.lab.console.pace import run_room
-from dorothie_gym.lab.console.room import Room
-from dorothie_gym.lab.console.seat import Seat
 from dorothie_gym.lab.console.spoken_turns import SpokenTurns
 from dorothie_gym.lab.gate import gzipped_json
 from dorothie_gym.lab.hosts import is_same_origin
@@ -31,6 +29,10 @@ from dorothie_gym.lab.pages import SHARED, files, page, redirection
 from dorothie_gym.lab.protocols import recognise
 from dorothie_gym.lab.town_page import town_page
 from dorothie_gym.lab.web import application
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.room import Room
+    from dorothie_gym.lab.console.seat import Seat
 
 logger = logging.getLogger(__name__)
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.lab.console.lane_lookup import LaneLookup
 from dorothie_gym.lab.console.pins import Pin, pin_rows
 from dorothie_gym.lab.console.views import KMH, RoleView, weather_shares
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.views.exception_words import exception_words
-from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.tasks.storyboard import Landmark
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.lane_lookup import LaneLookup
+    from dorothie_gym.session.live_session import LiveSession
+    from dorothie_gym.tasks.storyboard import Landmark
 
 
 def spectator_view(session: LiveSession, places: LaneLookup) -> RoleView:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.lab.console.speech_input import act_json
-from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.session.spaces.observations import ObservationMapping, heard_acts
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Utterance
+    from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 
 Entry = dict[str, Any]
 """Line of the talk in JSON types: `t` [s], `who`, `text`; for the role's utterances also `utterance` (number) and

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.lab.console.lane_lookup import LaneLookup
 from dorothie_gym.lab.console.pins import Pin, pin_rows
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
@@ -26,6 +25,9 @@ from dorothie_gym.session.spaces.observations import (
     SubgoalColumn,
 )
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.lane_lookup import LaneLookup
 
 RoleView: TypeAlias = dict[str, Any]
 """View of a role in JSON types; the same fields at each decision, so that a browser needs the changed ones only."""

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from dorothie_gym.lab.console.config import ConsoleConfig
 from dorothie_gym.pictures.camera.session_pictures import windscreen_camera
-from dorothie_gym.session.live_session import LiveSession
 
 if TYPE_CHECKING:
+    from dorothie_gym.lab.console.config import ConsoleConfig
     from dorothie_gym.pictures.camera.session_camera import SessionCamera
+    from dorothie_gym.session.live_session import LiveSession
 
 
 class Windscreen:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.lab.studies.records import StudyRecords
 from dorothie_gym.lab.studies.stages import RefusedError
 from dorothie_gym.lab.studies.study import Admission, Study
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.records import StudyRecords
 
 _PLACEHOLDER: Final = re.compile(r"[{}<>\[\]%$]")
 """Signs of templates, such as {{%PROLIFIC_PID%}}, ${e://Field/id}, [ID] or <id>; ids of platforms have none of them."""

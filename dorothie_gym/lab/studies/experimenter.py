@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from functools import partial
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -16,11 +16,13 @@ from dorothie_gym.lab.gate import Gate, RequestError
 from dorothie_gym.lab.pages import page
 from dorothie_gym.lab.studies import requests as r
 from dorothie_gym.lab.studies.answers import answer, cookie_name, set_secret
-from dorothie_gym.lab.studies.entrance import Entrance
-from dorothie_gym.lab.studies.open_rooms import OpenRoom
-from dorothie_gym.lab.studies.progress import Progress
 from dorothie_gym.lab.studies.records import digest
 from dorothie_gym.lab.studies.stages import RefusedError
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.entrance import Entrance
+    from dorothie_gym.lab.studies.open_rooms import OpenRoom
+    from dorothie_gym.lab.studies.progress import Progress
 
 COOKIE: Final = "dorothie_experimenter"
 """Cookie with the secret of the experimenter's browser; scripts of pages cannot read it."""

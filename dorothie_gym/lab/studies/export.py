@@ -11,18 +11,20 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from dorothie_gym.archive.sound import audio_files
 from dorothie_gym.lab.studies.folder import check_folder
 from dorothie_gym.lab.studies.record_types import SESSIONS_FOLDER, STUDY_FILE
 from dorothie_gym.lab.studies.records import StudyRecords
-from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.lab.studies.study_file import read_study
 from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.support.files import replacing, write_atomically
 from dorothie_gym.support.libraries import pa, pq
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.study import Study
 
 Row: TypeAlias = Mapping[str, str | int | float | bool | None]
 """Row of a table."""

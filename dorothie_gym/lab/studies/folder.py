@@ -5,15 +5,17 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.lab.studies.database import LOCK_FILE, RunLock
 from dorothie_gym.lab.studies.record_types import DATABASE_FILE, STUDY_FILE
 from dorothie_gym.lab.studies.records import StudyRecords
-from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.lab.studies.study_file import MAX_STUDY, read_study
 from dorothie_gym.support.files import PART, write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.study import Study
 
 FIXED: Final = ("conditions", "scenarios", "questionnaires", "assignment", "session")
 """Parts of a study that may not change while data are collected."""

@@ -7,20 +7,22 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.lab.console.config import AfterAbsence
 from dorothie_gym.lab.console.room import Room
 from dorothie_gym.lab.console.seat import RoomState
-from dorothie_gym.lab.console.server import Console
 from dorothie_gym.lab.studies.erasure import remove_attempts
 from dorothie_gym.lab.studies.record_types import SessionRow
-from dorothie_gym.lab.studies.records import StudyRecords
-from dorothie_gym.lab.studies.room_building import RoomBuilder
-from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import EndReason
 from dorothie_gym.session.recording.files import SessionState
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.console.server import Console
+    from dorothie_gym.lab.studies.records import StudyRecords
+    from dorothie_gym.lab.studies.room_building import RoomBuilder
+    from dorothie_gym.lab.studies.study import Study
 
 logger = logging.getLogger(__name__)
 

@@ -5,15 +5,17 @@ It holds nothing about conditions, other people or the assignment.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from dorothie_gym.lab.console.config import AfterAbsence
-from dorothie_gym.lab.studies.progress import Progress
-from dorothie_gym.lab.studies.record_types import Participant
 from dorothie_gym.lab.studies.stages import QUESTIONNAIRES, Outcome, Stage
-from dorothie_gym.lab.studies.study import Study
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.progress import Progress
+    from dorothie_gym.lab.studies.record_types import Participant
+    from dorothie_gym.lab.studies.study import Study
 
 
 def entrance_view(progress: Progress) -> dict[str, Any]:

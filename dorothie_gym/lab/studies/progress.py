@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from dorothie_gym.lab.studies.assignment import Assigner
 from dorothie_gym.lab.studies.erasure import erase_from_data, finish_erasures
 from dorothie_gym.lab.studies.items import Answer, check_answers
-from dorothie_gym.lab.studies.open_rooms import OpenRoom, OpenRooms
-from dorothie_gym.lab.studies.presence import Presence
-from dorothie_gym.lab.studies.record_types import Participant, SessionRow
-from dorothie_gym.lab.studies.records import StudyRecords
 from dorothie_gym.lab.studies.stages import QUESTIONNAIRES, Outcome, RefusedError, Stage, check_stage, next_stage
-from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.lab.studies.waiting_room import WaitingRoom
 from dorothie_gym.session.recording.events import EndReason
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.open_rooms import OpenRoom, OpenRooms
+    from dorothie_gym.lab.studies.presence import Presence
+    from dorothie_gym.lab.studies.record_types import Participant, SessionRow
+    from dorothie_gym.lab.studies.records import StudyRecords
+    from dorothie_gym.lab.studies.study import Study
 
 logger = logging.getLogger(__name__)
 

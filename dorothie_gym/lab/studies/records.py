@@ -10,11 +10,9 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.lab.studies.assignment import Slot
 from dorothie_gym.lab.studies.database import Database
-from dorothie_gym.lab.studies.items import Answer
 from dorothie_gym.lab.studies.record_types import (
     DATABASE_FILE,
     RECRUITMENT_FILE,
@@ -27,6 +25,10 @@ from dorothie_gym.lab.studies.record_types import (
 )
 from dorothie_gym.lab.studies.stages import Outcome, Stage
 from dorothie_gym.ontology.roles import Role
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.assignment import Slot
+    from dorothie_gym.lab.studies.items import Answer
 
 ABANDONED_SECONDS: Final = 1800.0
 """Time without a sign of a person before the consent after which the person's data are deleted [s]."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from msgspec import Meta, Struct
 
 from dorothie_gym.lab.studies.items import MAX_TEXT
-from dorothie_gym.lab.studies.stages import Stage
-from dorothie_gym.ontology.roles import Role
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.stages import Stage
+    from dorothie_gym.ontology.roles import Role
 
 
 class Body(Struct, forbid_unknown_fields=True, frozen=True):

@@ -8,7 +8,7 @@ import logging
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from starlette.applications import Starlette
 from starlette.requests import Request
@@ -28,12 +28,14 @@ from dorothie_gym.lab.studies.open_rooms import OpenRooms
 from dorothie_gym.lab.studies.participant_view import entrance_view, participant_view
 from dorothie_gym.lab.studies.presence import Presence
 from dorothie_gym.lab.studies.progress import Progress
-from dorothie_gym.lab.studies.record_types import Participant
-from dorothie_gym.lab.studies.records import StudyRecords
 from dorothie_gym.lab.studies.room_building import RoomBuilder
 from dorothie_gym.lab.studies.stages import RefusedError
-from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.lab.web import application
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.record_types import Participant
+    from dorothie_gym.lab.studies.records import StudyRecords
+    from dorothie_gym.lab.studies.study import Study
 
 logger = logging.getLogger(__name__)
 

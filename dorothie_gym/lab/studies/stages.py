@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import enum
+from typing import TYPE_CHECKING
 
 from dorothie_gym.errors import DorothieGymError
-from dorothie_gym.lab.studies.study import Study
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.study import Study
 
 
 class RefusedError(DorothieGymError, ValueError):

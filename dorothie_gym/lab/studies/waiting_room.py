@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 import time
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.lab.studies.assignment import Assigner, Candidate, changed_role, match, needed_role
-from dorothie_gym.lab.studies.open_rooms import OpenRooms
-from dorothie_gym.lab.studies.presence import Presence
-from dorothie_gym.lab.studies.record_types import Group, Participant, SessionRow
-from dorothie_gym.lab.studies.records import StudyRecords
 from dorothie_gym.lab.studies.stages import Outcome, RefusedError, Stage, check_stage, next_stage
-from dorothie_gym.lab.studies.study import Study
+
+if TYPE_CHECKING:
+    from dorothie_gym.lab.studies.open_rooms import OpenRooms
+    from dorothie_gym.lab.studies.presence import Presence
+    from dorothie_gym.lab.studies.record_types import Group, Participant, SessionRow
+    from dorothie_gym.lab.studies.records import StudyRecords
+    from dorothie_gym.lab.studies.study import Study
 
 logger = logging.getLogger(__name__)
 

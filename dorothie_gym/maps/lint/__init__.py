@@ -6,6 +6,7 @@ Entry point: `check_town`. Each module checks one family of faults; its limits a
 from __future__ import annotations
 
 from itertools import chain
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.lint.centre_lines import centre_line_faults, continuity_faults
 from dorothie_gym.maps.lint.clearance import clearance_faults
@@ -14,7 +15,9 @@ from dorothie_gym.maps.lint.fault import Fault, FaultKind
 from dorothie_gym.maps.lint.kerbs import kerb_faults
 from dorothie_gym.maps.lint.samples import sample_lanes
 from dorothie_gym.maps.lint.turn_types import turn_type_faults
-from dorothie_gym.maps.town import Town
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 __all__ = ["Fault", "FaultKind", "check_town"]
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_TURN, Fault, FaultKind
-from dorothie_gym.maps.model import Array, Lane
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array, Lane
+    from dorothie_gym.maps.town import Town
 
 MAX_LINK_GAP = 0.05
 """Largest distance in the plane between the ends of linked lanes [m]; a requirement of all towns."""

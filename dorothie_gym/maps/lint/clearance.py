@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,9 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_GROUND, SAMPLE_SPACING, LaneSamples
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 MAX_OVERLAP = 0.5
 """Largest sideways overlap of lanes [m]: merging roads overlap, and markings are not exact."""

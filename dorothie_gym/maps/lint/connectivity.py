@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,9 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from dorothie_gym.maps.lint.fault import Fault, FaultKind
-from dorothie_gym.maps.town import Town
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 _LANES_NAMED = 8  # in a message
 

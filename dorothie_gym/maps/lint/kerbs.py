@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
@@ -11,8 +12,10 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_GROUND, SAMPLE_SPACING, LaneSamples
 from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 CORNER_TURNS = np.radians([20.0, 160.0])
 """Range of turns with a corner on the inner side [rad]."""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 SAMPLE_SPACING = 1.0
 """Largest distance between samples of a lane [m]."""

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.lint.fault import Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_GROUND
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType, SignalKind
-from dorothie_gym.maps.town import Town
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 WRONG_WAY = 10.0
 """Largest angle of a left turn to the right, or of a right turn to the left [degrees]: the branches of a fork that are

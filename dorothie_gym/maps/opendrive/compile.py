@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_road
 from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
-from dorothie_gym.maps.opendrive.records import OpenDriveRecords, RoadRecord
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.opendrive.records import OpenDriveRecords, RoadRecord
 
 # Speed limit of roads without one, as in built-up areas [m/s] (50 km/h).
 DEFAULT_SPEED_LIMIT = 50.0 / 3.6

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 # 32 Gauss-Legendre nodes integrate cos and sin of the heading to rounding error up to four full turns per element.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from pathlib import Path
-from typing import NoReturn, TypeAlias
+from typing import TYPE_CHECKING, NoReturn, TypeAlias
 
 import numpy as np
 from lxml import etree
 
 from dorothie_gym.errors import InputFileError, TownError, short_repr
-from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import (
     NO_CUBICS,
     Arc,
@@ -33,6 +32,9 @@ from dorothie_gym.maps.opendrive.records import (
     SignalRecord,
 )
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, MAX_XML_ELEMENTS, read_file
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 # Type of XML elements; the stubs of lxml name the class with an underscore.
 Element: TypeAlias = etree._Element

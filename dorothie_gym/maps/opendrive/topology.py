@@ -10,15 +10,17 @@ import logging
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType
-from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadRecord
 
 # Lane sections shorter than this are contracted [m].
 JOINT_LENGTH = 1e-3

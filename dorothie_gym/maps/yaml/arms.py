@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import Lane
 from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
-from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.portable_math import wrap_radians
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 
 POCKET = -1
 """Number of a left-turn lane in the median."""

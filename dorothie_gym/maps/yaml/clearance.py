@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NoReturn, TypeAlias
+from typing import TYPE_CHECKING, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.yaml.arms import Arm
-from dorothie_gym.maps.yaml.centrelines import Centreline
 from dorothie_gym.maps.yaml.movements import SMALLEST_RING_TRIM, SMALLEST_TRIM, MovementPath
-from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.arms import Arm
+    from dorothie_gym.maps.yaml.centrelines import Centreline
+    from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 
 Indices: TypeAlias = NDArray[np.int64]
 

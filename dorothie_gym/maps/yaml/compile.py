@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from dorothie_gym.maps.yaml.furniture import crosswalks, place_signals, place_si
 from dorothie_gym.maps.yaml.layout import Layout, lay_out
 from dorothie_gym.maps.yaml.movements import MovementPath, kinds_of
 from dorothie_gym.maps.yaml.schema import read_plan
-from dorothie_gym.maps.yaml.segments import Crossing
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.segments import Crossing
 
 SITES = 24
 """Number of landmark sites of a town without explicit ones."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,13 +14,15 @@ from dorothie_gym.maps.model import Array, Crosswalk, Junction, Lane, LaneLink, 
 from dorothie_gym.maps.town import LightPhase, LightProgramme
 from dorothie_gym.maps.traffic_light_programs import derive_programmes, yellow_time
 from dorothie_gym.maps.yaml.arms import Approach, find_slips
-from dorothie_gym.maps.yaml.entries import YamlEntry
-from dorothie_gym.maps.yaml.geometry import Point
-from dorothie_gym.maps.yaml.layout import Layout
 from dorothie_gym.maps.yaml.plan import GreenPlan, LightsPlan, StreetPlan
-from dorothie_gym.maps.yaml.segments import Crossing
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.portable_math import wrap_radians
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.entries import YamlEntry
+    from dorothie_gym.maps.yaml.geometry import Point
+    from dorothie_gym.maps.yaml.layout import Layout
+    from dorothie_gym.maps.yaml.segments import Crossing
 
 CROSSWALK_SPAN = (0.5, 3.5)
 """Distances of both edges of a crosswalk beyond the ends of the lanes, towards the junction [m]."""

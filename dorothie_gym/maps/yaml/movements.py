@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.yaml.arms import (
@@ -18,9 +19,11 @@ from dorothie_gym.maps.yaml.arms import (
     turn_between,
 )
 from dorothie_gym.maps.yaml.geometry import Curve, connect
-from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.portable_math import wrap_radians
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 
 STRAIGHT_BELOW = math.radians(35.0)
 """Largest change of heading of a straight movement [rad]."""

@@ -22,10 +22,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from dorothie_gym.maps.yaml.entries import YamlEntry, listed, read_nodes
-from dorothie_gym.maps.yaml.geometry import Point
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, JunctionPlan, LightsPlan, RoundaboutPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.street_schema import (
     StreetDefaults,
@@ -37,6 +36,9 @@ from dorothie_gym.maps.yaml.street_schema import (
     shown,
     speed,
 )
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.geometry import Point
 
 LIGHTS_KEYS = ("at", "offset", "phases")
 PHASE_KEYS = ("green", "left", "seconds")

@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.yaml.entries import YamlEntry
 from dorothie_gym.maps.yaml.plan import Bend, CourseStep, JunctionPlan, StreetPlan
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.yaml.entries import YamlEntry
 
 STREET_KEYS = ("through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk")
 SPEED_RANGE = (5.0, 130.0)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.cells import is_hidden, is_in_view
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh
-from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import BEHIND
 from dorothie_gym.support.compilation import concurrent, inlined
 from dorothie_gym.support.compilation.records import RecordArray
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
+    from dorothie_gym.pictures.camera.pose import View
 
 _ROUNDED = 0.01  # [m] more than rounding moves the plane of a triangle
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dorothie_gym.pictures.camera.session_camera import Bodies
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.compilation.records import Record, RecordArray, empty_records, plain
 from dorothie_gym.support.portable_math import wrap_radians
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.session_camera import Bodies
 
 _CONTINUOUS = ("x", "y", "height", "speed", "acceleration", "odometer")
 

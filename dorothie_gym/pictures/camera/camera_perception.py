@@ -9,28 +9,30 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
-from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.session_pictures import camera_of
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA, is_body_seen, is_landmark_recognised
 from dorothie_gym.session.observations import write_landmarks
 from dorothie_gym.session.providers import OBSERVERS
-from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.sim.sensing.perception import BODY, look_around
 from dorothie_gym.sim.state.records import EyeRecord, SeenRecord
-from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.support.copying import CachedViews
 from dorothie_gym.support.portable_math import wrap_radians
-from dorothie_gym.tasks.storyboard import Landmark
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.session_camera import SessionCamera
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.observations import Observation
+    from dorothie_gym.sim.world import World
+    from dorothie_gym.tasks.storyboard import Landmark
 
 
 class CameraPerception(CachedViews):

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.mesh import Mesh
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import NEAR, VisibilityBuffer, collect_triangles, draw_collected
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
 from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.mesh import Mesh
+    from dorothie_gym.pictures.camera.pose import View
 
 CELL = 24.0
 """Size of a cell [m]."""

@@ -7,15 +7,17 @@ perception (`sim/sensing/visibility.py`), so that contrast in the picture falls 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
-from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import by_reference
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.weather import Weather
 
 _CLEAR_HORIZON, _CLEAR_ZENITH = (196, 212, 226), (84, 136, 204)
 _WARM_HORIZON, _WARM_ZENITH = (242, 178, 118), (88, 104, 158)  # sunrise and sunset

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.labels import plane_of
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, Surface
-from dorothie_gym.pictures.camera.optics import Optics
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.samples import (
     AMBIENT,
     BIAS,
@@ -40,6 +38,10 @@ from dorothie_gym.pictures.camera.shadows import TEXEL
 from dorothie_gym.pictures.camera.texturing import Textures, sample_texture
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import by_reference, gives_row
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.optics import Optics
+    from dorothie_gym.pictures.camera.pose import View
 
 FACES: Final = 64
 """Number of triangles whose faces are kept; a power of two."""

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import PictureError
-from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.pictures.camera.atlas import AtlasArrays
 from dorothie_gym.pictures.camera.cells import CellOrder, CellTable, new_order, sorted_by_cell
 from dorothie_gym.pictures.camera.daylight import Daylight, daylight_of
@@ -31,10 +30,13 @@ from dorothie_gym.pictures.camera.shading import shade
 from dorothie_gym.pictures.camera.shadows import new_shadow_maps, turn_sun
 from dorothie_gym.pictures.camera.texturing import textures_of
 from dorothie_gym.session.config import CameraConfig, CameraOutput
-from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.compilation import direct, fixed
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.world_exceptions import Sensor
+    from dorothie_gym.sim.weather import Weather
 
 T = TypeVar("T")
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.head_lights import HeadLights, beam_light
 from dorothie_gym.pictures.camera.lighting import (
     HAZE_START,
@@ -45,6 +45,9 @@ from dorothie_gym.pictures.camera.samples import (
 )
 from dorothie_gym.pictures.camera.shadows import REACH, STEPS, TEXEL, ShadowMaps, sunlit
 from dorothie_gym.support.compilation import compiled, inlined
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 _GROUND, _GLASS, _EMISSIVE = int(Surface.GROUND), int(Surface.GLASS), int(Surface.EMISSIVE)
 _GLOW = (0.8, 0.69, 0.5)  # factors of the light of lit windows

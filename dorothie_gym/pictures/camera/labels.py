@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.ground.lookup import GroundArrays, material_of_part, part_of
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import SKY, VisibilityBuffer
 from dorothie_gym.pictures.camera.samples import FIRST, ROOM, Samples, X, Y
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
 from dorothie_gym.support.compilation.records import by_reference
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.pose import View
 
 _SKY_CLASS = int(ObjectClass.SKY.value)
 _GROUND = int(Surface.GROUND)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.optics import Optics
 from dorothie_gym.sim.sensing.visibility import transmission
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import concurrent, inlined
 from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.optics import Optics
 
 LAMP_REACH = 20.0
 """Distance from a lamp's foot up to which its light is drawn [m]."""

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.ontology.slots import ObjectClass
 
 PLAIN = 0
 """Index of the texture without a pattern."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from dorothie_gym.pictures.camera.daylight import Daylight
-from dorothie_gym.pictures.camera.pose import View
-from dorothie_gym.pictures.camera.shadows import ShadowMaps
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import inlined
 from dorothie_gym.support.compilation.records import by_reference
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.daylight import Daylight
+    from dorothie_gym.pictures.camera.pose import View
+    from dorothie_gym.pictures.camera.shadows import ShadowMaps
 
 
 @by_reference

@@ -6,12 +6,16 @@ of a building tints them; windows and doors are dark. Alpha is the share of own 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.lettering import Ink, Picture
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.lettering import Ink, Picture
 
 BAYS = 4
 """Windows beside and above each other in one repeat of a wall with windows."""

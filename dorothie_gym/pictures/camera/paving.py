@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.faces import Face
 from dorothie_gym.pictures.camera.ground.colours import (
     BLENDED,
     GRAINS,
@@ -30,7 +29,6 @@ from dorothie_gym.pictures.camera.ground.lookup import (
     part_of,
 )
 from dorothie_gym.pictures.camera.mesh import Surface
-from dorothie_gym.pictures.camera.optics import Optics
 from dorothie_gym.pictures.camera.samples import (
     AMBIENT,
     BIAS,
@@ -57,6 +55,11 @@ from dorothie_gym.pictures.camera.samples import (
     whole_vectors,
 )
 from dorothie_gym.support.compilation import compiled, inlined
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.faces import Face
+    from dorothie_gym.pictures.camera.optics import Optics
 
 _GROUND = int(Surface.GROUND)
 _DONE = -1  # instead of a material: the colour has been written

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA, is_body_seen
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import SceneTable
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 
 def pictured_actors(session: Session, town: Town) -> SceneTable:

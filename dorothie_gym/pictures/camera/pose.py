@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.session.config import CameraMount
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.config import CameraMount
 
 
 @shared

@@ -8,16 +8,18 @@ gaps nor samples drawn twice. The near plane cuts edges from their visible end.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.mesh import PADDING, Mesh
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
 from dorothie_gym.support.compilation.records import by_reference
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.pose import View
 
 SKY = -1
 """Triangle of samples that see none."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -17,39 +18,41 @@ from numpy.typing import NDArray
 from dorothie_gym.archive.actor_tracks import ActorTracks, Moment
 from dorothie_gym.archive.recorded_perception import Switches, light_switches
 from dorothie_gym.errors import OntologyError, SessionError
-from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.spellings import parse_landmark, parse_sensor
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.body_snapshots import BodySnapshot
-from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
-from dorothie_gym.pictures.camera.pose import CameraPose
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes, solid_boxes
 from dorothie_gym.pictures.camera.town_scene import SessionScene, TownScene
-from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.session.recording.events import EventType
-from dorothie_gym.session.recording.header import LandmarkRow
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import LIGHT_STATES, ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.pedestrians.walking import PACE
-from dorothie_gym.sim.sensing.visibility import Visibility
+from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.sim.world import CLARITY
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Record, RecordArray, empty_records, plain
 from dorothie_gym.support.portable_math import wrap_radians
 from dorothie_gym.tasks.storyboard import Landmark
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.town import LightColour, Town
+    from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+    from dorothie_gym.pictures.camera.pose import CameraPose
+    from dorothie_gym.session.config import CameraConfig
+    from dorothie_gym.session.recording.header import LandmarkRow
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.sim.sensing.visibility import Visibility
 
 _KINDS = {ActorKind.VEHICLE: Kind.CAR, ActorKind.CYCLIST: Kind.CYCLIST}
 _NO_BODY = -1

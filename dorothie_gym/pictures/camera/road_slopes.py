@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.maps.shapes import TownSamples
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 _CELL = 5.0  # [m]; samples as far away count
 _LEVEL = 1.5  # [m] of height between a vehicle and its road, at most

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.camera.cells import sorted_by_cell
 from dorothie_gym.pictures.camera.ground.ground import Ground
 from dorothie_gym.pictures.camera.ground.town_ground import build_ground
@@ -14,6 +15,9 @@ from dorothie_gym.pictures.camera.road_slopes import road_slopes
 from dorothie_gym.pictures.camera.scenery.town_scenery import build_scenery
 from dorothie_gym.pictures.camera.town_scene import TownScene
 from dorothie_gym.pictures.maps.map_layers import MapLayers
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 
 def build_town_scene(town: Town) -> TownScene:

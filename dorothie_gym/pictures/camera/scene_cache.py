@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.cache import pack
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.camera.array_cache import Arrays, columns, table_of, through_cache
 from dorothie_gym.pictures.camera.cells import CellTable
 from dorothie_gym.pictures.camera.ground.ground import Ground
@@ -18,6 +18,9 @@ from dorothie_gym.pictures.camera.road_slopes import RoadSlopes
 from dorothie_gym.pictures.camera.scenery.lenses import Lenses
 from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.town_scene import TownScene
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 SCENES_KEPT = 16
 """Largest number of entries; the oldest are removed beyond it. A scene takes 10 to 30 MB."""

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.bodies import copy_bodies
 from dorothie_gym.pictures.camera.cells import CellOrder, CellTable, draw_cells, draw_more_cells
-from dorothie_gym.pictures.camera.mesh import Mesh
-from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import VisibilityBuffer, clear, draw_triangles
 from dorothie_gym.pictures.camera.shadows import ShadowMaps, draw_shadows
 from dorothie_gym.support.compilation import concurrent
 from dorothie_gym.support.compilation.records import RecordArray
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.mesh import Mesh
+    from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
+    from dorothie_gym.pictures.camera.pose import View
 
 
 @concurrent

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor
-from dorothie_gym.sim.world import CLARITY
+from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.support.compilation import concurrent
 
 _SHARE = 0.012  # radius of the blur as a share of the picture's width

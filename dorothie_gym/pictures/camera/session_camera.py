@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import LightColour, LightPhase
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.cells import is_in_view
@@ -20,16 +19,19 @@ from dorothie_gym.pictures.camera.models.model_bank import FIRST_PERSON, FIRST_P
 from dorothie_gym.pictures.camera.pose import CameraPose, View, pose_on_car
 from dorothie_gym.pictures.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
-from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.config import CameraConfig
 from dorothie_gym.sim.state.codes import Colour
-from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.world_arrays import CAR_KEY
-from dorothie_gym.sim.weather import Weather
-from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import concurrent, fixed, inlined
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.town_scene import SessionScene
+    from dorothie_gym.session.config import CameraConfig
+    from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
+    from dorothie_gym.sim.weather import Weather
+    from dorothie_gym.sim.world import World
 
 REACH = 250.0
 """Distance up to which bodies are drawn [m]: a car is then two pixels high in a picture of 480 x 320."""

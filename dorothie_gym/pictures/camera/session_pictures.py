@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from dorothie_gym.maps.town import Town
-from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.providers import FIELDS, OBSERVERS
-from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.session.spaces.observations import Observation
-from dorothie_gym.sim.world import World
 from dorothie_gym.support.copying import CachedViews
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.spaces.observations import Observation
+    from dorothie_gym.sim.world import World
 
 
 def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCamera:

@@ -6,26 +6,30 @@ that see the same triangle are a run, which is coloured at once; light and air f
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.pictures.camera.daylight import Daylight
 from dorothie_gym.pictures.camera.faces import FACES, Face, add_face, face_of, read_face
-from dorothie_gym.pictures.camera.ground.lookup import GroundArrays
-from dorothie_gym.pictures.camera.head_lights import HeadLights
 from dorothie_gym.pictures.camera.illumination import light_samples
 from dorothie_gym.pictures.camera.labels import mesh_of, row_in
-from dorothie_gym.pictures.camera.lighting import LampMap
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, Surface
-from dorothie_gym.pictures.camera.optics import Optics
 from dorothie_gym.pictures.camera.paving import add_ground
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.pictures.camera.rasterizer import SKY, VisibilityBuffer
 from dorothie_gym.pictures.camera.samples import BLUE, GREEN, RED, RIGHT, ROOM, UP, WEIGHT, Samples
-from dorothie_gym.pictures.camera.shadows import ShadowMaps
 from dorothie_gym.pictures.camera.sky import add_sky
-from dorothie_gym.pictures.camera.texturing import Textures
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.daylight import Daylight
+    from dorothie_gym.pictures.camera.ground.lookup import GroundArrays
+    from dorothie_gym.pictures.camera.head_lights import HeadLights
+    from dorothie_gym.pictures.camera.lighting import LampMap
+    from dorothie_gym.pictures.camera.optics import Optics
+    from dorothie_gym.pictures.camera.pose import View
+    from dorothie_gym.pictures.camera.shadows import ShadowMaps
+    from dorothie_gym.pictures.camera.texturing import Textures
 
 _GROUND = int(Surface.GROUND)
 

@@ -10,7 +10,7 @@ the picture alone, not on earlier ones.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,13 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.bodies import surround
 from dorothie_gym.pictures.camera.cells import CellTable, is_in_view
 from dorothie_gym.pictures.camera.mesh import TOWN, Mesh, Surface
-from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
-from dorothie_gym.pictures.camera.pose import View
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
 from dorothie_gym.support.compilation.records import RecordArray, by_reference
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
+    from dorothie_gym.pictures.camera.pose import View
 
 TEXEL = 0.2
 """Width of a square of the plane [m]."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.daylight import Daylight
 from dorothie_gym.pictures.camera.optics import Optics, ray
 from dorothie_gym.pictures.camera.samples import (
     AMBIENT,
@@ -36,6 +35,10 @@ from dorothie_gym.pictures.camera.samples import (
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.daylight import Daylight
 
 _SIZE = 256
 _MASK = _SIZE - 1

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.compilation.records import RecordArray, plain
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.models.model_bank import ModelBank, PlacementRecord
 
 
 @dataclass(frozen=True)

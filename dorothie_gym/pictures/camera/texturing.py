@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.pictures.camera.atlas import AtlasArrays
 from dorothie_gym.support.compilation import inlined
 from dorothie_gym.support.compilation.records import by_reference
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.atlas import AtlasArrays
 
 _LANES = 0x00FF00FF00FF00FF  # the four channels of a texel, 16 bits apart
 

@@ -5,18 +5,21 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.shapes import Shape, disc, ribbon, simplified, strokes
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.palette import Colour
 
 # Larger holes between connectors are islands (such as the middle of a roundabout), not asphalt [m2].
 _LARGEST_HOLE = 160.0

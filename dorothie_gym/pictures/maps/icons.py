@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.maps.town import LightColour
 from dorothie_gym.pictures import palette
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import font
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.palette import Colour
 
 ICON_SUPERSAMPLING = 4  # supersampling factor
 _LAMPS = (

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Signal, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.maps import markings
 from dorothie_gym.pictures.maps.borders import Border, Borders, find_borders
 from dorothie_gym.pictures.maps.ground import landscape
@@ -18,6 +18,9 @@ from dorothie_gym.pictures.maps.markings import lane_arrows
 from dorothie_gym.pictures.maps.medians import find_pockets, held, pocket_paint
 from dorothie_gym.pictures.maps.shapes import Shape, TownSamples
 from dorothie_gym.pictures.maps.surfaces import BEYOND_BRIDGE, deck, streets, tunnel_floors, tunnel_pavements
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 _SIGN_ASIDE = 1.5  # [m] from the edge of the lane
 SHOWN = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)

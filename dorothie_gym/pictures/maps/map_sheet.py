@@ -5,20 +5,23 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array, LinkType, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.borders import BorderKind
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.icons import ICON_SUPERSAMPLING, pin_icon, sign_icon, stamp
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.markings import one_way_arrow, one_way_places, turn_arrow
 from dorothie_gym.pictures.maps.town_map import BAR_LENGTHS, GROUND, MapPainter
 from dorothie_gym.pictures.text import font, words
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 _ROWS = 4
 _HIGH = 1.9  # [units] height of a swatch

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.borders import Border, BorderKind, Borders
 from dorothie_gym.pictures.maps.shapes import Shape, cut, dash_pattern, place, stroke, zebra
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.palette import Colour
 
 ARROW_LENGTH = 6.0
 """Length of a turn arrow [m]."""

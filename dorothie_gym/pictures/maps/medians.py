@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Lane
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.borders import Border, BorderKind, Borders
-from dorothie_gym.pictures.maps.levels import LevelLookup
 from dorothie_gym.pictures.maps.shapes import Shape, disc, longer, stroke
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array, Lane
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.levels import LevelLookup
 
 SHORTEST_MEDIAN = 8.0
 """Longest median without plants [m]."""

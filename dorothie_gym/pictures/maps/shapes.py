@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array, Lane
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 
 @dataclass(frozen=True, eq=False)

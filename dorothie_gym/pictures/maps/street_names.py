@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -12,14 +13,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array, Lane
-from dorothie_gym.pictures.maps.borders import Border
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.markings import ARROW_LENGTH
 from dorothie_gym.pictures.maps.medians import pocket_places
 from dorothie_gym.pictures.maps.shapes import sample, side_line
 from dorothie_gym.pictures.maps.street_axes import Axis, across_junctions, beside_axes, street_axes
 from dorothie_gym.pictures.text import font
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.maps.borders import Border
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 
 class LabelClearance(enum.IntEnum):

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import Array, Lane, Site
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.borders import SAME_SURFACE, Border, BorderKind
 from dorothie_gym.pictures.maps.ground import junction_areas
@@ -30,8 +29,12 @@ from dorothie_gym.pictures.maps.shapes import (
     stroke,
     strokes,
 )
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array, Lane, Site
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.palette import Colour
 
 _LAID_BACK = 0.55  # [m] of slope per metre of depth
 _BROADEST_SLOPE = 3.0  # [m]

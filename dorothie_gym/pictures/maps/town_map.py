@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array, Lane, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.icons import lamp_colour, pin_icon, sign_icon, stamp
@@ -22,6 +22,9 @@ from dorothie_gym.pictures.maps.street_names import Label, LabelPlacer, covering
 from dorothie_gym.pictures.text import set_along, words
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 SUPERSAMPLING = 2
 GROUND = 14.0

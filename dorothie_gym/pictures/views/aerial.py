@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,6 @@ from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.town_map import MapPainter, draw_scale_bar
 from dorothie_gym.pictures.text import font
-from dorothie_gym.pictures.views.scene import Pin, Scene
 from dorothie_gym.pictures.views.sprites import (
     PIN_LENGTH,
     Canvas,
@@ -29,6 +29,9 @@ from dorothie_gym.pictures.views.sprites import (
 )
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.views.scene import Pin, Scene
 
 _NIGHT = (126, 138, 184)
 _OVERCAST = (226, 230, 236)

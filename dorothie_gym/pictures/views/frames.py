@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.views.aerial import AerialView
 from dorothie_gym.pictures.views.panel import Panel
-from dorothie_gym.pictures.views.scene import Scene
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.views.scene import Scene
 
 PICTURE_SIZE = (1640, 900)
 """Width and height of the picture of a whole session with its transcript [px]."""

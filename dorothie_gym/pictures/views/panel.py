@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures import palette
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import shorten, words, wrap
 from dorothie_gym.pictures.views.aerial import weather_summary
 from dorothie_gym.pictures.views.scene import Scene, SpokenLine
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.palette import Colour
 
 _PANEL_FINE = 2  # supersampling factor
 _PAD = 20

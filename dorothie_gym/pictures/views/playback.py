@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.archive.actor_tracks import ActorTracks
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
-from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.pictures.views.exception_words import exception_words
@@ -26,12 +24,16 @@ from dorothie_gym.pictures.views.scene import (
     SubgoalState,
 )
 from dorothie_gym.session.recording.events import EventType
-from dorothie_gym.session.recording.header import LandmarkRow
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.catalogue import map_labels
 from dorothie_gym.tasks.storyboard import with_reason
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.dialogue_acts import DialogueAct
+    from dorothie_gym.session.recording.header import LandmarkRow
+    from dorothie_gym.session.recording.session import Session
 
 _KINDS: Final[dict[int, FigureKind]] = {
     int(ActorKind.VEHICLE): "vehicle",

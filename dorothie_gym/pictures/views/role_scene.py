@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
@@ -38,6 +38,9 @@ from dorothie_gym.session.spaces.observations import (
 )
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.tasks.catalogue import map_label, map_labels
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 _KINDS: dict[ObjectClass, FigureKind] = {ObjectClass.VEHICLES: "vehicle", ObjectClass.PEDESTRIAN: "pedestrian"}
 _TITLES = {

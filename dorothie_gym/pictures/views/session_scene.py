@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.pictures.views.exception_words import exception_words
@@ -21,7 +21,10 @@ from dorothie_gym.pictures.views.scene import (
     SpokenLine,
     SubgoalState,
 )
-from dorothie_gym.session.live_session import LiveSession
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Utterance
+    from dorothie_gym.session.live_session import LiveSession
 
 
 def utterances_of(session: LiveSession) -> list[SpokenLine]:

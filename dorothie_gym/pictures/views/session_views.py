@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,10 +11,12 @@ from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.views.aerial import AerialView
 from dorothie_gym.pictures.views.frames import SceneRenderer
 from dorothie_gym.pictures.views.panel import Panel
-from dorothie_gym.pictures.views.scene import Scene
 from dorothie_gym.pictures.views.subtitles import Subtitles
 from dorothie_gym.session.config import RenderView
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.views.scene import Scene
 
 _SIZE = 1280, 720
 _WINDSCREEN = 832, 540  # of `RenderView.BOTH`; the subtitles are below

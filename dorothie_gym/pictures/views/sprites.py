@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.shapes import disc, place, stroke
 from dorothie_gym.pictures.maps.town_map import SUPERSAMPLING
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import words
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.palette import Colour
 
 _STROKE = 6  # segments
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures import palette
-from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.pictures.text import shorten, wrap
 from dorothie_gym.pictures.views.panel import Pen
-from dorothie_gym.pictures.views.scene import Scene, SpokenLine
 from dorothie_gym.support.libraries import pygame
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.palette import Colour
+    from dorothie_gym.pictures.views.scene import Scene, SpokenLine
 
 LINGER = 2.5
 """Time for which a line stays bright after it was heard [s]: long enough to read its end."""

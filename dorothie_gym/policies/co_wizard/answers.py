@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
@@ -24,9 +23,6 @@ from dorothie_gym.policies.co_wizard.proposition_truth import (
     seconds_to_goal,
     sees_far,
 )
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.knowledge import CoWizardKnowledge
 from dorothie_gym.policies.notable_conditions import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
@@ -34,6 +30,13 @@ from dorothie_gym.policies.route_progress import direction_of
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import camera_fault, limit_of, sight
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.ontology.dialogue_acts import DialogueAct
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.knowledge import CoWizardKnowledge
 
 _ABOUT_THE_GOAL = frozenset(
     {Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS}

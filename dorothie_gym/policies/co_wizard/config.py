@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
-from dorothie_gym.policies.mood import Mood
 from dorothie_gym.policies.persona import Driving, Persona, within
 from dorothie_gym.policies.policy import replace
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.mood import Mood
 
 
 @dataclass(frozen=True, kw_only=True)

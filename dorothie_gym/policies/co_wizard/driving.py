@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,6 @@ from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.intentions import Wish
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, slowing_distance, u_turn_start
 from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import (
@@ -31,6 +30,10 @@ from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 CRUISE_TOLERANCE = 2.6
 """Difference between actual and target cruise speed that is not corrected [km/h]; half a speed step of 5 km/h."""

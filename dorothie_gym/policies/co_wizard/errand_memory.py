@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +14,12 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.purposes import read_purpose
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.observation_parser import HeardUtterance
 
 _TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.REPLY_W})
 _CLAUSE = re.compile(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +17,14 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.errand_memory import kept_for_later
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 """Names that several places bear."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
@@ -18,15 +20,17 @@ from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
 from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
-from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.session.spaces.actions import Physical
 
 _HANDLED = frozenset(
     {WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION, WeatherParameter.SUN_ALTITUDE_ANGLE}

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dorothie_gym.dialogue.speaker_style import draw_style
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
@@ -25,9 +24,12 @@ from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Mental, Physical
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 class ScriptedCoWizard(Policy[CoWizardState]):

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dorothie_gym.dialogue.conversation import is_partly_inaudible
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import doubt
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend, repeated
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.observation_parser import HeardUtterance
 
 FRAGMENT = 3
 """Largest number of meaningless words that count as the rest of a misheard utterance."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
@@ -19,6 +18,10 @@ from dorothie_gym.policies.route_progress import Choice, next_choice
 from dorothie_gym.policies.route_tables import is_choice
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
 
 
 @dataclass(frozen=True, kw_only=True)

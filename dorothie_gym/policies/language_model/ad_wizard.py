@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
@@ -28,6 +28,9 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.session.spaces.actions import ActionDict, AdWizardAction, LanePosition
 from dorothie_gym.session.spaces.observations import ObservationMapping, PropColumn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 AGAIN = ("60", "20", "30", "90", "120")
 """Times after which the model can ask to be asked again [s]."""

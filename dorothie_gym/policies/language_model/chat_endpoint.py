@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from dorothie_gym.errors import InputFileError, PolicyLoadError, one_line
 from dorothie_gym.policies.language_model.faults import CallError, Fault
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import parse_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 KEY_VARIABLE: Final = "OPENAI_API_KEY"
 """Environment variable with the secret for the header `Authorization`; unset for servers without one."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
 from dorothie_gym.policies.language_model.co_wizard_prompt import (
     answer_schema,
     drive_options,
@@ -33,8 +32,12 @@ from dorothie_gym.policies.language_model.role_interface import (
 )
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, LanePosition, Mental, Physical
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 REPEAT_AFTER = 3.0
 """Time after which a step that is still due is pointed out once more [s]."""

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LinkType
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
-from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
 from dorothie_gym.policies.language_model.role_interface import (
     ALL_NAMES,
     KEEP,
@@ -33,6 +30,12 @@ from dorothie_gym.session.spaces.observations import ExitColumn
 from dorothie_gym.sim.ego.limits import may_change_cruise
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
 
 AHEAD = (5, 10, 20, 30, 50, 80)
 """Distances ahead at which a place can be marked [m]."""

@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
 from dorothie_gym.policies.language_model.cassette import Cassette, Reply
 from dorothie_gym.policies.language_model.chat_endpoint import ChatEndpoint, IncompleteError, httpx_module
-from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.language_model.faults import ABOUT_THE_ANSWER, WORTH_REPEATING, CallError
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.language_model.config import LanguageModelConfig
 
 _LEAST_TIME: Final = 0.05
 """Time below which no further attempt is made [s]."""

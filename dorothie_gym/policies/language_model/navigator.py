@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import SAME_WAY
@@ -28,6 +27,10 @@ from dorothie_gym.policies.route_progress import (
 )
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 TURN_LEAD = 85.0
 """Distance to a junction from which on its turn is due [m]; as the scripted Co-Wizard commands it."""

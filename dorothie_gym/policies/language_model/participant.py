@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
 from dorothie_gym.policies.language_model.role_interface import (
@@ -31,8 +31,11 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress, stopping_distance
 from dorothie_gym.policies.turn_lanes import next_turn
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 ANNOUNCED = 70.0
 """Distance to a junction at which its turn is due to be announced [m]; a car at 40 km/h takes 6 s for it."""

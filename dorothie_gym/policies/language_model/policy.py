@@ -7,14 +7,12 @@ import io
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.ad_wizard import AdWizardInterface
-from dorothie_gym.policies.language_model.cassette import Reply
 from dorothie_gym.policies.language_model.co_wizard import CoWizardInterface
 from dorothie_gym.policies.language_model.config import LanguageModelConfig, SimulatedTime
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
@@ -23,9 +21,13 @@ from dorothie_gym.policies.language_model.role_interface import Memory, RoleInte
 from dorothie_gym.policies.language_model.usage import ModelUsage
 from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.policies.policy import Policy, replace
-from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.language_model.cassette import Reply
+    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 _LOG = logging.getLogger(__name__)
 

@@ -8,11 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
-from typing import ClassVar, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Final, Generic, TypeVar
 
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
 from dorothie_gym.policies.observation_parser import (
@@ -26,8 +25,11 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.session.spaces.actions import ActionDict, Speech
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 KEEP: Final = "keep"
 """Label of leaving a goal, a status or a plan as it is."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Annotated, TypeAlias, TypedDict
 
 from msgspec import Meta
 
-from dorothie_gym.policies.language_model.faults import Fault
+if TYPE_CHECKING:
+    from dorothie_gym.policies.language_model.faults import Fault
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, lt=2**53)]
 Amount: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e12)]

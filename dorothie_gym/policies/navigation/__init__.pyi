@@ -3,6 +3,6 @@
 from .actions import NavigationAction as NavigationAction
 from .instructor import Guidance as Guidance
 from .navigation_policy import NavigationPolicy as NavigationPolicy
-from .observation_vector import FIELD_SPECS as FIELD_SPECS
-from .observation_vector import FIELDS as FIELDS
-from .observation_vector import layout as layout
+from .observation_fields import FIELD_SPECS as FIELD_SPECS
+from .observation_fields import FIELDS as FIELDS
+from .observation_fields import layout as layout

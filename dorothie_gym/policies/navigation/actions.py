@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import LinkType
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
-from dorothie_gym.policies.navigation.driver_view import DriverArrays
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.ego.limits import (
     HALF_LENGTH,
@@ -30,6 +28,9 @@ from dorothie_gym.support.compilation import compiled, direct
 from dorothie_gym.support.compilation.records import plain
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.navigation.driver_view import DriverArrays
+    from dorothie_gym.policies.navigation.junction_exits import ExitArrays
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

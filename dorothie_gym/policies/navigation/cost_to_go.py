@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.maps.routing_graph import RoutingLane, routing_graph
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 REACHED_BEHIND = 2.0
 """Largest distance behind the car at which a goal counts as reached instead of passed [m]."""

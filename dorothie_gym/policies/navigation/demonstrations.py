@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.policies.co_wizard.driving import distance_ahead
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
-from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.navigation.actions import LEFT, NavigationAction, prepares
 from dorothie_gym.policies.navigation.driver_view import driver_of
-from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.navigation_policy import (
     PLAIN_STYLE,
     DriverInputs,
     NavigationPolicyState,
     has_nothing_to_do,
 )
-from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
+from dorothie_gym.policies.navigation.observation_fields import MAX_SECONDS, Vector
 from dorothie_gym.policies.route_progress import lanes_beside
-from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.navigation.junction_exits import JunctionExits
+    from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 STOP_FOR_GOAL = 30.0
 """Distance to the destination within which a stop is attributed to it [m]."""

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import LinkType
-from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays, JunctionExits
+from dorothie_gym.policies.navigation.observation_fields import COLOURS, OBJECTS, SECTORS
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.session.spaces.observations import ExitColumn, ObjectColumn, ObservationMapping
 from dorothie_gym.sim.config import FRAME_RATE
@@ -29,14 +28,9 @@ from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray, by_reference, empty_records, plain
 
 if TYPE_CHECKING:
+    from dorothie_gym.policies.navigation.junction_exits import ExitArrays, JunctionExits
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
-
-OBJECTS: Final = 6
-"""Number of objects in a view, the nearest first."""
-
-COLOURS: Final = tuple(LightColour)
-"""Colours of lights in the order of `codes.Colour`."""
 
 _SECTORS, _PARAMETERS = len(SECTORS), len(WeatherParameter)
 

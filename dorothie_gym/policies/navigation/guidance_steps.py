@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import closest_on_segment
-from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.route_search import find_route
 from dorothie_gym.maps.routing_graph import CHANGE_LEFT, NONE, U_TURN, RoutingGraph
 from dorothie_gym.ontology.slots import ActionValue
@@ -25,7 +24,6 @@ from dorothie_gym.policies.route_legs import (
     needs_switch,
 )
 from dorothie_gym.policies.route_progress import ASTRAY, CELL_BEHIND, SAME_ROADBLOCK
-from dorothie_gym.policies.route_tables import RouteTables
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.limits import EGO_STANDING, U_TURN_SPEED, u_turn_braking
 from dorothie_gym.sim.sensing.perception import see
@@ -34,6 +32,8 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.route_arrays import RouteSearch
+    from dorothie_gym.policies.route_tables import RouteTables
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 SWITCH_DISTANCE = 80.0

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
-from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.support.compilation.records import fields
 from dorothie_gym.tasks.catalogue import map_label
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
+
     pass
 
 

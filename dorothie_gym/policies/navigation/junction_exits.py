@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Exit
-from dorothie_gym.maps.town import Town
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.policies.route_progress import lanes_beside, next_choice
 from dorothie_gym.policies.route_tables import is_choice, route_tables
 from dorothie_gym.session.spaces.fields import SpaceLimits
@@ -19,8 +18,9 @@ from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.portable_math import wrap_degrees
 
-SECTORS = tuple(range(-180, 180, 45))
-"""Middles of the sectors [degrees, positive left]: back, sharp right, right, half right, straight, ..."""
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Exit
+    from dorothie_gym.maps.town import Town
 
 SECTOR_WIDTH = 45.0
 """Width of a sector [degrees]."""

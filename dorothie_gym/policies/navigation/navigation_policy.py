@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps.model import LinkType
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -22,25 +20,24 @@ from dorothie_gym.policies.co_wizard.driving import CRUISE_TOLERANCE, distance_a
 from dorothie_gym.policies.co_wizard.intentions import Wish
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, GuidanceConfig
 from dorothie_gym.policies.navigation.actions import EstimatedActionMask, NavigationAction, physical_of
 from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.instructor import GuidanceStep, NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
-from dorothie_gym.policies.navigation.observation_vector import (
-    DECISION_FREQUENCY,
-    MAX_SECONDS,
-    HeardInstruction,
-    NavigationEncoder,
-    Vector,
-)
+from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUENCY, MAX_SECONDS, Vector
+from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.session.spaces.actions import ActionDict, Physical
-from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 ARRIVED_WITHIN = 3.0
 """Distance to its destination within which a standing car is taken to have arrived [m]; wider than the instructor's

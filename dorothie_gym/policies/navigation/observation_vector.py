@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-import numpy as np
-from gymnasium import spaces
-from numpy.typing import NDArray
-
-from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.routing_graph import RoutingLane
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.navigation.actions import write_mask
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo, cost_from
 from dorothie_gym.policies.navigation.driver_view import (
-    COLOURS,
-    OBJECTS,
     CostRecord,
     DriverArrays,
     DriverView,
@@ -33,10 +23,22 @@ from dorothie_gym.policies.navigation.driver_view import (
     read_view,
 )
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays, JunctionExits
+from dorothie_gym.policies.navigation.observation_fields import (
+    AGE_UNIT,
+    CLOSE_UNIT,
+    COLOURS,
+    DETOUR_UNIT,
+    DISTANCE_UNIT,
+    FIELDS,
+    KINDS,
+    MANOEUVRES,
+    OBJECTS,
+    SECTORS,
+    SPEED_UNIT,
+    TOWN_UNIT,
+    Vector,
+)
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.session.spaces.fields import share, signal, sizes
-from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.sim.ego.manoeuvres import find_oncoming
 from dorothie_gym.sim.ego.path_builder import position_on, project_on
@@ -48,125 +50,19 @@ from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray, plain
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.routing_graph import RoutingLane
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.navigation.junction_exits import ExitArrays, JunctionExits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
-Vector: TypeAlias = NDArray[np.float32]
-
-MAX_SECONDS = 600.0
-"""Default time limit of a navigation session [s]."""
-
-DECISION_FREQUENCY = 2.0
-"""Default number of driving decisions per second [Hz]."""
-
-KINDS = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
-"""Classes of objects that the vector distinguishes; all others count as the first."""
-
-SPEED_UNIT = 25.0
-"""Unit of speeds: 90 km/h [m/s]."""
-
-DISTANCE_UNIT = 100.0
-"""Unit of distances to junctions, instructions and hazards [m]."""
-
-CLOSE_UNIT = 10.0
-"""Second, finer unit of distances that have to be met to the metre [m]."""
-
-DETOUR_UNIT = 200.0
-"""Unit of differences between routes [m]."""
-
-TOWN_UNIT = 500.0
-"""Unit of positions on the map [m]."""
-
-AGE_UNIT = 10.0
-"""Unit of the age of an instruction [s]."""
-
 _WEATHER = tuple((parameter.low, parameter.high - parameter.low) for parameter in WeatherParameter)
 _TURN = int(PhysicalAction.J_TURN.value)
-_MANOEUVRES = (int(PhysicalAction.LANE_SWITCH.value), int(PhysicalAction.U_TURN.value), _TURN)
+_MANOEUVRES = tuple(int(action.value) for action in MANOEUVRES)
 _KINDS = tuple(int(kind.value) for kind in KINDS)
 _MOTIONS, _MOVES, _ACTIONS, _LANDMARKS = len(Motion), len(DialogueMove), len(ActionValue), len(LandmarkName)
-
-FIELD_SPECS = (
-    signal("speed", 1, unit="25 m/s", meaning="speed of the car"),
-    share("cruise", 1, unit="90 km/h", meaning="cruise speed"),
-    share("motion", len(Motion), meaning="one-hot `Motion`"),
-    share("manoeuvre", len(_MANOEUVRES), meaning="one-hot manoeuvre, planned or under way: lane switch, U-turn, turn"),
-    share("hazard", 2, unit="1, 100 m", meaning="1 if the car brakes or stands for a hazard; distance to the hazard"),
-    share("lights", 1, meaning="1 if the headlights are on"),
-    share(
-        "lane",
-        4,
-        unit="1, 1, 1, 25 m/s",
-        meaning="1 in a junction; 1 if there is a lane to the left; 1 if there is a lane to the right; speed limit",
-    ),
-    share("uncertainty", 2, unit="10 m, 0.1 rad", meaning="standard deviations of the estimated position and heading"),
-    share("junction", 2, unit="1, 100 m", meaning="1 if a junction with a choice is ahead; distance to the junction"),
-    share(
-        "exits",
-        3 * len(SECTORS),
-        meaning="three flags for each sector of `SECTORS`: exit present, exit planned, exit leads to the named street",
-    ),
-    signal(
-        "traffic_light",
-        1 + len(COLOURS),
-        unit="100 m, 1",
-        meaning="distance to the light at the end of the lane; one-hot colour (green, yellow, red)",
-    ),
-    share("said", 1 + len(DialogueMove), meaning="1 if an instruction was heard; its one-hot `DialogueMove`"),
-    share("said_action", len(ActionValue), meaning="one-hot `ActionValue` of the instruction"),
-    share("said_sector", len(SECTORS), meaning="one-hot sector of the instruction, in the order of `SECTORS`"),
-    share("said_landmark", len(LandmarkName), meaning="one-hot `LandmarkName` of the instruction"),
-    signal(
-        "said_distance",
-        2,
-        unit="100 m, 10 m",
-        meaning="remaining part of the announced distance in two units; negative after the place",
-    ),
-    share("said_age", 1, unit="10 s", meaning="age of the instruction"),
-    signal(
-        "goal", 3, unit="1, 500 m, 500 m", meaning="1 if the place of the goal is known; its position ahead and right"
-    ),
-    signal(
-        "goal_distance",
-        3,
-        unit="500 m, 100 m, 10 m",
-        meaning="cost to go; distance ahead in two units, 1 if the goal is on another lane",
-    ),
-    signal(
-        "detours",
-        3 + len(SECTORS),
-        unit="200 m",
-        meaning="added route cost of a U-turn, of a switch to the left and right, and of the exit in each of `SECTORS`",
-    ),
-    signal(
-        "objects",
-        OBJECTS * (3 + len(KINDS)),
-        unit="50 m, 1, 1, 1",
-        meaning="for each object: distance, sine and cosine of the bearing, one-hot class "
-        "(vehicle, pedestrian, static)",
-    ),
-    share("weather", len(_WEATHER), meaning="each `WeatherParameter` as a share of its range"),
-    share("time", 1, meaning="elapsed share of the time limit"),
-)
-"""Fields of the observation vector, in order. Values are clipped to their range; unknown values are 0.
-
-Units are the scales of normalised values: with the unit "25 m/s", 1 means 25 m/s.
-"""
-
-FIELDS = sizes(FIELD_SPECS)
-"""Sizes of the fields by name, in order."""
-
-
-def layout(fields: Mapping[str, int] = FIELDS) -> dict[str, slice]:
-    """Returns the slice of the observation for each field; by default for the fields of `NavigationEnv`."""
-    ends = np.cumsum(list(fields.values())).tolist()
-    return {name: slice(end - size, end) for (name, size), end in zip(fields.items(), ends, strict=True)}
-
-
-def navigation_space() -> spaces.Space[Vector]:
-    """Returns the observation space: a vector of all `FIELDS`."""
-    space: spaces.Space[Vector] = spaces.Box(-1.0, 1.0, (sum(FIELDS.values()),), dtype=np.float32)
-    return space
 
 
 @dataclass(frozen=True, kw_only=True)

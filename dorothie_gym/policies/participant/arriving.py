@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,11 +18,13 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.policies.speech import Remark, intend
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 STOP_REPEAT = 5.0
 """Time after which the stop instruction is repeated [s]."""

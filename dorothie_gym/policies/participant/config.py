@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.policies.guidance_config import USUAL_SPEED, GuidanceConfig
-from dorothie_gym.policies.mood import Mood
 from dorothie_gym.policies.persona import Directions, Persona, within
 from dorothie_gym.policies.policy import replace
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.mood import Mood
 
 BACKSEAT = 0.22
 """Knowledge times talkativeness above which a participant also guides to known places; two in five do."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
 from dorothie_gym.policies.participant.messages import (
     LONGEST_REASON,
@@ -23,12 +23,15 @@ from dorothie_gym.policies.participant.messages import (
     refers_back,
     seconds_to_take_in,
 )
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.purposes import Purpose, read_purposes
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 # --- changes of the tasks -------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,13 +30,15 @@ from dorothie_gym.policies.participant.retrying import (
     why_standing,
 )
 from dorothie_gym.policies.participant.route_steps import route_step
-from dorothie_gym.policies.participant.state import ParticipantState, StepKey
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 ANNOUNCING_TIME = 1.5
 """Time that the car drives on while a U-turn is being announced [s]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,13 @@ from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import DENSE, sight
 from dorothie_gym.tasks.landmark_designs import features_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 _FAMOUS = frozenset(LandmarkName) - {
     LandmarkName.HOUSE,

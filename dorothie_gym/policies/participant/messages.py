@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,12 +11,14 @@ from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.policies.observation_parser import SeenLandmark
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.purposes import ReadMessage, read_message
 from dorothie_gym.tasks.storyboard import Channel
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.observation_parser import SeenLandmark
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 READING_RATE = 4.0
 """Rate at which a message is read [words/s] (Brysbaert, Journal of Memory and Language 109, 2019: 238 a minute)."""

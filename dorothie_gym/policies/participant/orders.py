@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.speech import Remark, intend
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
 
 _FUNCTIONS: Final = MappingProxyType(
     {

@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.dialogue.speaker_style import draw_style
-from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
 from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
-from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
 
-LONG_RED = 10.0
-"""Standstill at a red light that is felt as long [s]."""
-
-TURN_TIME = 4.0
-"""Standstill across the lane after which a car is no longer regarded as turning [s]."""
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 class ScriptedParticipant(Policy[ParticipantState]):
@@ -108,22 +104,3 @@ class ScriptedParticipant(Policy[ParticipantState]):
         )
         updated.motion = updated.motion.with_speed(view.speed)
         return ParticipantAction(speech=speech).encode(self.limits), updated
-
-
-def excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
-    """Excuses a standstill before a red light and right after it has turned green."""
-    progress, config = state.route.progress, state.config
-    last_stretch = (
-        state.guidance.guiding
-        and progress is not None
-        and progress.left(view.station) < config.last_stretch
-        and progress.next_crossing(state.town, view.station) is None
-    )
-    if not view.standing or last_stretch or view.time - state.motion.moved_at > config.red_light_time:
-        return
-    if light_ahead(state.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
-        return
-    waited = state.motion.standstill(view.time)
-    if waited - state.clock.interval < LONG_RED <= waited:
-        state.feel(Happening.RED_LIGHT, view.time)
-    state.motion = state.motion.at_red_light(view.time, config.start_time)

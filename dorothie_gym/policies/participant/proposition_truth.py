@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
@@ -12,9 +12,11 @@ from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive
 from dorothie_gym.policies.participant.route_steps import route_step
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import first_new_street
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 LEFT_TO_THE_CAR: Final = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
 """Actions that the participant leaves to the car."""

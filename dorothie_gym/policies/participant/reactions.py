@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording, WordingContext
-from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies import act_builders
@@ -26,11 +26,14 @@ from dorothie_gym.policies.observation_parser import (
     weather,
 )
 from dorothie_gym.policies.participant.goals import purpose_of_target
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION})
 """Parameters of the weather that have a reaction of their own."""

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
-from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.observation_parser import HeardUtterance
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend, repeated
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.policies.observation_parser import HeardUtterance
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 _WORTH_REPEATING = act_builders.QUESTIONS | {DialogueMove.EXPLAIN}
 """Moves that the participant asks to have repeated."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
@@ -31,8 +31,6 @@ from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import correction, has_missed
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.participant.yes_no_answers import (
     addition,
     answer_yes_no,
@@ -47,6 +45,11 @@ from dorothie_gym.policies.participant.yes_no_answers import (
 )
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, repeated
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 

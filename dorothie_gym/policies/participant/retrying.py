@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.participant.state import ParticipantState, StepKey
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, intend
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 IN_VAIN = 2
 """Number of failures after which something else is tried."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress
 from dorothie_gym.policies.turn_lanes import next_turn, turn_lanes
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 
 @dataclass(frozen=True, kw_only=True)

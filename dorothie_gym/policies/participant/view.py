@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import (
@@ -19,6 +18,10 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
 
 ACROSS_LANE = 0.8
 """Cosine of the angle between car and lane below which the car is in the middle of a U-turn."""

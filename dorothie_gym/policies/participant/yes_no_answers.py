@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, Slot, SlotValue, StreetName
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.observation_parser import SeenSubgoal
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, route_length, story_remark, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.policies.observation_parser import SeenSubgoal
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
 """Actions that determine the route."""

@@ -9,12 +9,11 @@ import re
 import sys
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
 from dorothie_gym.errors import SessionError, short_repr
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import (
     MAX_DEPTH,
     MAX_SESSION_TEXT,
@@ -23,6 +22,9 @@ from dorothie_gym.support.input_files import (
     raising,
     read_file,
 )
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 # --- Names and limits -------------------------------------------------------------------------------------------------
 

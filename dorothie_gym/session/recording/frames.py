@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +35,12 @@ from dorothie_gym.session.recording.trajectory import (
     check_rising,
     trajectory_of,
 )
-from dorothie_gym.session.recording.validation import ReadReport
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.input_files import ParquetLimits, raising, read_parquet
 from dorothie_gym.support.libraries import pa, pq
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.validation import ReadReport
 
 _TABLES: Final = {"actors": ACTOR_DTYPE, "lights": LIGHT_DTYPE, "weather": WEATHER_DTYPE}
 _WORDS: Final = {

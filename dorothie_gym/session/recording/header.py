@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Final, NotRequired, TypedDict
 
 from dorothie_gym import __version__
 from dorothie_gym.errors import OntologyError, SessionError, short_repr
 from dorothie_gym.ontology.spellings import parse_landmark, parse_street
 from dorothie_gym.session.recording.files import Fields, canonical, canonical_object
-from dorothie_gym.support.files import JsonValue
+
+if TYPE_CHECKING:
+    from dorothie_gym.support.files import JsonValue
 
 NO_LANE: Final = -1
 """Lane number for an unknown lane."""

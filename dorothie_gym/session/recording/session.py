@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.action_log import Decision, encode_decision, read_decisions
 from dorothie_gym.session.recording.events import (
     INFRACTIONS,
@@ -61,6 +61,9 @@ from dorothie_gym.session.recording.validation import ReadReport, faults_of
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.files import new_folder, write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
 
 
 @shared

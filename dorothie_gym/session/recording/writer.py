@@ -7,15 +7,12 @@ import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import OutputFolderError, SessionError
-from dorothie_gym.maps.town import LightColour
-from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.session.recording.action_log import Decision, encode_decision
 from dorothie_gym.session.recording.events import Event, encode_event
 from dorothie_gym.session.recording.files import (
@@ -32,11 +29,16 @@ from dorothie_gym.session.recording.files import (
     safe_name,
 )
 from dorothie_gym.session.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
-from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.session import SessionFile, picture_name
 from dorothie_gym.session.recording.surroundings import ActorColumns, Rows, actor_rows, light_rows, weather_rows
 from dorothie_gym.session.recording.trajectory import check_rising, checked_rows
 from dorothie_gym.support.files import PART, make_folder, sync, write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import LightColour
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.ontology.world_exceptions import WeatherParameter
+    from dorothie_gym.session.recording.header import SessionHeader
 
 
 class SessionWriter:

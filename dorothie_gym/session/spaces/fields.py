@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from multiprocessing.sharedctypes import SynchronizedArray
 from types import MappingProxyType, ModuleType
-from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self, SupportsIndex, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -24,9 +24,11 @@ from gymnasium.vector.utils import (
 from numpy.typing import DTypeLike, NDArray
 
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps.town import Town
 from dorothie_gym.support.copying import CachedViews, shared
 from dorothie_gym.tasks.storyboard import MESSAGE_LENGTH as MESSAGE_LENGTH
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 # --- Texts in shared memory -------------------------------------------------------------------------------------------
 # Text space whose values reach `gymnasium.vector.AsyncVectorEnv` through shared memory.

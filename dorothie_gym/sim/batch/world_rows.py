@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.worlds import VectorWorld
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.world_arrays import WorldArrays, with_room_of
-from dorothie_gym.sim.traffic_rules import WorldEvent
 from dorothie_gym.sim.world import World, parts_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.traffic_rules import WorldEvent
 
 
 class WorldRows:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE
-from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of, world_of
 from dorothie_gym.sim.step import step_share
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.copying import CachedViews
 from dorothie_gym.support.processors import available_processors
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.town_arrays import TownArrays
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:

@@ -5,28 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array, Exit, LinkType
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
 from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE, FeasibleManoeuvres, VehicleControl, may_change_cruise
 from dorothie_gym.sim.ego.manoeuvres import find_feasible, request
 from dorothie_gym.sim.ego.path import Path
-from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusal
-from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.records import GoalRecord
-from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import fields, filled_records, plain
 from dorothie_gym.support.copying import CachedViews, shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.sim.road import TownRoad
+    from dorothie_gym.sim.state.record_views import ArrayHolder
+    from dorothie_gym.sim.state.town_arrays import TownArrays
 
 # --- The car as a vehicle of highway-env ------------------------------------------------------------------------------
 # The ego car as a highway-env vehicle: a view on the arrays of its world.

@@ -18,16 +18,15 @@ from dorothie_gym.sim.ego.obstacles import ROADBLOCK_GAP, STANDSTILL_GAP, bodies
 from dorothie_gym.sim.ego.path import point_at
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, U_TURN, VEHICLES, TrafficControl, Wait, Walk
-from dorothie_gym.sim.state.records import SeenRecord
-from dorothie_gym.sim.state.town_records import PassageRecord
-from dorothie_gym.sim.traffic.idm_traffic import STEP_AHEAD, STEP_PAST
 from dorothie_gym.sim.traffic.junctions import announce, close, request
-from dorothie_gym.sim.traffic.parameters import CRITICAL_GAP, HARDEST_BRAKING
+from dorothie_gym.sim.traffic.parameters import CRITICAL_GAP, HARDEST_BRAKING, STEP_AHEAD, STEP_PAST
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import SeenRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import PassageRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 TURN_ROUND_SPEED = 4.0

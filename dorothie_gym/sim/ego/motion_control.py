@@ -31,7 +31,6 @@ from dorothie_gym.sim.ego.path_builder import height_at_point
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, U_TURN, EventCode, Motion
-from dorothie_gym.sim.state.records import EgoRecord
 from dorothie_gym.sim.state.world_arrays import log
 from dorothie_gym.sim.traffic.junctions import note
 from dorothie_gym.sim.traffic.vehicle_models import slip_of
@@ -48,6 +47,7 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import EgoRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

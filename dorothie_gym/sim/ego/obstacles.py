@@ -11,10 +11,10 @@ from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.ego.path import WIDEST_SWEEP, point_at
 from dorothie_gym.sim.ego.path_builder import PATH_SPACING, height_at_point
 from dorothie_gym.sim.state.codes import STATIC
-from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

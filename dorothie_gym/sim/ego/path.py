@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.path_builder import SEARCH_RANGE
-from dorothie_gym.sim.state.records import CoursePointRecord, SweepRecord, VehicleRecord
+from dorothie_gym.sim.network.lane_lookup import locate
 from dorothie_gym.sim.traffic.parameters import PLANNED
-from dorothie_gym.sim.traffic.vehicle_models import locate
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.records import CoursePointRecord, SweepRecord, VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

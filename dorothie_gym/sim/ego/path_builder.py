@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 from dorothie_gym.maps.model import HEADING, HEIGHT, STATION, Array, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
 from dorothie_gym.sim.network.lane_lookup import closest_segment, stretch_near, wrap_radians
-from dorothie_gym.sim.state.records import CoursePointRecord
-from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import CoursePointRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import LaneRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

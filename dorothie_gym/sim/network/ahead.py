@@ -7,13 +7,15 @@ import heapq
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from dorothie_gym.maps.model import LEVEL_HEIGHT, WIDTH, Array, IntArray, LaneTable, local_coordinates, value_at
-from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 from dorothie_gym.support.compilation import allocating
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 
 HORIZON = 80.0
 """Range ahead and behind, beyond the own lane, in which neighbours are searched [m]."""

@@ -27,6 +27,7 @@ from dorothie_gym.support.compilation import allocating, compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray, empty_records
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
 
 
@@ -352,6 +353,12 @@ def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, f
     at, share, gap = closest_segment(town.points, first, last, x, y)
     station, lateral = coordinates(town.points, town.lanes[number], at, share, gap, x, y)
     return station, lateral, at
+
+
+@inlined
+def locate(town: TownArrays, vehicle: VehicleRecord) -> None:
+    """Finds the place of a vehicle on the lane that it follows."""
+    vehicle.station, vehicle.lateral, vehicle.segment = project(town, vehicle.plan[0], vehicle.x, vehicle.y)
 
 
 @inlined

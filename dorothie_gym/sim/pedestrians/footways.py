@@ -9,16 +9,16 @@ import numpy as np
 
 from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lanes, rightmost
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.pedestrians.pacing import FROM_ENDS, FROM_JUNCTION, KERB, SHORTEST_WALK, WALK_STEP
-from dorothie_gym.sim.state.records import PedestrianRecord
-from dorothie_gym.sim.state.town_records import LaneRecord, WalkwayRecord
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.sim.state.records import PedestrianRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import LaneRecord, WalkwayRecord
 
 
 KEEP_RIGHT = 0.4

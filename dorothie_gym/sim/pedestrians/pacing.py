@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, SizedBody
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import PedestrianRecord, SizedBody
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

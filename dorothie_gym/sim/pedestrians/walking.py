@@ -31,8 +31,6 @@ from dorothie_gym.sim.pedestrians.pacing import (
 )
 from dorothie_gym.sim.randomness import draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, VehicleRecord
-from dorothie_gym.sim.state.town_records import CrossingRecord, WalkwayRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import ASKING, CRITICAL_GAP, TRAFFIC_STANDING
 from dorothie_gym.sim.traffic.vehicle_models import brake_to
@@ -40,7 +38,9 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import PedestrianRecord, VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import CrossingRecord, WalkwayRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,16 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.lane_neighbours import LaneEdges
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Crosswalk, Lane, Sidewalk
-from dorothie_gym.maps.town import Town
-from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import street_walks
 from dorothie_gym.sim.state.codes import NOBODY, Footway
 from dorothie_gym.sim.state.town_records import CrossingRecord, LaneRecord, MouthRecord, PassageRecord, WalkwayRecord
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import RecordArray, empty_records, filled_records
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.sim.network.network import TownNetwork
 
 SAME_END = 0.5
 """Distance within which ends of pavements are one place [m]."""

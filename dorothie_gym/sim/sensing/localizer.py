@@ -10,21 +10,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.randomness import begin_stream, draw_normal
-from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.records import LOCALIZER_STATES, ODOMETRY_DRAWS
-from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.record_views import ArrayHolder
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 SCALE_SIGMA = 0.02
 """Relative error of the odometer, constant for a car (tyre wear, pressure)."""

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
 from dorothie_gym.sim.sensing.visibility import (
@@ -24,20 +23,21 @@ from dorothie_gym.sim.sensing.visibility import (
     signal,
 )
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, Group, Kind, Walk
-from dorothie_gym.sim.state.records import (
-    EyeRecord,
-    PedestrianRecord,
-    PlacedBody,
-    PropRecord,
-    SeenRecord,
-    VehicleRecord,
-)
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.copying import CachedViews
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.records import (
+        EyeRecord,
+        PedestrianRecord,
+        PlacedBody,
+        PropRecord,
+        SeenRecord,
+        VehicleRecord,
+    )
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

@@ -22,9 +22,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.ontology.vocabulary import complete
+from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.copying import shared
+
+CLARITY = complete({Sensor.BLUR: 0.25, Sensor.GPS: 1.0, Sensor.VIEW: 0.0}, Sensor, "CLARITY", __name__)
+"""Share of the signal of the view that the fault of a sensor leaves: blur halves the sight."""
 
 CLEAR_SIGHT = 80.0
 """Range of perception on a clear day [m]."""

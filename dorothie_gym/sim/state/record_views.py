@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeAlias, TypeVa
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.copying import CachedViews
 
 if TYPE_CHECKING:
     from highway_env.vehicle.objects import RoadObject
 
+    from dorothie_gym.maps.model import Array
     from dorothie_gym.sim.network.lane import PolylineLane
     from dorothie_gym.sim.road import TownRoad
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
 class ArrayHolder(Protocol):

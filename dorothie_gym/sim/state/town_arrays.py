@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import WIDTH, Array, Lane, LaneTable, LinkType, SignalKind
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
-from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.lane_lookup import CELL_REACH, SLACK, build_cells
 from dorothie_gym.sim.network.network import TownNetwork, build_exits
 from dorothie_gym.sim.pedestrians.walkways import build_walkways
@@ -34,6 +33,9 @@ from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, 
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import RecordArray, by_reference, empty_records, filled_records
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 PASSING_WIDTH = 2.5
 """Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""

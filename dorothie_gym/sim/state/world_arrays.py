@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,6 @@ from dorothie_gym.sim.state.records import (
     VehicleRecord,
     WatchRecord,
 )
-from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, GOALS, MAX_SUBSTEPS, POINTS, STEPS
 from dorothie_gym.support.compilation import compiled, inlined
@@ -47,6 +46,9 @@ from dorothie_gym.support.compilation.records import (
     plain,
     record_dtype,
 )
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
 
 PROPS = 16
 """Most props in a world."""

@@ -11,8 +11,6 @@ from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.pedestrians.walking import give_way_to_strayers
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Wait, Walk
-from dorothie_gym.sim.state.records import VehicleRecord
-from dorothie_gym.sim.state.town_records import LaneRecord, PassageRecord
 from dorothie_gym.sim.traffic.junctions import announce, forget, note, request
 from dorothie_gym.sim.traffic.lane_index import around, next_on_lane
 from dorothie_gym.sim.traffic.parameters import (
@@ -25,6 +23,8 @@ from dorothie_gym.sim.traffic.parameters import (
     CYCLIST_ACCELERATION,
     HARDEST_BRAKING,
     LINE_GAP,
+    STEP_AHEAD,
+    STEP_PAST,
     STOP_BRAKING,
 )
 from dorothie_gym.sim.traffic.vehicle_models import (
@@ -39,7 +39,9 @@ from dorothie_gym.sim.traffic.vehicle_models import (
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import LaneRecord, PassageRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NO_ROOM_PATIENCE = 5.0
@@ -53,12 +55,6 @@ CURVES_SIGHT = 40.0
 
 CROSSWALK_GAP = 1.0
 """Room that is left before a crosswalk [m]."""
-
-STEP_AHEAD = 5.0
-"""Distance of a coming pedestrian to the middle of a lane within which vehicles stop before the crosswalk [m]."""
-
-STEP_PAST = 2.5
-"""Distance of a pedestrian past the middle of a lane within which vehicles still stop [m]."""
 
 
 @inlined

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.traffic_light_programs import YELLOW_BRAKING
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Kind, Relation, TrafficControl, Wait
-from dorothie_gym.sim.state.records import VehicleRecord
-from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import (
     AFTER_END,
     AT_LINE,
@@ -36,7 +34,9 @@ from dorothie_gym.sim.traffic.parameters import (
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import LaneRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

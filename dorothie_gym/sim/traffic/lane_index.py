@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from dorothie_gym.sim.network.ahead import HORIZON, LANE_MARGIN
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.state.codes import NOBODY, Kind
-from dorothie_gym.sim.state.records import NodeRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import CAR_WIDTH
 from dorothie_gym.support.compilation import compiled, inlined
 from dorothie_gym.support.compilation.records import RecordArray
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import NodeRecord, VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

@@ -217,3 +217,9 @@ CROSSING_SIGHT = 40.0
 
 CROSSING_MARGIN = 0.5
 """Room left beside that U-turn [m]."""
+
+STEP_AHEAD = 5.0
+"""Distance of a coming pedestrian to the middle of a lane within which vehicles stop before the crosswalk [m]."""
+
+STEP_PAST = 2.5
+"""Distance of a pedestrian past the middle of a lane within which vehicles still stop [m]."""

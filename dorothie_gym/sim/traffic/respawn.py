@@ -11,7 +11,6 @@ from dorothie_gym.sim.pedestrians.footways import place_beside
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import choose, draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
-from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import (
     CAR_LENGTH,
@@ -32,6 +31,7 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 

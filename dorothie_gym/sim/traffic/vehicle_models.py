@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.ahead import HORIZON
-from dorothie_gym.sim.network.lane_lookup import project, value_near, wrap_radians
+from dorothie_gym.sim.network.lane_lookup import closest_lane, locate, project, value_near, wrap_radians
 from dorothie_gym.sim.randomness import choose
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.state.records import VehicleRecord
-from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.lane_index import around
 from dorothie_gym.sim.traffic.parameters import (
     ACC_MAX,
@@ -46,7 +43,10 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.sim.state.records import VehicleRecord
     from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.town_records import LaneRecord
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
@@ -74,9 +74,21 @@ def keep_side(vehicle: VehicleRecord, lane: LaneRecord) -> None:
 
 
 @inlined
-def locate(town: TownArrays, vehicle: VehicleRecord) -> None:
-    """Finds the place of a vehicle on the lane that it follows."""
-    vehicle.station, vehicle.lateral, vehicle.segment = project(town, vehicle.plan[0], vehicle.x, vehicle.y)
+def update_lane(town: TownArrays, vehicle: VehicleRecord) -> None:
+    """Updates the closest lane of a vehicle, and its place on the lane that it follows."""
+    lane, station, lateral, segment = closest_lane(
+        town, vehicle.x, vehicle.y, vehicle.heading, vehicle.cos, vehicle.sin, vehicle.height, vehicle.lane
+    )
+    vehicle.lane, vehicle.own_station, vehicle.own_lateral = lane, station, lateral
+    if vehicle.kind == Kind.EGO:
+        vehicle.plan[0], vehicle.planned = lane, 1
+        vehicle.inside = lane if town.lanes[lane].junction >= 0 else -1
+    if lane == vehicle.plan[0]:
+        vehicle.station, vehicle.lateral, vehicle.segment = station, lateral, segment
+    else:
+        locate(town, vehicle)
+    if not town.flat and vehicle.kind != Kind.DRIVEN:
+        vehicle.height = value_near(town.points, town.lanes[lane], segment, 4, station)
 
 
 @compiled

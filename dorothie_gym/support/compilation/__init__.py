@@ -16,8 +16,8 @@ import numpy as np
 from numba.core import config
 from numpy.typing import NDArray
 
-from dorothie_gym.support.compilation.cache import compiled_folder
-from dorothie_gym.support.compilation.dispatcher import CompiledFunction, InlinedFunction
+from dorothie_gym.support.compilation.cache import ContentCache, compiled_folder
+from dorothie_gym.support.compilation.dispatcher import WITHOUT_COUNTS, CompiledFunction, portable
 
 __all__ = [
     "WITHOUT_COUNTS",
@@ -33,9 +33,6 @@ __all__ = [
 ]
 
 F = TypeVar("F", bound=Callable[..., object])
-
-WITHOUT_COUNTS: dict[str, bool] = {"_nrt": False}
-"""numba's option that turns reference counting off."""
 
 
 def allocating(function: F) -> F:
@@ -64,17 +61,6 @@ def inlined(function: F) -> F:
     A call passes a tuple of thirty arrays as two hundred numbers, which takes longer than many small functions.
     """
     return _compile(function, **WITHOUT_COUNTS, forceinline=True)
-
-
-def portable(function: F) -> F:
-    """As `inlined`; called from Python, the function runs as Python, with the same result.
-
-    For short arithmetic that Python calls rarely: reading machine code at the start would take longer than it saves.
-    Integers count as floating-point numbers.
-    """
-    if config.DISABLE_JIT:
-        return function
-    return cast(F, InlinedFunction(function, targetoptions={"nopython": True, **WITHOUT_COUNTS, "forceinline": True}))
 
 
 def direct(function: F) -> F:
@@ -125,5 +111,5 @@ def _compile(function: F, **options: bool) -> F:
     if config.DISABLE_JIT:
         return function
     dispatcher = CompiledFunction(function, targetoptions={"nopython": True, "fastmath": False, **options})
-    dispatcher.enable_caching()
+    dispatcher.keep_in(ContentCache(dispatcher))
     return cast(F, dispatcher)

@@ -15,11 +15,11 @@ from contextlib import contextmanager
 from functools import cache, partial
 from operator import getitem
 from types import BuiltinFunctionType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from llvmlite import binding, ir
 from numba import typeof, types
-from numba.core import cgutils, event, typing
+from numba.core import cgutils, config, event, typing
 from numba.core.codegen import CodeLibrary
 from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
@@ -43,7 +43,6 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from dorothie_gym.support.compilation.cache import ContentCache
 from dorothie_gym.support.compilation.numba_classes import (
     Compiler,
     Context,
@@ -63,6 +62,14 @@ if TYPE_CHECKING:
     from numba.core.compiler import CompileResult
     from numba.core.compiler_machinery import CompilerPass
     from numba.core.typing.templates import Signature
+
+    from dorothie_gym.support.compilation.cache import ContentCache
+
+
+F = TypeVar("F", bound=Callable[..., object])
+
+WITHOUT_COUNTS: dict[str, bool] = {"_nrt": False}
+"""numba's option that turns reference counting off."""
 
 
 # --- Shorter ways through the compiler --------------------------------------------------------------------------------
@@ -370,10 +377,11 @@ class CompiledFunction(CPUDispatcher):
         parts = {**options, "no_cpython_wrapper": True}
         self._part_compiler = _OwnFunctionCompiler(py_func, self.targetdescr, parts, self.locals, _PartCompiler)
         self._parts: dict[tuple[types.Type, ...], CompileResult] = {}
+        self._kept_in: ContentCache | None = None
 
-    def enable_caching(self) -> None:
-        """Keeps machine code on disk."""
-        self._cache = ContentCache(self)
+    def keep_in(self, cache: ContentCache) -> None:
+        """Keeps machine code in a cache."""
+        self._cache = self._kept_in = cache
 
     def compile(self, sig: Any) -> Any:
         """Returns the machine code for a signature, from memory, the cache or compiled now."""
@@ -396,7 +404,7 @@ class CompiledFunction(CPUDispatcher):
 
     def is_cached(self) -> bool:
         """Returns whether there is machine code of this version of the function on disk."""
-        return isinstance(self._cache, ContentCache) and not self._cache.is_empty()
+        return self._kept_in is not None and not self._kept_in.is_empty()
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Returns the signature of the part that compiled code calls with arguments of some types."""
@@ -431,3 +439,14 @@ class InlinedFunction(CompiledFunction):
     def __call__(self, *numbers: float) -> object:
         """Runs the function in Python, with numbers of Python's own type, whose arithmetic is the fastest."""
         return self.py_func(*[float(number) for number in numbers])
+
+
+def portable(function: F) -> F:
+    """As `inlined`; called from Python, the function runs as Python, with the same result.
+
+    For short arithmetic that Python calls rarely: reading machine code at the start would take longer than it saves.
+    Integers count as floating-point numbers.
+    """
+    if config.DISABLE_JIT:
+        return function
+    return cast("F", InlinedFunction(function, targetoptions={"nopython": True, **WITHOUT_COUNTS, "forceinline": True}))

@@ -16,7 +16,8 @@ from dorothie_gym.archive import Task
 from dorothie_gym.archive.recorded_perception import ObjectKind
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.dataset import Dataset
-from dorothie_gym.baselines.model_zoo import find_row, make_model
+from dorothie_gym.baselines.model_entries import find_row
+from dorothie_gym.baselines.model_zoo import make_model
 from dorothie_gym.baselines.trainer import BEST_FILE
 from dorothie_gym.baselines.vision import detected_boxes
 from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes, actors_at, looked_at, objects_in

@@ -18,7 +18,7 @@ from dorothie_gym.envs.navigation.dashboard import (
     show_dashboard,
 )
 from dorothie_gym.ontology import ActionValue
-from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from tests.envs.dashboard_reader import distance_on, instruction_on, planned_on, speed_on, wanted_on
 
 TURNS = [(ActionValue.J_TURN, sector) for sector in range(len(SECTORS))]

@@ -22,7 +22,7 @@ from dorothie_gym.policies.navigation.instructor import (
     instruction_of,
 )
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
-from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.policies.observation_parser import SeenLandmark, read_landmarks, read_subgoals
 from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.session.spaces import ObjectColumn, SubgoalColumn

@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 
 from dorothie_gym.maps import load_town
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, nearest_sector
+from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
+from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.support.portable_math import wrap_degrees
 
 TOWNS = ("brookside", "millbrook", "midtown", "northgate")

@@ -13,9 +13,8 @@ from dorothie_gym.sim.population import add_vehicle
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.vehicle_models import take
+from dorothie_gym.sim.traffic.vehicle_models import take, update_lane
 
 DT = 1.0 / 30.0
 

@@ -7,9 +7,8 @@ import pytest
 
 from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.vehicle_models import GIVING_UP
+from dorothie_gym.sim.traffic.vehicle_models import GIVING_UP, update_lane
 from tests.sim.network.towns import straight_town
 from tests.sim.state.states import DT, Pose, kernel_world
 

@@ -8,19 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
 from dorothie_gym.baselines.roles.learned_role.encoding import seconds_since
-from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, ObjectClass, Slot, SlotValue, StreetName
 from dorothie_gym.policies.co_wizard.answers import arrival, judged, why_standing, why_turning_round
 from dorothie_gym.policies.co_wizard.proposition_truth import believes
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, repeated
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
+    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _OPEN_QUESTIONS: Final[Mapping[SlotValue, tuple[Predicate, ...]]] = MappingProxyType(
     {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from dorothie_gym.baselines.roles.co_wizard.answers import QUESTIONS
 from dorothie_gym.baselines.roles.co_wizard.features import (
@@ -22,16 +23,18 @@ from dorothie_gym.baselines.roles.co_wizard.memory import Update, WorkingMemory
 from dorothie_gym.baselines.roles.learned_role.decision import Attention, Inputs, Percept, just_heard, kept_utterances
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE, word_rows
 from dorothie_gym.baselines.roles.learned_role.remark_forms import topic_of
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import drive_options
-from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import Remark
-from dorothie_gym.session.spaces.actions import Mental, Physical
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
+    from dorothie_gym.policies.language_model.navigator import RouteStep
+    from dorothie_gym.policies.speech import Remark
+    from dorothie_gym.session.spaces.actions import Mental, Physical
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

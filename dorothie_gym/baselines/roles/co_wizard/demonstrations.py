@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from dorothie_gym.baselines.roles.co_wizard.decision import (
 )
 from dorothie_gym.baselines.roles.co_wizard.examples import Example, correcting_example, make_example
 from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory, initial_values
-from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
 from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, Turn
 from dorothie_gym.baselines.roles.co_wizard.remarks import sources
 from dorothie_gym.baselines.roles.co_wizard.teacher import CALM, Lesson, Teacher
@@ -27,18 +26,21 @@ from dorothie_gym.baselines.roles.learned_role.decision import Attention
 from dorothie_gym.baselines.roles.learned_role.practice import TRAINED, observed, play_in_turns
 from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
 from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
-from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
-from dorothie_gym.policies.speech import Remark
-from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
+    from dorothie_gym.policies.speech import Remark
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CO_WIZARD: Final = Role.CO_WIZARD
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept
 from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.remarks import form_of
-from dorothie_gym.baselines.roles.co_wizard.teacher import Lesson
 from dorothie_gym.baselines.roles.learned_role.decision import Inputs
 from dorothie_gym.baselines.roles.learned_role.examples import (
     IDLE_SHARE,
@@ -24,8 +22,12 @@ from dorothie_gym.baselines.roles.learned_role.examples import (
     whole,
     word_tensor,
 )
-from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
-from dorothie_gym.session.spaces.actions import Physical
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept
+    from dorothie_gym.baselines.roles.co_wizard.teacher import Lesson
+    from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
+    from dorothie_gym.session.spaces.actions import Physical
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.co_wizard.memory import CONFIG, ORDERS, STATUSES, VARIABLES, WorkingMemory
 from dorothie_gym.baselines.roles.learned_role.encoding import (
@@ -16,21 +16,23 @@ from dorothie_gym.baselines.roles.learned_role.encoding import (
     seconds_since,
     time_scales,
 )
-from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.maps.model import Exit
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import GoalStatus, ObjectClass
 from dorothie_gym.policies.co_wizard.proposition_truth import believes, distance_to_goal, is_red_ahead
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
-from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.observation_parser import SeenLandmark, is_dark
 from dorothie_gym.policies.route_progress import Choice, direction_of, find_exit, stopping_distance, streets_named
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
-from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.maps.model import Exit
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.language_model.navigator import RouteStep
+    from dorothie_gym.session.spaces.actions import Physical
 
 HAZARDS: Final = (
     ObjectClass.TRAFFIC_LIGHT,

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
-from dorothie_gym.baselines.roles.co_wizard.examples import CoWizardExamples
-from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
 from dorothie_gym.baselines.roles.learned_role.supervised import changed_weights, entropy, weighted_mean
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.co_wizard.examples import CoWizardExamples
+    from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
 
 
 def loss_of(network: CoWizardNetwork, batch: CoWizardExamples) -> Tensor:

@@ -11,7 +11,7 @@ import enum
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.learned_role.encoding import AWAY
 from dorothie_gym.dialogue.realization_context import Direction
@@ -21,17 +21,19 @@ from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
 from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
 from dorothie_gym.policies.knowledge import CoWizardKnowledge, Standstill
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import Navigator
-from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.observation_parser import SeenLandmark
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
 """Turn that was asked for: none, a direction, or only a street."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import torch
@@ -27,16 +27,18 @@ from dorothie_gym.baselines.roles.learned_role.policy import LearnedPolicy, draw
 from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources, filled, sources_of, topic_of
 from dorothie_gym.dialogue.realization_context import WordingContext
 from dorothie_gym.dialogue.speaker_style import draw_style
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""

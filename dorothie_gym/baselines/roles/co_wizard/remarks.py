@@ -7,22 +7,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.co_wizard.answers import answer_to, is_answer, said_again
-from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
 from dorothie_gym.baselines.roles.learned_role import remark_forms
-from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
-from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.proposition_truth import seconds_to_goal
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import direction_of, first_new_street
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.view_range import sight, suitable_speed
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
+    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _WHOLES: Final = ("answer", "again")
 """Sources of whole remarks: the answer to what was just asked, and the last remark said again."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.baselines.roles.co_wizard.answers import QUESTIONS
 from dorothie_gym.baselines.roles.co_wizard.memory import (
@@ -22,19 +23,21 @@ from dorothie_gym.baselines.roles.co_wizard.memory import (
 from dorothie_gym.baselines.roles.learned_role.practice import new_remarks
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
-from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState
-from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CALM = CoWizardStyle(
     echoes=0.3, checks=0.1, announces=0.0, silent=0.4, asks=0.6, proposes=0.0, mishears=0.0, careful=1.0, notices=0.9

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining, follow, practise
 from dorothie_gym.baselines.roles.co_wizard.examples import CoWizardExamples
 from dorothie_gym.baselines.roles.co_wizard.files import FILES
 from dorothie_gym.baselines.roles.co_wizard.fitting import loss_of
-from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit, OnStage
 from dorothie_gym.baselines.roles.learned_role.training import LearnedRole, train_role
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit, OnStage
 
 CO_WIZARD: Final = LearnedRole(
     files=FILES, examples=CoWizardExamples, loss=loss_of, follow=follow, practise=practise, branch=29

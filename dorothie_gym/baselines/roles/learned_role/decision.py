@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, Utterance, utterance_vector, word_rows
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.observation_parser import heard_utterance
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 class TimedView(Protocol):

@@ -12,7 +12,7 @@ from torch import nn
 
 from dorothie_gym.baselines.tensor_files import check_tensors, read_tensors, save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, one_line
-from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.policies.policy import DESCRIPTION
 from dorothie_gym.support.files import replacing
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, raising, read_json
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import Policy
-from dorothie_gym.session.spaces.fields import SpaceLimits
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.session.spaces.fields import SpaceLimits
 
 State = TypeVar("State")
 Network = TypeVar("Network", bound=nn.Module)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.policies.speech import Remark
-from dorothie_gym.session.recording.header import SessionHeader
-from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.speech import Remark
+    from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TRAINED: Final = parse_traits("talkativeness=0..0.8,certainty=0.2..1")
 """Traits of the participants in training; those who are talkative or uncertain beyond are held out."""

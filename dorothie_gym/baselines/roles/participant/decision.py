@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, MAX_E
 from dorothie_gym.baselines.roles.participant.memory import SessionMemory
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
 from dorothie_gym.baselines.roles.learned_role.practice import observed, play_in_turns
-from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
 from dorothie_gym.baselines.roles.participant.decision import (
     ParticipantPercept,
     choosing_inputs,
@@ -18,20 +17,23 @@ from dorothie_gym.baselines.roles.participant.decision import (
 )
 from dorothie_gym.baselines.roles.participant.examples import Example, forms_of_remarks, make_example
 from dorothie_gym.baselines.roles.participant.memory import AVERAGE, SessionMemory
-from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
 from dorothie_gym.baselines.roles.participant.policy import LearnedParticipant, finished
 from dorothie_gym.baselines.roles.participant.remarks import sources
 from dorothie_gym.baselines.roles.participant.teacher import Lesson, Teacher
 from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
-from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
+    from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 PARTICIPANT: Final = Role.PARTICIPANT
 

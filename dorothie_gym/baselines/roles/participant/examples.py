@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 import numpy as np
 import torch
@@ -20,10 +20,12 @@ from dorothie_gym.baselines.roles.learned_role.examples import (
     whole,
     word_tensor,
 )
-from dorothie_gym.baselines.roles.participant.decision import ParticipantPercept
 from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, SessionMemory, TargetChoice
 from dorothie_gym.baselines.roles.participant.remarks import STOP_FORM, form_of, is_stop
-from dorothie_gym.policies.speech import Remark
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.participant.decision import ParticipantPercept
+    from dorothie_gym.policies.speech import Remark
 
 MOST_REMARKS: Final = 4
 """Largest number of remarks of one decision."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.learned_role.encoding import (
     AWAY,
@@ -15,7 +15,6 @@ from dorothie_gym.baselines.roles.learned_role.encoding import (
     seconds_since,
     time_scales,
 )
-from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.baselines.roles.participant.memory import NotedEvent, SessionMemory
 from dorothie_gym.baselines.roles.participant.records import next_step
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
@@ -31,10 +30,13 @@ from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
 from dorothie_gym.policies.participant.proposition_truth import believes, is_elsewhere
 from dorothie_gym.policies.participant.route_steps import is_last_stretch
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.route_progress import light_ahead, next_choice
 from dorothie_gym.policies.turn_lanes import turn_lanes
 from dorothie_gym.policies.view_range import camera_fault, sight, suitable_speed
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 MAX_ERRANDS: Final = 12
 """Number of subgoals among which the target is chosen."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from dorothie_gym.baselines.roles.learned_role.supervised import changed_weights, entropy, weighted_mean
-from dorothie_gym.baselines.roles.participant.examples import ParticipantExamples
-from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.participant.examples import ParticipantExamples
+    from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
 
 
 def loss_of(network: ParticipantNetwork, batch: ParticipantExamples) -> Tensor:

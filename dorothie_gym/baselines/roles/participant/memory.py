@@ -9,30 +9,32 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.baselines.roles.learned_role.remark_forms import topic_of
 from dorothie_gym.baselines.roles.participant.records import note_remark
 from dorothie_gym.dialogue.speaker_style import draw_style
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, Slot
-from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.arriving import prepare_stop
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.participant.guidance import follow_route
-from dorothie_gym.policies.participant.policy import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.retrying import stop_circling
 from dorothie_gym.policies.participant.route_steps import is_last_stretch
+from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, SpeechState
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 AVERAGE: Final = ParticipantStyle(
     guides=0.0, names_goal=1.0, names_street=0.2, hurries=0.3, patience=10.0, chat=250.0, waits=0.4, hints=0.2,

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.notable_conditions import CONSPICUOUS, CROWD_DISTANCE, CROWDS, OVER
 from dorothie_gym.policies.observation_parser import weather
-from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.speech import Remark
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.view import ParticipantView
+    from dorothie_gym.policies.speech import Remark
 
 
 def is_denied(remark: Remark, view: ParticipantView) -> bool:

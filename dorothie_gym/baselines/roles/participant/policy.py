@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import torch
@@ -32,14 +32,16 @@ from dorothie_gym.baselines.roles.participant.remarks import (
     sources_of,
     stop_remark,
 )
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.reactions import scene_of
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import Remark
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction, Speech
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.speech import Remark
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TEMPERATURE: Final = 0.5
 """Temperature at which remarks are drawn."""

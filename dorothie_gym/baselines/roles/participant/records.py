@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
@@ -12,9 +12,11 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
 from dorothie_gym.policies.participant.arriving import about_to_arrive
 from dorothie_gym.policies.participant.guidance import note_step
 from dorothie_gym.policies.participant.route_steps import RouteStep, route_step
-from dorothie_gym.policies.participant.state import ParticipantState
-from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.speech import Remark
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
+    from dorothie_gym.policies.speech import Remark
 
 
 def next_step(records: ParticipantState, view: ParticipantView) -> RouteStep | None:

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from dorothie_gym.baselines.roles.learned_role import remark_forms
-from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.baselines.roles.learned_role.remark_forms import TEXT_MARK
 from dorothie_gym.baselines.roles.participant.memory import NotedEvent, SessionMemory
 from dorothie_gym.baselines.roles.participant.records import next_step
@@ -27,12 +26,15 @@ from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.route_steps import RouteStep, is_last_stretch
-from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import sight, suitable_speed
 from dorothie_gym.tasks.landmark_designs import features_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.policies.participant.view import ParticipantView
 
 TEXTS: Final = ("person", "item", "purpose", "reason", "feature")
 """Arguments of propositions that are free texts."""

@@ -7,18 +7,21 @@ so that it continues from the player's situation, not from its own.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.baselines.roles.learned_role.practice import new_remarks
 from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, SessionMemory, TargetChoice
-from dorothie_gym.maps.town import Town
-from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
-from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.session.spaces.actions import ActionDict
-from dorothie_gym.session.spaces.fields import SpaceLimits
-from dorothie_gym.session.spaces.observations import ObservationMapping
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.policies.participant.config import ParticipantStyle
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.session.spaces.fields import SpaceLimits
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

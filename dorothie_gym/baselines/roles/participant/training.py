@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit, OnStage, RoundSettings
 from dorothie_gym.baselines.roles.learned_role.training import LearnedRole, train_role
 from dorothie_gym.baselines.roles.participant.demonstrations import follow, practise
 from dorothie_gym.baselines.roles.participant.examples import ParticipantExamples
 from dorothie_gym.baselines.roles.participant.files import FILES
 from dorothie_gym.baselines.roles.participant.fitting import loss_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit, OnStage, RoundSettings
 
 PARTICIPANT: Final = LearnedRole(
     files=FILES, examples=ParticipantExamples, loss=loss_of, follow=follow, practise=practise, branch=31

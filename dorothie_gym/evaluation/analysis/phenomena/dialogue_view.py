@@ -8,11 +8,10 @@ import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from dorothie_gym.evaluation.analysis.exception_attribution import time_met
 from dorothie_gym.evaluation.analysis.units import Units, goals_of
-from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import (
@@ -26,8 +25,11 @@ from dorothie_gym.ontology.slots import (
 )
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import Event, EventType, UtteranceRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+    from dorothie_gym.session.recording.session import Session
 
 ANSWER_WINDOW = 15.0
 """Time after a turn within which its answer begins [s]: patience of an exchange, and duration of the answer."""

@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.evaluation.analysis.exception_attribution import kind_of, times_mentioned
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
@@ -18,12 +17,15 @@ from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionW
 from dorothie_gym.evaluation.analysis.truth_checks.truth import agrees, is_true
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import LandmarkName, Slot
 from dorothie_gym.session.recording.events import EventType, MoveRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.tasks.purposes import find_items, read_people
+
+if TYPE_CHECKING:
+    from dorothie_gym.archive.corpus import Corpus
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 TALKED_ABOUT_WITHIN: Final = 45.0
 """Time within which an exception is talked about [s]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
-from dorothie_gym.session.recording.events import MoveRecord
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import MoveRecord
+    from dorothie_gym.session.recording.session import Session
 
 SAME_ORDERS: Final = 3
 """Number of equal orders that make a loop."""

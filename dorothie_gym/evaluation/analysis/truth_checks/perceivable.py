@@ -15,7 +15,7 @@ An exception that is not perceived within `WITHIN` could not be talked about, an
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -23,8 +23,10 @@ from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTA
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import ACTORS, SessionWorld
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, Sensor, WeatherParameter
-from dorothie_gym.session.recording.events import Event
 from dorothie_gym.sim.world import FAULT_SECONDS
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.events import Event
 
 WITHIN: Final = 45.0
 """Time within which an exception is perceived, if at all [s]."""

@@ -6,11 +6,10 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -18,6 +17,9 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName
 from dorothie_gym.session.recording.events import EventType
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.purposes import in_first_person
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
 
 CARRIED_OUT_WITHIN: Final = 60.0
 """Time within which an announced action is carried out [s]."""

@@ -6,7 +6,7 @@ import bisect
 import functools
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,16 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.session.recording.events import Event, EventType
-from dorothie_gym.session.recording.header import LandmarkRow
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.sim.world import CLARITY, FAULT_SECONDS
+from dorothie_gym.sim.world import FAULT_SECONDS
 from dorothie_gym.support.portable_math import wrap_degrees
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.header import LandmarkRow
+    from dorothie_gym.session.recording.session import Session
 
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
@@ -15,8 +15,10 @@ from dorothie_gym.maps.whereabouts import is_near_corner, is_on_right, signals_n
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
-from dorothie_gym.session.recording.header import LandmarkRow
 from dorothie_gym.tasks.landmark_designs import features_of
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.recording.header import LandmarkRow
 
 CLOSE, FAR = 130.0, 200.0
 """Routes up to the first length count as short, and from the second on as long [m]; in between, both statements are

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.evaluation.teacher_forced.features.columns import NO_TEXT, Columns, Flags, Ints, Reals
-from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 from dorothie_gym.session.recording.trajectory import TENTHS
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 

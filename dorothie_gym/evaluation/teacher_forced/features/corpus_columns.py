@@ -31,9 +31,7 @@ from dorothie_gym.evaluation.teacher_forced.features.session_columns import Sess
 from dorothie_gym.evaluation.teacher_forced.features.sight import Sight, seen_by
 from dorothie_gym.maps.cache import compiler_digest
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.maps.town import Town
 from dorothie_gym.session.recording.files import ACTIONS_FILE
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_file, read_text
 from dorothie_gym.support.user_cache import (
@@ -49,6 +47,9 @@ from dorothie_gym.support.user_cache import (
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 _log = logging.getLogger(__name__)
 

@@ -12,14 +12,13 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.archive.recorded_perception import perceived
 from dorothie_gym.evaluation.teacher_forced.features.batch import HistorySizes
-from dorothie_gym.evaluation.teacher_forced.features.columns import Columns, TownGraph
 from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import join
 from dorothie_gym.evaluation.teacher_forced.features.session_columns import (
     SessionColumns,
@@ -37,6 +36,9 @@ from dorothie_gym.session.recording.events import ActionRecord, UtteranceRecord
 from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.recording.surroundings import Rows, SceneTable, Surroundings
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TRAJECTORY_DTYPE, Trajectory
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.teacher_forced.features.columns import Columns, TownGraph
 
 _FULL_TURN: Final = 2.0 * math.pi
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,15 @@ from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.evaluation.teacher_forced.features.columns import NO_TEXT, TownGraph
 from dorothie_gym.maps.lane_graph import FEATURES
 from dorothie_gym.maps.model import NO_JUNCTION
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import LABELS
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.session.recording.events import ActionRecord, EventType, UtteranceRecord
 from dorothie_gym.session.recording.header import NO_LANE, SessionHeader
-from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH, TENTHS, Trajectory
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
 
 HEADING_STEP: Final = 1e-3
 """Headings are rounded to this [degrees], so that they do not depend on the unit in a file."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps.town import Town
-from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.recording.surroundings import SceneTable
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.session.recording.session import Session
+    from dorothie_gym.session.recording.surroundings import SceneTable
 
 
 class Sight(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ from dorothie_gym.pictures.camera.ground.cells import CELL, Cells, build_cells
 from dorothie_gym.pictures.camera.ground.colours import TEXEL, ground_noise, halved, paint_finest
 from dorothie_gym.pictures.camera.ground.lookup import GroundArrays
 from dorothie_gym.pictures.camera.ground.materials import material_classes, material_colours, material_grains
-from dorothie_gym.pictures.camera.ground.sheets import Sheet
 from dorothie_gym.pictures.camera.ground.squares import find_squares
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.ground.sheets import Sheet
 
 LEVELS = 8
 """Number of averaged pictures: texels of 0.5 to 64 m."""

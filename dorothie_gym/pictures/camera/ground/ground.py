@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET, GroundArrays
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 _FEW = 1 << 16
 """Largest number of pairs of a place and a triangle that are compared without a search tree."""

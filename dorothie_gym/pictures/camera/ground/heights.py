@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -12,11 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
-from dorothie_gym.pictures.maps.levels import LevelStretch
 from dorothie_gym.pictures.maps.shapes import SAMPLE_STEP, TownSamples, polyline_stations
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.levels import LevelStretch
 
 _FLAT = 1e-3  # [m] difference of height in a town without hills
 _STEEPEST = 0.12  # slope of the land: steeper roads are on banks

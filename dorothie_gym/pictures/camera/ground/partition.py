@@ -9,14 +9,17 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.ground.regions import GRID, only_areas
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 LARGEST = 32.0
 """Width of a cell of level ground [m]."""

@@ -5,18 +5,21 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
-from dorothie_gym.pictures.camera.ground.cells import Painted
 from dorothie_gym.pictures.camera.ground.materials import LOOKS, Material, Relief
-from dorothie_gym.pictures.maps.levels import LevelStretch
 from dorothie_gym.pictures.maps.shapes import ribbon
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.camera.ground.cells import Painted
+    from dorothie_gym.pictures.maps.levels import LevelStretch
 
 GRID = 1.0 / 1024.0
 """Distance between the positions that corners of triangles may have [m]; exact in float32 up to 16 km."""

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.camera.ground.cells import Painted
 from dorothie_gym.pictures.camera.ground.materials import MATERIALS, SYMBOLS, Material
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.levels import LevelStretch
 from dorothie_gym.pictures.maps.map_layers import MapLayers
-from dorothie_gym.pictures.maps.shapes import Shape
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.shapes import Shape
 
 BORDER = 80.0
 """Width of the country around the outermost roads in the lookup [m]; farther ones have no details."""

@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.ground.heights import HeightField, Zone
 from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.pictures.camera.ground.materials import KERB_HEIGHT, LOOKS, Material
 from dorothie_gym.pictures.camera.ground.partition import Area, cut_areas
 from dorothie_gym.pictures.camera.ground.regions import GRID, footprint, only_areas, polygons_of, tidy
-from dorothie_gym.pictures.camera.ground.sheets import Sheet
 from dorothie_gym.pictures.camera.ground.surface import (
     PORTAL_HEIGHT,
     ROOF,
@@ -30,9 +28,14 @@ from dorothie_gym.pictures.camera.ground.surface import (
     add_sheet,
     find_edges,
 )
-from dorothie_gym.pictures.camera.mesh import MeshBuilder
-from dorothie_gym.pictures.maps.levels import LevelStretch
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.camera.ground.sheets import Sheet
+    from dorothie_gym.pictures.camera.mesh import MeshBuilder
+    from dorothie_gym.pictures.maps.levels import LevelStretch
 
 COVER = 3.2
 """Width of covered ground on both sides of the lanes in a tunnel [m]: beyond the slopes of a cutting."""

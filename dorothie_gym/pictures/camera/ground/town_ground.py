@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures.camera.ground.arrays import ground_arrays
 from dorothie_gym.pictures.camera.ground.ground import Ground
 from dorothie_gym.pictures.camera.ground.heights import HeightField
@@ -26,6 +27,9 @@ from dorothie_gym.pictures.camera.ground.structures import (
 )
 from dorothie_gym.pictures.camera.ground.surface import add_faces, add_sheet, find_edges, lifted
 from dorothie_gym.pictures.camera.mesh import MeshBuilder
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
 
 _SLIVER = 0.05  # [m] width
 

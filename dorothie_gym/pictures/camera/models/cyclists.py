@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.sim.traffic.parameters import CYCLIST_LENGTH, CYCLIST_WIDTH
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.mesh import Mesh
 
 PEDAL_PHASES = 8
 """Phases of one turn of the pedals."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +34,12 @@ from dorothie_gym.pictures.camera.models.people import (
 from dorothie_gym.pictures.camera.models.props import prop_model
 from dorothie_gym.pictures.camera.models.vehicles import PAINTS, Lamps, VehicleType, painted_vehicle, vehicle_form
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.support.compilation import compiled, concurrent
 from dorothie_gym.support.compilation.records import Float, Int32, RecordArray
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 
 LAMP_STATES = 4
 """Number of combinations of `Lamps`; the state of a vehicle is the rest of its model's index."""

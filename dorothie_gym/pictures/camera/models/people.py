@@ -5,14 +5,17 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.mesh import Mesh
 
 PHASES = 8
 """Phases of a walking cycle of two steps."""

@@ -7,16 +7,18 @@ import warnings
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.pictures.camera.atlas import Texture
-from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, dressed
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.mesh import Mesh
 
 _PALETTE: Palette = {
     Part.ORANGE: (240, 98, 24), Part.WHITE: (255, 255, 255), Part.METAL: (122, 126, 128), Part.TRIM: (44, 46, 48),

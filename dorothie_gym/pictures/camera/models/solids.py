@@ -5,15 +5,17 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import ObjectClass
 
 Rgb: TypeAlias = tuple[int, int, int]
 Point: TypeAlias = Sequence[float] | Array

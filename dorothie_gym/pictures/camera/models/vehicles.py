@@ -6,16 +6,19 @@ import enum
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.atlas import Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 _FRONT, _SIDE = CAR_LENGTH / 2.0, CAR_WIDTH / 2.0
 _SILL, _BELT = 0.24, 0.55  # [m] heights of the lower edge and of the widest part of a body

@@ -6,14 +6,13 @@ import enum
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.atlas import Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, oriented
@@ -21,10 +20,13 @@ from dorothie_gym.pictures.camera.patterns import BAYS
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of, rectangles
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on
 from dorothie_gym.pictures.maps.borders import BorderKind
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.medians import held
 from dorothie_gym.pictures.maps.shapes import polyline_stations, sample, side_line, widths_at
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 STOREY = 3.2
 """Height of a storey, and width of a bay with a window [m]."""

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array, Site
-from dorothie_gym.maps.town import Town
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.camera.scenery.lots import Lot
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.shapes import ribbon
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array, Site
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 BESIDE = 1.8
 """Ground beside a lane that stays free [m]."""

@@ -6,10 +6,10 @@ import math
 import warnings
 from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.ontology.vocabulary import check_complete
 from dorothie_gym.pictures.camera import atlas
@@ -17,13 +17,16 @@ from dorothie_gym.pictures.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented
 from dorothie_gym.pictures.camera.models.people import STANDING, Look, Outfit, person_form
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Part, Rgb, dressed
-from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.pictures.maps.shapes import disc
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks import landmark_designs
 from dorothie_gym.tasks.landmark_designs import COAT, HOUSE, MIDDLE_STRIPE, STORES, StoreDesign, Top
-from dorothie_gym.tasks.storyboard import Landmark
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.camera.scenery.lots import Lot
+    from dorothie_gym.tasks.storyboard import Landmark
 
 TOTEM = 6.4, 1.6
 """Width and height of the sign on the totem of a brand [m]: 38 by 10 pixels at 40 m in the standard picture."""

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.mesh import Mesh, new_mesh
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
 
 
 class Heights(Hashable, Protocol):

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
 
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, SignalKind
-from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.atlas import STREET_NAMES, Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, Lenses
 from dorothie_gym.pictures.camera.scenery.placing import Heights, stamped
-from dorothie_gym.pictures.maps.map_layers import MapLayers, Post
 from dorothie_gym.pictures.maps.shapes import disc
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.map_layers import MapLayers, Post
 
 _HEAD = 3.4  # [m] height of the middle of a traffic light
 _LENS, _BETWEEN = 0.2, 0.46  # [m] radius of a lens, distance of two

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import shapely
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, Surface
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.pictures.maps.borders import BorderKind
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.shapes import disc, polyline_stations
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 LIGHT_HEIGHT = 6.3
 """Height of the light of a street lamp [m]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,13 @@ from dorothie_gym.pictures.camera.scenery.buildings import build_buildings, plan
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance
 from dorothie_gym.pictures.camera.scenery.lenses import Lenses
 from dorothie_gym.pictures.camera.scenery.lots import Lot
-from dorothie_gym.pictures.camera.scenery.placing import Heights
 from dorothie_gym.pictures.camera.scenery.signals import build_blades, build_signals, plan_blades
 from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places
 from dorothie_gym.pictures.camera.scenery.trees import build_trees
-from dorothie_gym.pictures.maps.map_layers import MapLayers
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.scenery.placing import Heights
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 
 @dataclass(frozen=True, eq=False)

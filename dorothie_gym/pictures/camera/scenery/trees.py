@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import zlib
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.camera.atlas import Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.shapes import disc, ribbon
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 _KINDS = (palette.TREE, palette.COUNTRY_TREE, palette.MEDIAN_TREE)
 _FORMS = 4

@@ -1,0 +1,38 @@
+"""Standing car as the participant sees it: at a red light, or turning."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dorothie_gym.maps.town import LightColour
+from dorothie_gym.policies.mood import Happening
+from dorothie_gym.policies.route_progress import light_ahead
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.view import ParticipantView
+
+LONG_RED = 10.0
+"""Standstill at a red light that is felt as long [s]."""
+
+TURN_TIME = 4.0
+"""Standstill across the lane after which a car is no longer regarded as turning [s]."""
+
+
+def excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
+    """Excuses a standstill before a red light and right after it has turned green."""
+    progress, config = state.route.progress, state.config
+    last_stretch = (
+        state.guidance.guiding
+        and progress is not None
+        and progress.left(view.station) < config.last_stretch
+        and progress.next_crossing(state.town, view.station) is None
+    )
+    if not view.standing or last_stretch or view.time - state.motion.moved_at > config.red_light_time:
+        return
+    if light_ahead(state.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
+        return
+    waited = state.motion.standstill(view.time)
+    if waited - state.clock.interval < LONG_RED <= waited:
+        state.feel(Happening.RED_LIGHT, view.time)
+    state.motion = state.motion.at_red_light(view.time, config.start_time)
