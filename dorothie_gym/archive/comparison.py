@@ -102,7 +102,7 @@ class _Comparison:
     Args:
         recorded: the first.
         replayed: the second.
-        strict: as of `first_difference`.
+        strict: as in `first_difference`.
     """
 
     def __init__(self, recorded: Session, replayed: Session, *, strict: bool) -> None:

@@ -283,7 +283,7 @@ def _inference_points(history: SessionHistory, task: Task, since: int) -> Iterat
 
 
 def task_points(session: Session, task: Task, *, since: int = 0, strict: bool = False) -> tuple[Point, ...]:
-    """Returns the points of a task in a session, from event number `since` on; `strict` as of `rfn_points`."""
+    """Returns the points of a task in a session, from event number `since` on; `strict` as in `rfn_points`."""
     match task:
         case Task.UFN:
             return tuple(ufn_points(session, since=since))

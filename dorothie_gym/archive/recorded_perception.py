@@ -94,7 +94,7 @@ def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDA
     Args:
         session: the session so far.
         frame: looks of this frame and later ones do not count.
-        town: as of `perceived`.
+        town: as in `perceived`.
     """
     scene, trajectory = session.scene, session.trajectory
     look = _last(scene.actors, frame - 1)

@@ -158,7 +158,7 @@ class Dataset:
             fold: the fold.
             spec: sizes.
             queries: whether the inputs have the queries of the detector (N, q, d) at the last look, under "detector".
-            sound: encoder of the sound of the current utterances (N, ...), under "current_sound"; None for none.
+            sound: encoder of the sound of the current utterances (N, ...), under "current_sound"; None for no sound.
         """
         if (fold, spec) not in self._examples:
             self._examples[fold, spec] = Examples.gather(self.columns, self.tables(fold), spec)

@@ -84,7 +84,7 @@ class Experiment:
         return find_row(self.model)
 
     def material(self, every: Dataset, on_session: Callable[[], object] | None = None) -> Dataset:
-        """Returns the dataset with the objects of this model; arguments and errors as of `Dataset.seeing`."""
+        """Returns the dataset with the objects of this model; arguments and errors as in `Dataset.seeing`."""
         objects = self.row.objects
         return every.seeing(objects, on_session, self.detector if objects == "detections" else None)
 

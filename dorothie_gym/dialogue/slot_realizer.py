@@ -98,7 +98,7 @@ class SlotRealizer:
             wording: details of the act.
             style: style of the speaker.
             scene: dialogue history and objects in view.
-            names: largest number of names per slot.
+            names: maximum number of names per slot.
             of_rider: whether the friends and home in question are the speaker's.
         """
         self.random = draw

@@ -32,7 +32,7 @@ class SpeakerStyle:
         repairs: share of names that follow a wrong name as its correction.
         habit: share of choices that use the favourite alternative; below 1.
         idiolect: number that determines the favourite alternatives; not negative.
-        address: vocative for the other speaker; empty for none.
+        address: vocative for the other speaker; empty if there is none.
         addressing: share of sentences with the vocative.
         proper: whether sentences start with a capital letter and end with a full stop.
 

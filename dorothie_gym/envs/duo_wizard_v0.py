@@ -279,7 +279,7 @@ parallel_env = raw_env = DuoWizardEnv
 
 
 def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict | None]:
-    """Returns the environment in PettingZoo's turn-based form; arguments as of `DuoWizardEnv`."""
+    """Returns the environment in PettingZoo's turn-based form; arguments as in `DuoWizardEnv`."""
     return OrderEnforcingWrapper(TurnBasedDuoWizard(parallel_env(**arguments)))
 
 

@@ -42,7 +42,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     stop, start), or needle to the goal that was named; icon of the manoeuvre that the car prepares, in green; distance
     to the instruction's place on gauges of 112 m and 28 m (red behind it), or to the goal on one of 560 m; speed
     (white) and cruise speed (blue) on gauges of 28 m/s, with red marks at the limit; lamps for a hazard ahead and the
-    head lights.
+    headlights.
 
     ## Action Space
     `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` marks the feasible actions (int8, for

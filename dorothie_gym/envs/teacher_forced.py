@@ -159,11 +159,11 @@ class _Library(CachedViews):
     """Sessions of a split, read on demand.
 
     Args:
-        corpus: as of `TeacherForcedEnv`; `split` likewise.
+        corpus: as in `TeacherForcedEnv`; `split` likewise.
         split: see there.
         task: task of the points.
         limits: largest numbers of landmarks and streets.
-        strict: as of `TeacherForcedEnv`.
+        strict: as in `TeacherForcedEnv`.
     """
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("read",)

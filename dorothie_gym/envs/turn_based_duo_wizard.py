@@ -26,7 +26,7 @@ class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | 
         parallel.turns = self
 
     def clone_state(self) -> State:
-        """Returns the present state, see `DuoWizardEnv.clone_state`."""
+        """Returns the current state, see `DuoWizardEnv.clone_state`."""
         return self.env.clone_state()
 
     def restore_state(self, state: State) -> None:

@@ -171,7 +171,7 @@ class GuardedHttp(H11Protocol):
             self._guard.turns.ask(self)
 
     def shutdown(self) -> None:
-        """Ends the connection after the present answer."""
+        """Ends the connection after the current answer."""
         if self.conn.our_state is h11.ERROR:
             self.transport.abort()
         else:

@@ -252,7 +252,7 @@ def _faults(town: Town) -> Iterator[str]:
 # --- Entries in the cache folder -------------------------------------------------------------------------------------
 
 MOST_TOWNS = 64
-"""Largest number of entries; the oldest are removed beyond it. A town takes up to some megabytes."""
+"""Maximum number of entries; the oldest are removed beyond it. A town takes up to some megabytes."""
 
 _log = logging.getLogger(__name__)
 

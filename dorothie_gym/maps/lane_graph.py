@@ -216,7 +216,7 @@ def _u_turns(lanes: Sequence[Lane]) -> Iterator[tuple[int, int]]:
 
 
 def _aside(lane: Lane, other: Lane) -> tuple[bool, int, float]:
-    """Returns the rank of an opposite lane: first those beside the middle of the lane, innermost first; then by gap."""
+    """Returns the rank of an opposite lane: first those beside the centre of the lane, innermost first; then by gap."""
     middle = lane.position(lane.length / 2)
     station, offset = other.project(middle)
     beyond = not 0.0 < station < other.length

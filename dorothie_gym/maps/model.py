@@ -287,7 +287,7 @@ class Sidewalk:
 
     Attributes:
         id: index in `Town.sidewalks`.
-        points: middle line (n, 3) [m].
+        points: centre line (n, 3) [m].
         width: [m].
         street: index of its street, or -1.
     """

@@ -18,7 +18,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
 
 CIRCLE_OFFSET = 1.7
-"""Three circles of radius 1.3 m, one in the middle and one this far to either side, cover a car of 5 m x 2 m [m]."""
+"""Three circles of radius 1.3 m, one in the centre and one this far to either side, cover a car of 5 m x 2 m [m]."""
 
 CLEARANCE = 3.1
 """Distance below which the circles of two vehicles driving straight (almost) touch [m]."""

@@ -200,7 +200,7 @@ class Router:
 
     @property
     def search(self) -> RouteSearch:
-        """Scratch space of the present thread for `find_route`."""
+        """Scratch space of the current thread for `find_route`."""
         return self._searches.search
 
     def cell(self, lane: int, station: float) -> int:
@@ -366,17 +366,17 @@ def router(town: Town) -> Router:
 # before a prop, it must be able to reach every place that it could reach before.
 
 STANDS_BEFORE = 17.0
-"""Distance of a car that stops for a prop to the prop, between their middles [m]."""
+"""Distance of a car that stops for a prop to the prop, between their centres [m]."""
 
 TURNS_BEHIND = 16.0
-"""Least distance behind a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
+"""Minimum distance behind a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
 ahead first, and half the length of a prop [m]."""
 
 ONE_ROADBLOCK = 3.0
 """Largest distance along the road of props on lanes beside one another that form one roadblock [m]."""
 
 APART = 22.0
-"""Least distance along the road of other props [m]: a U-turn before the one swings out onto the other lane."""
+"""Minimum distance along the road of other props [m]: a U-turn before the one swings out onto the other lane."""
 
 
 def closed_by(place: Place) -> list[Place]:

@@ -89,7 +89,7 @@ SLIGHTLY_BEHIND = 1.0
 """Distance by which a goal may lie behind the start without a detour [m]."""
 
 LEAST_COST = 1e-3
-"""Least cost of an edge [m]: searches of sparse graphs ignore edges without cost."""
+"""Minimum cost of an edge [m]: searches of sparse graphs ignore edges without cost."""
 
 USUAL_SPEED = 40.0 / 3.6
 """Reference speed of costs [m/s]: a metre with this limit costs one metre, with a higher limit less."""

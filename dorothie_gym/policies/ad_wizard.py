@@ -47,15 +47,15 @@ class AdWizardConfig:
     Attributes:
         first_at: earliest time of a trick [s].
         window: range of planned times from then on [s].
-        spacing: least time between two tricks [s].
+        spacing: minimum time between two tricks [s].
         expires_after: time after which a trick that finds no moment is given up [s].
         weights: weight of each trick in the draw of those of a session.
         roadblock_ahead: range of distances ahead of the car at which a roadblock is placed [m].
-        roadblock_margins: least distances of a roadblock from the beginning and the end of its lane [m].
+        roadblock_margins: minimum distances of a roadblock from the beginning and the end of its lane [m].
         roadblock_speed: least speed of the car when one is placed [m/s].
-        roadblock_clearance: least distance of a roadblock from a place where the car may have to stop [m].
+        roadblock_clearance: minimum distance of a roadblock from a place where the car may have to stop [m].
         roadblock_time: time after which a roadblock is removed [s].
-        most_roadblocks: largest number of roadblocks in a session.
+        most_roadblocks: maximum number of roadblocks in a session.
         bad_weather_time: range of durations of bad weather [s].
         crowd_ahead: range of distances ahead at which people or vehicles are spawned [m].
         crowd_extent: size of the area in which they are spawned [m].
@@ -378,8 +378,8 @@ def suits_roadblock(
         lane: number of the lane.
         station: distance along it [m].
         length: its length [m].
-        margins: least distances from its beginning and its end [m].
-        clearance: least distance from places where a car stops for a landmark [m].
+        margins: minimum distances from its beginning and its end [m].
+        clearance: minimum distance from places where a car stops for a landmark [m].
     """
     if not margins[0] < station < length - margins[1]:
         return False

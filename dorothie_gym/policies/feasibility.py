@@ -22,14 +22,14 @@ def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED)
     """Returns the distance in which the car slows down for a U-turn [m].
 
     Args:
-        speed: present speed [m/s].
+        speed: current speed [m/s].
         target_squared: square of the speed of the U-turn [m^2/s^2].
     """
     return u_turn_braking(speed, target_squared)
 
 
 def u_turn_start(station: float, speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:
-    """Returns the station at which a U-turn commanded now would begin [m]; arguments as of `slowing_distance`."""
+    """Returns the station at which a U-turn commanded now would begin [m]; arguments as in `slowing_distance`."""
     return station + slowing_distance(speed, target_squared) + LEAD * (speed > EGO_MOVING)
 
 

@@ -26,10 +26,10 @@ TOLD_TO_STOP: Final = Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
 
 @dataclass(frozen=True, kw_only=True)
 class Standstill:
-    """Present or last standstill of the car, and the reason for it.
+    """Current or last standstill of the car, and the reason for it.
 
     Attributes:
-        since: start of the present standstill [s]; None while the car moves.
+        since: start of the current standstill [s]; None while the car moves.
         until: end of the last standstill [s].
         reason: why the car stands, or stood last, as far as that is known.
         reason_since: time since which it has stood for this reason [s].
@@ -76,7 +76,7 @@ class CoWizardKnowledge:
         told_to_stop_at: time of the last instruction to stop [s].
         stop_reason: why the car stopped on that instruction.
         told_to_turn_round_at: time of the last instruction to turn round [s].
-        standstill: present or last standstill.
+        standstill: current or last standstill.
         rests_for: obstacle for which the car stops by a decision.
         rests_until: end of that stop [s].
     """

@@ -57,10 +57,10 @@ CROWD_DISTANCE: Final = 50.0
 """Distance within which a crowd is noticed [m]."""
 
 CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 3, ObjectClass.VEHICLES: 3})
-"""Least number of objects in a crowd."""
+"""Minimum number of objects in a crowd."""
 
 MORE_THAN_USUAL: Final = 1.5
-"""Least number of objects by which a crowd exceeds the usual number."""
+"""Minimum number of objects by which a crowd exceeds the usual number."""
 
 USUAL_TIME: Final = 30.0
 """Time over which the usual number of objects is averaged [s]."""

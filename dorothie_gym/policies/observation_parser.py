@@ -83,7 +83,7 @@ def nearest_landmark(
 
 @dataclass(frozen=True, kw_only=True)
 class SeenSubgoal:
-    """Subgoal with its present status; `landmark` is a row of the landmarks."""
+    """Subgoal with its current status; `landmark` is a row of the landmarks."""
 
     index: int
     live: bool

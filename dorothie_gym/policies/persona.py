@@ -158,7 +158,7 @@ _TIMES: Final[Mapping[str, tuple[float, float, float, float]]] = MappingProxyTyp
         "reaction": (0.75, 0.2, 0.5, 1.4),
     }
 )
-"""Median, spread of the logarithm between speakers, least and greatest value of the traits with a unit."""
+"""Median, spread of the logarithm between speakers, minimum and maximum value of the traits with a unit."""
 
 _NAMED: Final[Mapping[str, type[enum.StrEnum]]] = MappingProxyType({"directions": Directions, "driving": Driving})
 

@@ -77,7 +77,7 @@ class Policy(ABC, Generic[State]):
         """
 
     def persona_of(self, state: State) -> Mapping[str, float | str] | None:
-        """Returns the traits of the persona that a state belongs to, in JSON types, for the record; None for none."""
+        """Returns the traits of the persona of a state, in JSON types, for the record; None if it has no persona."""
         return None
 
     def usage_of(self, state: State) -> Mapping[str, object] | None:
@@ -141,16 +141,16 @@ class ObservedSession(Protocol):
 
     @property
     def observations(self) -> RoleObservations:
-        """Observations at the present decision."""
+        """Observations at the current decision."""
         ...
 
     def mask(self, role: Role) -> Mapping[str, object]:
-        """Returns the mask of a role's action space at the present decision."""
+        """Returns the mask of a role's action space at the current decision."""
         ...
 
 
 def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) -> dict[Role, ObservationMapping]:
-    """Returns the inputs of policies at the present decision: the observation of each role, and its mask if it is read.
+    """Returns the inputs of policies at the current decision: the observation of each role, and its mask if it is read.
 
     Observations and masks that no policy reads are not computed.
 

@@ -137,7 +137,7 @@ def loadable_kinds() -> tuple[str, ...]:
 
 
 def _loader_of(kind: str) -> Loader | None:
-    """Returns the loader of a kind of files, None for none; imports the loader of a model of the package."""
+    """Returns the loader of a kind of files, None if there is none; imports the loader of a model of the package."""
     if kind not in MODEL_LOADERS:
         return _LOADERS.get(kind)
     module, _, name = MODEL_LOADERS[kind].partition(":")

@@ -15,7 +15,7 @@ PASSED = 3.0
 """Distance behind the car from which on a goal has been passed [m]."""
 
 SWITCH_ROOM = 16.0
-"""Least distance to the end of a lane for a lane switch [m]."""
+"""Minimum distance to the end of a lane for a lane switch [m]."""
 
 END_ROOM = 6.0
 """Distance to the end of a lane within which a car waits there and no longer turns round [m]."""
@@ -32,7 +32,7 @@ MANOEUVRE_OVERDUE_DISTANCE = 18.0
 
 @compiled
 def find_leg(tables: RouteTables, legs: RecordArray[LegRecord], count: int, leg: int, lane: int, station: float) -> int:
-    """Returns the leg that a car is on, the present one or one ahead; -1 if it is off the route.
+    """Returns the leg that a car is on, the current one or one ahead; -1 if it is off the route.
 
     A car that has passed the end of a leg, where it had to change lanes, turn round or stop, is not on that leg.
     """
@@ -77,7 +77,7 @@ def find_crossing(
         tables: lanes and exits.
         legs: legs of the route.
         count: number of legs.
-        leg: the present leg.
+        leg: the current leg.
         station: place of the car on it [m].
         first: first leg whose end counts, to find more than one junction.
 

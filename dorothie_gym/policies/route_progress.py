@@ -241,11 +241,11 @@ class RouteProgress:
 
     @property
     def legs(self) -> tuple[Leg, ...]:
-        """Remaining legs of the route, the present one first."""
+        """Remaining legs of the route, the current one first."""
         return self.route.legs[self.leg :] if self.route is not None else ()
 
     def followed(self, town: Town, lane: int, station: float) -> RouteProgress:
-        """Advances the present leg to the place of the car; `astray` counts up if the car is off the route."""
+        """Advances the current leg to the place of the car; `astray` counts up if the car is off the route."""
         leg = find_leg(route_tables(town), *self._legs, lane, station) if self.legs else -1
         return replace(self, astray=self.astray + 1) if leg < 0 else replace(self, leg=leg, astray=0)
 
@@ -259,7 +259,7 @@ class RouteProgress:
 
     @property
     def _legs(self) -> tuple[RecordArray[LegRecord], int, int]:
-        """Arguments of the compiled functions: legs as records, their number, and the present one."""
+        """Arguments of the compiled functions: legs as records, their number, and the current one."""
         return self._planned.records, len(self._planned.legs), self.leg
 
     @property
@@ -341,7 +341,7 @@ class RouteProgress:
 
 
 MOST_AVOIDED = 3
-"""Largest number of places that are excluded after misses; more would close a road of several lanes altogether."""
+"""Maximum number of places that are excluded after misses; more would close a road of several lanes altogether."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -411,12 +411,12 @@ class RouteState:
 def first_new_street(
     observation: ObservationMapping, town: Town, lane: int, progress: RouteProgress | None
 ) -> StreetName | None:
-    """Returns the first named street of a route other than that of the present lane; None if there is none.
+    """Returns the first named street of a route other than that of the current lane; None if there is none.
 
     Args:
         observation: observation with the names of the streets.
         town: the map.
-        lane: the present lane.
+        lane: the current lane.
         progress: the route, or None.
     """
     here = street_of(observation, town, lane)

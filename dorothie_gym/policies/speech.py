@@ -28,7 +28,7 @@ from dorothie_gym.policies.speech_timing import Delivery
 from dorothie_gym.session.spaces.actions import Speech
 
 LONGEST_BREATH = 3
-"""Largest number of acts that are worded together."""
+"""Maximum number of acts that are worded together."""
 
 MEMORY = 6
 """Number of the latest remarks that are remembered."""
@@ -72,7 +72,7 @@ def remark(
     urgent: bool = False,
     expires: float = math.inf,
 ) -> Remark:
-    """Returns a remark with a move and its slot values; other arguments as of `Remark`."""
+    """Returns a remark with a move and its slot values; other arguments as in `Remark`."""
     return Remark(
         act=DialogueAct.of(move, *values),
         wording=wording if wording is not None else Wording(),
@@ -101,9 +101,9 @@ def intend(
         elided: arguments of the contents that are left out of the words.
         wording: further particulars for the words; where no topic is given it is the predicate of the content, with
             "not_" in front if it is negated.
-        joined: as of `Remark`.
-        urgent: as of `Remark`.
-        expires: as of `Remark`.
+        joined: as in `Remark`.
+        urgent: as in `Remark`.
+        expires: as in `Remark`.
     """
     intention = Intention(function=function, content=content, elided=frozenset(elided))
     particulars = Wording() if wording is None else wording
@@ -233,7 +233,7 @@ class SpeechState:
         Args:
             now: time [s].
             acts: acts of the utterance.
-            rng: source of the gap before a reply; None for none.
+            rng: source of the gap before a reply; None if there is none.
             late: time for which the utterance has been over, as far as is known [s].
         """
         gap = self.delivery.draw_gap(rng) if rng is not None else 0.0

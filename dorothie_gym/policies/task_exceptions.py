@@ -25,12 +25,12 @@ EARLIEST = 5.0
 
 @lru_cache(maxsize=64)
 def plays_every_exception(story: str) -> bool:
-    """Returns whether every exception of a story is played, as of those that are not shipped."""
+    """Returns whether every exception of a story is played, as for those that are not shipped."""
     return bool(story) and not is_shipped_story(story)
 
 
 def story_exception(observation: ObservationMapping, town: Town, now: float, due: bool) -> AdWizardAction | None:
-    """Returns an exception that the storyboard marks and that is possible now; None for none.
+    """Returns an exception that the storyboard marks and that is possible now; None if there is none.
 
     A subgoal is changed before it is deleted. An exception that will soon be impossible is not postponed: the car is
     close to the place, or (for a trigger) to any place of an open subgoal, or no subgoal is open.

@@ -34,7 +34,7 @@ def travel_time(town: Town, progress: RouteProgress, station: float, now: float,
         progress: route and progress on it.
         station: distance of the car along its lane [m].
         now: time [s].
-        speed: present speed [m/s].
+        speed: current speed [m/s].
     """
     if not progress.legs:
         return math.inf

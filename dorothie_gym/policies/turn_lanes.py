@@ -56,7 +56,7 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
     Args:
         progress: the route.
         town: the map.
-        station: place of the car on the present leg [m].
+        station: place of the car on the current leg [m].
     """
     crossing, legs, distance = progress.next_crossing(town, station), progress.legs, 0.0
     for k, leg in enumerate(legs[:-1]):

@@ -24,7 +24,7 @@ DENSE: Final = 30.0
 """Range of sight below which fog is dense [m]."""
 
 LOSS: Final = 0.85
-"""Share of the sight in the present weather below which the camera is at fault."""
+"""Share of the sight in the current weather below which the camera is at fault."""
 
 REACTION: Final = 2.5
 """Time until a driver brakes [s] (AASHTO, Green Book, stopping sight distance)."""
@@ -48,7 +48,7 @@ def sight(observation: ObservationMapping) -> float:
 
 
 def sight_in_weather(observation: ObservationMapping) -> float:
-    """Returns the range of sight that weather, light and head lights leave a sound camera [m]."""
+    """Returns the range of sight that weather, light and headlights leave a sound camera [m]."""
     return _sight_of(tuple(observation["weather"].tolist()), bool(observation["lights"]))
 
 

@@ -34,7 +34,7 @@ class CameraMount:
     """Place of the camera on the car.
 
     Attributes:
-        forward: distance in front of the middle of the car [m].
+        forward: distance in front of the centre of the car [m].
         up: above the road [m].
         pitch: upwards [degrees].
 
@@ -150,7 +150,7 @@ class EnvConfig:
             reads from its transcript. The Ad-Wizard observes the spoken words.
         world: settings of traffic, pedestrians and sensing.
         rewards: weights of the reward terms.
-        camera: first-person camera on the car, whose pictures the participant and the Co-Wizard observe; None for none.
+        camera: first-person camera on the car, observed by the participant and the Co-Wizard; None for no camera.
             It affects nothing else in a session.
         perception: perception model of the participant and the Co-Wizard. With `PerceptionModel.CAMERA` they observe
             the objects that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The

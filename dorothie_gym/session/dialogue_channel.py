@@ -79,7 +79,7 @@ class DialogueChannel:
         Args:
             scenario: scenario of the session.
             config: settings of the session.
-            spans: largest number of acts in an utterance.
+            spans: maximum number of acts in an utterance.
             words: seed of the wording of acts without words.
             ears: seed of the recognition errors.
             styles: seed of the speakers' styles.

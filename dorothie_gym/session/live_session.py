@@ -165,7 +165,7 @@ class LiveSession:
 
     @property
     def picture(self) -> CameraFrame | None:
-        """Picture of the camera on the car at the present decision, boxes included; None without a camera."""
+        """Picture of the camera on the car at the current decision, boxes included; None without a camera."""
         return self.observer.picture(self.decisions)
 
     def end(self, reason: str) -> None:

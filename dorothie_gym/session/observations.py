@@ -97,7 +97,7 @@ class ActionMasks(CachedViews):
         return mask
 
     def mask(self, role: Role) -> RoleMask:
-        """Returns the mask of a role's action space at the present decision; the caller owns it."""
+        """Returns the mask of a role's action space at the current decision; the caller owns it."""
         if role is Role.CO_WIZARD:
             self._views.find_feasible()
         elif role is Role.AD_WIZARD:
@@ -312,7 +312,7 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
 
     Args:
         table: table, all rows of which are written.
-        task: present state of the task.
+        task: current state of the task.
         permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
     """
     table[:] = 0.0
@@ -337,7 +337,7 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
 
 
 class SessionObserver:
-    """Observations, masks and pictures of a session at the present decision.
+    """Observations, masks and pictures of a session at the current decision.
 
     Rows and masks are made when they are first used: not all sessions are observed by dicts, or asked for masks.
 
@@ -425,7 +425,7 @@ class Observable(Protocol):
     decisions: int
 
     def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
-        """Builds the observations of some roles at the present decision, by agent."""
+        """Builds the observations of some roles at the current decision, by agent."""
         ...
 
 

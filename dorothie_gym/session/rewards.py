@@ -133,7 +133,7 @@ class NavigationWeights:
 
     Attributes:
         progress: reward for each metre by which the cost to go decreases. The cost to go is that of the route to the
-            present goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng,
+            current goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng,
             Harada and Russell 1999).
         subgoal: reward for each subgoal reached.
         success: reward at the end, if every live subgoal was reached without a collision caused by the ego.

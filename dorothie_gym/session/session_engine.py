@@ -198,7 +198,7 @@ class SessionEngine(Restorable):
             return session.decisions >= self.max_cycles
         return session.world.time >= self.config.max_seconds - 1e-9
 
-    # --- the present decision ---------------------------------------------------------------------------------------
+    # --- the current decision ---------------------------------------------------------------------------------------
 
     @property
     def over(self) -> bool:
@@ -232,13 +232,13 @@ class SessionEngine(Restorable):
 
     @property
     def observations(self) -> LazyObservations:
-        """Observations at the present decision, the same object until the next step."""
+        """Observations at the current decision, the same object until the next step."""
         if self._observations is None:
             self._observations = LazyObservations(self.session)
         return self._observations
 
     def mask(self, role: Role) -> RoleMask:
-        """Returns the mask of a role's action space at the present decision."""
+        """Returns the mask of a role's action space at the current decision."""
         return self.session.observer.masks.mask(role)
 
     def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:

@@ -113,7 +113,7 @@ class EventLog:
         flagged: bool = False,
         frame: int | None = None,
     ) -> None:
-        """Logs an event; its frame is the present one unless another is given."""
+        """Logs an event; its frame is the current one unless another is given."""
         at = self._world.frame if frame is None else frame
         self.events.append(Event(frame=at, type=kind, source=source, flagged=flagged, data=dict(data)))
 

@@ -331,7 +331,7 @@ class SessionViews(CachedViews):
 
     @property
     def most_props(self) -> int:
-        """Largest number of props."""
+        """Maximum number of props."""
         return len(self.arrays.observations[Role.AD_WIZARD].arrays["props"][self.row])
 
     def observe(self, roles: Sequence[Role]) -> None:

@@ -191,7 +191,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
 
     @property
     def action(self) -> dict[str, float]:
-        """Present action: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
+        """Current action: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
         record = self.record
         return {"acceleration": float(record.acceleration), "steering": float(steering_angle(record.slip))}
 

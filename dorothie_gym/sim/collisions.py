@@ -47,7 +47,7 @@ def overlap(
     """Returns whether two rectangles touch: no axis of either separates them (Gottschalk, Lin and Manocha 1996).
 
     Args:
-        dx: from the middle of the first to that of the second [m], `dy` likewise.
+        dx: from the centre of the first to that of the second [m], `dy` likewise.
         dy: [m].
         cos: direction of the first, `sin` likewise.
         sin: see there.
@@ -214,7 +214,7 @@ def _touch(vehicle: VehicleRecord, other: PlacedBody, radius: float, length: flo
 
 
 class OrientedBox(NamedTuple):
-    """Outline of a body on the ground: its middle [m], heading [rad], length along it and width across it [m]."""
+    """Outline of a body on the ground: its centre [m], heading [rad], length along it and width across it [m]."""
 
     x: float
     y: float

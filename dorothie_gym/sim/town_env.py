@@ -43,7 +43,7 @@ from dorothie_gym.support.copying import CachedViews, Restorable
 from dorothie_gym.support.time_limit import TimeLimited, steps_until
 
 ROUNDS = 8
-"""Largest number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
+"""Maximum number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
 
 SEEDS = 2**31
 """Upper bound of the seeds of a world's random numbers."""
@@ -180,7 +180,7 @@ class OccupancyGrid(OccupancyGridObservation):
         """
         spacing, network, place = np.amin(self.grid_step), self.env.road.network, self.observer_vehicle.position
         reach = float(np.linalg.norm(np.abs(self.grid_size).max(axis=1)))
-        boxes = network.table.boxes  # (n, 4): least x, least y, greatest x, greatest y
+        boxes = network.table.boxes  # (n, 4): minimum x, minimum y, maximum x, maximum y
         near = (boxes[:, :2] <= place + reach).all(axis=1) & (boxes[:, 2:] >= place - reach).all(axis=1)
         lanes = network.lanes_list()
         for row in np.flatnonzero(near).tolist():

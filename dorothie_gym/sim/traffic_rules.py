@@ -144,7 +144,7 @@ def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, nea
         if turning or (x - line.x) * line.cos + (y - line.y) * line.sin <= 0.0:
             continue
         across = abs((y - line.y) * line.cos - (x - line.x) * line.sin)
-        # on the border of two lanes the one with the nearer middle counts
+        # on the border of two lanes the one with the nearer centre counts
         if across < best and _is_on(line, x, y, cos, sin, poses[k, HEIGHT]):
             passed, best = j, across
     if passed == NOBODY:
@@ -210,7 +210,7 @@ def _list_lasting(town: TownArrays, world: WorldArrays, k: int, frame: int, kind
 def _state(town: TownArrays, poses: Array, k: int) -> tuple[bool, bool]:
     """Returns whether the car is off the road, and whether it is against the traffic.
 
-    A place that is at most `OFF_ROAD_MARGIN` outside of a lane is no farther from its middle than half its width and
+    A place that is at most `OFF_ROAD_MARGIN` outside of a lane is no farther from its centre than half its width and
     twice `OFF_ROAD_MARGIN`. Cells list all lanes that close, except very wide ones.
     """
     if town.wide:
@@ -300,9 +300,9 @@ class WorldEventKind(enum.StrEnum):
     STOP_SIGN = "stop_sign"
     """It passes the end of a lane with a stop sign and has not stood there with its front within `AT_LINE`."""
     OFF_ROAD = "off_road"
-    """Its middle is farther than `OFF_ROAD_MARGIN` outside of every lane's area, and it is not turning round."""
+    """Its centre is farther than `OFF_ROAD_MARGIN` outside of every lane's area, and it is not turning round."""
     WRONG_WAY = "wrong_way"
-    """Its middle is on lanes that all run against it, outside junctions, and it is not turning round."""
+    """Its centre is on lanes that all run against it, outside junctions, and it is not turning round."""
 
 
 INFRACTION_KINDS = (

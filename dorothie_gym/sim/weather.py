@@ -77,7 +77,7 @@ class Weather:
         """Returns the visibility in this weather.
 
         Args:
-            lights: whether the car's head lights are on.
+            lights: whether the car's headlights are on.
             clarity: share of the signal that the view itself leaves.
         """
         found = self._views.get((lights, clarity))

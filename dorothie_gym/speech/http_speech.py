@@ -62,7 +62,7 @@ class HttpSynthesizer:
         url: address before the route, such as "http://localhost:8000/v1".
         model: name of the model.
         voices: names of the voices of the server; the first is the default.
-        key: secret for the header `Authorization`; empty for none.
+        key: secret for the header `Authorization`; empty if there is none.
         timeout: time for an answer [s].
 
     Raises:
@@ -106,7 +106,7 @@ class HttpRecognizer:
     Args:
         url: address before the route, such as "http://localhost:8000/v1".
         model: name of the model.
-        key: secret for the header `Authorization`; empty for none.
+        key: secret for the header `Authorization`; empty if there is none.
         timeout: time for an answer [s].
 
     Raises:

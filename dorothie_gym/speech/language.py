@@ -69,7 +69,7 @@ def build_language(dictionary: Path, phonemes: Callable[[str], str]) -> SpokenLa
 
     Args:
         dictionary: CMU's dictionary.
-        phonemes: phonemes of a text, as of `HibariSynthesizer.phonemes`.
+        phonemes: phonemes of a text, as in `HibariSynthesizer.phonemes`.
     """
     sentences = [(words, weight) for words, weight in weighted_sentences() if words]
     vocabulary = {word for words, _ in sentences for word in words} | known_words()

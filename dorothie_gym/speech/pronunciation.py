@@ -49,7 +49,7 @@ def pronunciations(
     Args:
         words: spoken words in lower case.
         dictionary: pronunciations by word.
-        phonemes: phonemes of a text, as of `HibariSynthesizer.phonemes`.
+        phonemes: phonemes of a text, as in `HibariSynthesizer.phonemes`.
     """
     found = {}
     for word in words:

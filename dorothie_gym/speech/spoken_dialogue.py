@@ -32,7 +32,7 @@ PITCHES: Final = {Role.PARTICIPANT: (0.86, 0.97), Role.CO_WIZARD: (0.92, 0.96)}
 """Ranges from which the pitch of a speaker without a voice of its own is drawn; set by hand, see `policies.persona`."""
 
 DISTINCT: Final = 0.03
-"""Least difference in pitch between the two speakers; set by hand. Smaller ones are hard to hear between utterances."""
+"""Minimum difference in pitch between the speakers, set by hand. Smaller ones are hard to hear between utterances."""
 
 CROSSTALK: Final = -15.0
 """Level of the other speaker's voice at a speaker's microphone, where both talk [dB]; set by hand."""
@@ -68,7 +68,7 @@ class SpokenDialogue:
         Args:
             seed: seed of voices and noise.
             words_per_second: speaking rate of the session [words/s].
-            classify: as of `dialogue.Recogniser`.
+            classify: as in `dialogue.Recogniser`.
 
         Raises:
             SpeechError: the extra `speech` is not installed.

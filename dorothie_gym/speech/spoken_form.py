@@ -97,7 +97,7 @@ def written_form(tokens: Sequence[str]) -> str:
 
 @functools.cache
 def _written_names() -> tuple[Mapping[tuple[str, ...], str], int]:
-    """Returns the written form of names by their spoken words, and the largest number of words of a name."""
+    """Returns the written form of names by their spoken words, and the maximum number of words of a name."""
     found: dict[tuple[str, ...], str] = {}
     for value, forms in load_lexicon().phrases.items():
         if value.slot not in (Slot.LANDMARK, Slot.STREET):

@@ -186,7 +186,7 @@ class Restorable:
     """Attributes that hold changing values."""
 
     def clone_state(self) -> State:
-        """Returns the present state, for `restore_state`: an opaque value that later steps do not change.
+        """Returns the current state, for `restore_state`: an opaque value that later steps do not change.
 
         The states of generators are part of it; those of the spaces (`sample()`) and rendered pictures are not.
         """

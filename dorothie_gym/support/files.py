@@ -96,7 +96,7 @@ def replacing(path: Path, *, shared: bool = False, synced: bool = True) -> Itera
 def write_atomically(
     path: Path, content: str | bytes, *, shared: bool = False, mode: int | None = None, synced: bool = True
 ) -> None:
-    """Writes a file whole or not at all; a text in UTF-8. Errors as of `replacing`.
+    """Writes a file whole or not at all; a text in UTF-8. Errors as in `replacing`.
 
     Args:
         path: the file.

@@ -235,7 +235,7 @@ def _within_depth(value: object) -> bool:
 
 
 def read_json(path: Path, limit: int, *, unique: bool = True) -> JsonValue:
-    """Returns the JSON value of a file; arguments and errors as of `read_text` and `parse_json`."""
+    """Returns the JSON value of a file; arguments and errors as in `read_text` and `parse_json`."""
     return parse_json(read_text(path, limit), path, unique=unique)
 
 

@@ -29,7 +29,7 @@ from dorothie_gym.tasks.storyboard import (
 )
 
 MAX_LIVE_SUBGOALS = 6
-"""Largest number of subgoals without a trigger: two to six landmarks to visit (paper, "Task Configuration")."""
+"""Maximum number of subgoals without a trigger: two to six landmarks to visit (paper, "Task Configuration")."""
 
 
 def check(template: StoryboardTemplate) -> None:

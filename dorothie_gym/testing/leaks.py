@@ -136,7 +136,7 @@ def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[
 def _cameras(config: EnvConfig) -> list[CameraConfig]:
     """Returns cameras whose pixels are the samples of the pictures that the roles see, or see by.
 
-    RGB has several samples in a pixel; labels have one, in the middle, which is none of these.
+    RGB has several samples in a pixel; labels have one, in the centre, which is none of these.
     """
     cameras = [] if config.camera is None else [config.camera]
     if config.perception is PerceptionModel.CAMERA:

@@ -43,7 +43,7 @@ class TriggerState:
         junction: lane before the junction of the last decision, -1 for none.
         waited: time of the last decision at a junction [s].
         drove: time of the last navigation decision [s].
-        hazard: time since which there has been a hazard [s], infinite for none.
+        hazard: time since which there has been a hazard [s], infinite if there is none.
         at_place: whether the car would stop at the last-named place now.
         owed: whether a navigation decision is postponed until a lane switch or U-turn is complete.
     """

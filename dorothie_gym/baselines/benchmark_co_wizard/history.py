@@ -118,7 +118,7 @@ class History:
 
 
 def _last_landmark(utterances: Sequence[UtteranceRecord]) -> str | None:
-    """Returns the label of the landmark that was named last in utterances, None for none."""
+    """Returns the label of the landmark that was named last in utterances, None if there is none."""
     moves = (move for utterance in reversed(utterances) for move in reversed(utterance.moves))
     named = (move.act.slot_labels().get(Slot.LANDMARK.label) for move in moves)
     return next((labels[-1] for labels in named if labels), None)
@@ -138,7 +138,7 @@ class HistoryTracker:
         history: completed utterances and actions.
         air: spans of the Co-Wizard's utterance in progress.
         began: start of that utterance [s].
-        tried: physical action of the last decision, None for none.
+        tried: physical action of the last decision, None if there is none.
         before: observation of the last decision; None at first.
     """
 
@@ -155,7 +155,7 @@ class HistoryTracker:
             speech: the utterance, with its words.
             physical: the physical action.
             view: observation that the decision was taken on.
-            most_spans: largest number of acts in an utterance; further ones are refused.
+            most_spans: maximum number of acts in an utterance; further ones are refused.
         """
         air, began = self.air, self.began
         if speech is not None and len(air) < most_spans:
@@ -169,7 +169,7 @@ class HistoryTracker:
         Args:
             view: the observation.
             town: the map.
-            heard: spans of the participant's utterance that is over, empty for none.
+            heard: spans of the participant's utterance that is over, empty if there is none.
         """
         history = self.history
         if self.tried is not None and self.before is not None and carried_out(self.tried, self.before, view):

@@ -174,7 +174,7 @@ def _act(predicted: Predicted) -> DialogueAct:
 _CLAUSE_END: Final = re.compile(r"(?<=[,.?!]) ")
 
 _MAX_CLAUSES: Final = 8
-"""Largest number of clauses; the last one gets the rest of a longer utterance."""
+"""Maximum number of clauses; the last one gets the rest of a longer utterance."""
 
 
 def spans_of(text: str, acts: Sequence[DialogueAct] | None, after: DialogueMove | None = None) -> tuple[Span, ...]:

@@ -115,7 +115,7 @@ def _freshness(now: Tensor, times: Tensor, mask: Tensor) -> Tensor:
 # --- Exits of the next junction, from the lane graph of a town --------------------------------------------------------
 
 EXITS: Final = 5
-"""Largest number of exits; a crossing has three."""
+"""Maximum number of exits; a crossing has three."""
 
 _HOPS: Final = 24
 _START_YAW, _END_YAW = FEATURES.index("start_yaw"), FEATURES.index("end_yaw")

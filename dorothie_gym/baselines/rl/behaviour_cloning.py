@@ -35,7 +35,7 @@ LEARNING_RATE: Final = 1e-3
 BATCH_SIZE: Final = 64
 
 MAX_EPOCHS: Final = 60
-"""Largest number of passes over the decisions."""
+"""Maximum number of passes over the decisions."""
 
 PATIENCE: Final = 5
 """Number of passes without a better held-out likelihood after which cloning stops."""

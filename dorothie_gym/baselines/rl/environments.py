@@ -176,7 +176,7 @@ class EnvFactory:
 
 
 class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
-    """Records how the present episode began and the actions since then, with which another process can repeat it.
+    """Records how the current episode began and the actions since then, with which another process can repeat it.
 
     The beginning is the seed of the reset; for a reset without a seed, the state of the environment's random generator
     before it. That is exact if the environment depends on its seed and the actions only, as Gymnasium demands.
@@ -201,7 +201,7 @@ class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
         return self.env.step(action)
 
     def recorded_episode(self) -> tuple[Page, NDArray[np.generic]]:
-        """Returns the beginning of the present episode in JSON types, and its actions (n, ...)."""
+        """Returns the beginning of the current episode in JSON types, and its actions (n, ...)."""
         return self._start, np.array(self._actions)
 
     def repeat_episode(self, start: Page, actions: NDArray[np.generic]) -> Vector:

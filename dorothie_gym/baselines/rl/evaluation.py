@@ -25,7 +25,7 @@ PARALLEL_EPISODES: Final = 8
 """Number of episodes that single environments play in parallel: networks are faster on batches."""
 
 BATCHED_EPISODES: Final = 128
-"""Largest number of episodes that a batch plays in parallel."""
+"""Maximum number of episodes that a batch plays in parallel."""
 
 
 Action: TypeAlias = Any

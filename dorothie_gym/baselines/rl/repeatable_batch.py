@@ -18,7 +18,7 @@ Episode: TypeAlias = tuple[Page, NDArray[Any]]
 
 
 class RepeatableVecEnv(NativeVecEnv):
-    """Batch that records how each present episode began and its actions; see `RepeatableEpisodes` for one environment.
+    """Batch that records how each current episode began and its actions; see `RepeatableEpisodes` for one environment.
 
     The beginning is the seed of a reset; for a reset without a seed, the state of the environment's random generator
     before it, which is its state after the reset before.
@@ -54,7 +54,7 @@ class RepeatableVecEnv(NativeVecEnv):
         return observations, rewards, dones, infos
 
     def recorded_episodes(self) -> list[Episode]:
-        """Returns the present episodes of all environments."""
+        """Returns the current episodes of all environments."""
         kind = self.action_space
         return [
             (start, np.array(taken, dtype=kind.dtype).reshape(-1, *(kind.shape or ())))

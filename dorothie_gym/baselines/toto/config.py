@@ -93,7 +93,7 @@ _RANGES: Final = (
     ("weight_decay", 0.0, 10.0),
     ("clip", 0.0, 1e6),
 )
-"""Least and greatest values of numbers."""
+"""Minimum and maximum values of numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +126,7 @@ class TOTOConfig(HistorySizes):
         detector: (queries, numbers each) of an object detector; None: objects come from the world's list.
         learning_rate, weight_decay, clip: of AdamW, and the largest norm of the gradient.
         batch_size: points of a step.
-        min_epochs, max_epochs: smallest and largest number of epochs.
+        min_epochs, max_epochs: minimum and maximum number of epochs.
         patience: epochs without a better validation loss after which training stops.
         loss: weights of its parts.
 

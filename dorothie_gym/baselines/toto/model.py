@@ -320,7 +320,7 @@ class TOTO(Model):
 def gather_tokens(channels: list[Tokens]) -> tuple[Tensor, Tensor, Tensor]:
     """Returns the tokens of all channels (B, T, d), their times (B, T) and their mask (B, T).
 
-    Valid tokens come first, and T is the largest number of any point: missing tokens cost nothing, and results do not
+    Valid tokens come first, and T is the maximum number of any point: missing tokens cost nothing, and results do not
     depend on the padding. Attention does not know places, so that their order does not matter.
     """
     tokens = torch.cat([part for part, _, _ in channels], dim=1)

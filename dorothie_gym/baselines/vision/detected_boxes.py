@@ -105,7 +105,7 @@ class DetectedBoxes:
 
     @property
     def threshold(self) -> float:
-        """Least score of a detection."""
+        """Minimum score of a detection."""
         figures = self._about.get("figures")
         found = figures.get("threshold") if isinstance(figures, dict) else None
         if not isinstance(found, float):
@@ -154,7 +154,7 @@ class DetectedBoxes:
     def queries(self, session: Session, town: Town) -> tuple[NDArray[np.int64], NDArray[np.float16]]:
         """Returns the queries (m, q, d) at the last record before each event, and the frames of these records (m,).
 
-        They are 0 outside the frames of the car. Errors as of `actors`.
+        They are 0 outside the frames of the car. Errors as in `actors`.
         """
         frames = session.scene.actors.frames
         return frames[before_events(frames, _event_frames(session))], self._recall(session, town)[1]
@@ -241,7 +241,7 @@ def before_events(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDAr
 
 
 def looked_at(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the places (n,) of the records that are looked at, rising; arguments as of `before_events`."""
+    """Returns the places (n,) of the records that are looked at, rising; arguments as in `before_events`."""
     return np.union1d(before_events(records, events), np.arange(0, len(records), _SPACING)).astype(np.int64)
 
 
@@ -253,7 +253,7 @@ def objects_in(boxes: NDArray[np.floating], scores: NDArray[np.floating], thresh
     """Returns the queries (n,) that are objects in a picture, the surest first, each object once.
 
     Args:
-        boxes: (q, 4) middle x and y, width and height.
+        boxes: (q, 4) centre x and y, width and height.
         scores: (q, k) sureness of the kinds.
         threshold: least score of an object.
     """

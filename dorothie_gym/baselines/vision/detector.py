@@ -121,7 +121,7 @@ class Targets:
     """Objects that have to be found in a picture.
 
     Attributes:
-        boxes: (n, 4) as of `Detections`.
+        boxes: (n, 4) as in `Detections`.
         kinds: (n,) rows of `KINDS`.
         solids: (n, 8) boxes in space.
         known: (n,) bool, whether the solid is known.
@@ -146,7 +146,7 @@ class Detections:
     """Detections in B pictures.
 
     Attributes:
-        boxes: (B, q, 4) middle x and y, width and height, in widths and heights of the picture.
+        boxes: (B, q, 4) centre x and y, width and height, in widths and heights of the picture.
         scores: (B, q, k) sureness in 0..1.
         solids: (B, q, 8) boxes in space, see `solids`.
         queries: (B, q, d) vectors of the queries after the last layer.

@@ -43,7 +43,7 @@ TESTS: Final = {"seen": "test/seen", "unseen": "test/unseen"}
 """Folds of the figures; those of unseen towns come second."""
 
 TESTED: Final = 300
-"""Largest number of pictures of a fold that are tested, evenly chosen."""
+"""Maximum number of pictures of a fold that are tested, evenly chosen."""
 
 _OBJECT_SPACING, _OBJECT_WAIT, _OBJECT_MOST = 4.0, 4.0, 60  # pictures with objects are rare
 
@@ -94,7 +94,7 @@ class VisionExperiment:
 
 
 def check_experiment(job: VisionExperiment) -> None:
-    """Raises `ValueError` if a setting is unknown, or the device is not here; `CheckpointError` as of the run."""
+    """Raises `ValueError` if a setting is unknown, or the device is not here; `CheckpointError` as in the run."""
     config_of(job.model, job.size)
     if job.inputs not in ("predicted", "true"):
         raise ValueError(f"there are no inputs {job.inputs!r}; choose from predicted, true")

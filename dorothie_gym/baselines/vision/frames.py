@@ -58,7 +58,7 @@ CLASSES: Final = 23
 """Number of CARLA's semantic classes, `ObjectClass` without QUERIED."""
 
 SPACE_COLUMNS: Final = ("x", "y", "z", "length", "width", "height", "heading")
-"""Columns of a body's upright box in space: middle to the right, down and along the axis of the camera, size [m], and
+"""Columns of a body's upright box in space: centre to the right, down and along the axis of the camera, size [m], and
 heading relative to the camera's, clockwise from above [rad]."""
 
 BOX_DTYPE: Final = np.dtype(
@@ -94,7 +94,7 @@ class FrameSampling:
         height: height of a picture [pixels].
         spacing: distance that the car drives between two pictures [m].
         wait: time after which a car that does not drive gives a further picture [s].
-        most: largest number of pictures of a session, evenly thinned out.
+        most: maximum number of pictures of a session, evenly thinned out.
         pixels: visible pixels that at least one road user or prop in a picture has; 0 for any picture.
 
     Raises:

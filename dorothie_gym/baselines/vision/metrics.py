@@ -34,7 +34,7 @@ OVERLAPS: Final = tuple(round(0.5 + 0.05 * k, 2) for k in range(10))
 """COCO's thresholds of overlap."""
 
 PLACE_RADIUS: Final = 2.0
-"""Largest distance of the middles of a true and a detected box in space that belong together [m]."""
+"""Largest distance of the centres of a true and a detected box in space that belong together [m]."""
 
 _RECALLS: Final = np.linspace(0.0, 1.0, 101)
 
@@ -137,7 +137,7 @@ def _overlap(picture: PictureBoxes) -> Array:
 
 
 def _nearness(picture: PictureBoxes) -> Array:
-    """Returns the negative distances of the middles, height aside (m, n) [m]."""
+    """Returns the negative distances of the centres, height aside (m, n) [m]."""
     x, _, z = (picture.detected_spaces[:, None, :3] - picture.spaces[None, :, :3]).transpose(2, 0, 1)
     return np.asarray(-np.hypot(x, z))
 
@@ -165,7 +165,7 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
         turned: kinds whose headings are compared.
 
     Returns:
-        place_error: distance of the middles, height aside [m].
+        place_error: distance of the centres, height aside [m].
         range_error: |detected - true| / true depth.
         size_error: 1 minus the intersection over union of the boxes with aligned centre and heading.
         heading_error: [degrees].

@@ -35,7 +35,7 @@ TURNED: Final = (0, 1)
 """Rows of `KINDS` whose headings mean something: props look alike from several sides."""
 
 VALIDATED: Final = 150
-"""Largest number of validation pictures after an epoch, evenly chosen."""
+"""Maximum number of validation pictures after an epoch, evenly chosen."""
 
 _TESTED: Final = 8  # pictures at once
 _LEAST_SHARE: Final = 0.4  # of an object's box that an enlarged part of a picture must hold
@@ -192,14 +192,14 @@ def distinct_queries(centred: NDArray[np.floating], scores: NDArray[np.floating]
     """Returns the queries (n,) that overlap no query with a higher score by more than `OVERLAP`, best first.
 
     Args:
-        centred: (q, 4) boxes: middle x and y, width and height.
+        centred: (q, 4) boxes: centre x and y, width and height.
         scores: (q, k) sureness of the kinds.
     """
     return distinct(corners_of(centred).astype(np.float64), scores.max(axis=1).astype(np.float64), OVERLAP)
 
 
 def corners_of(centred: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Returns left, top, right and bottom (n, 4) of boxes (n, 4) with middle x and y, width and height."""
+    """Returns left, top, right and bottom (n, 4) of boxes (n, 4) with centre x and y, width and height."""
     half = centred[:, 2:] / 2
     return np.concatenate((centred[:, :2] - half, centred[:, :2] + half), axis=1)
 

@@ -17,7 +17,7 @@ from dorothie_gym.baselines.vision.segformer import SegFormer, SegFormerConfig, 
 from dorothie_gym.baselines.vision.training import Learner
 
 VALIDATED: Final = 120
-"""Largest number of validation pictures after an epoch, evenly chosen."""
+"""Maximum number of validation pictures after an epoch, evenly chosen."""
 
 _JITTER: Final = 0.2  # largest change of brightness and contrast
 _TESTED: Final = 8  # pictures at once

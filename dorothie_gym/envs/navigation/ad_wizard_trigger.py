@@ -58,7 +58,7 @@ _place_ahead, _suits_roadblock = compiled(place_ahead), compiled(suits_roadblock
 class PlansRecord:
     """Plans of the scripted Ad-Wizard in an environment."""
 
-    times: Annotated[NDArray[np.float64], "f8", (MOST_TRICKS,)]  # of the tricks to come, infinite for none [s]
+    times: Annotated[NDArray[np.float64], "f8", (MOST_TRICKS,)]  # of the tricks to come, infinite if there is none [s]
     due: Float  # earliest time of anything [s], infinite for never
     restores: Float  # earliest time at which a change is undone [s]
     last: Float  # time of the last trick [s]

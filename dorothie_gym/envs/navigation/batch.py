@@ -55,7 +55,7 @@ class DrivingBatch(DrivingRows):
 
     @property
     def observations(self) -> DriverObservation:
-        """Observations at the present decision: vectors (environments, n) or pictures (environments, h, w, 3).
+        """Observations at the current decision: vectors (environments, n) or pictures (environments, h, w, 3).
 
         They are to be copied. Those of a restored batch are up to date after its next decision.
         """

@@ -49,7 +49,7 @@ OBSERVED_OBJECTS: Final = 4
 """Number of objects in the vector, the nearest first."""
 
 LOST: Final = 4.0
-"""Distance from the path beyond which a new path from the present lane is planned [m]."""
+"""Distance from the path beyond which a new path from the current lane is planned [m]."""
 
 END: Final = 2.0
 """Distance to the end of the path within which a new one is planned [m]."""

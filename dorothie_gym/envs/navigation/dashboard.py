@@ -54,14 +54,14 @@ class Readings:
         action: action of the last instruction; None before the first, and where a goal was named instead.
         sector: its direction, an index of `SECTORS`; None without one.
         distance: from the car to its place, negative behind it [m].
-        planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None for none.
+        planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None if there is none.
         planned_sector: its direction.
         goal: place of the named goal ahead of the car and to its right [m]; None if it is not known.
         speed: speed of the car [m/s].
         wanted: target speed: the cruise speed, or the speed that the path allows [m/s].
         limit: speed limit [m/s]; None where it is not known.
         hazard: whether the car brakes for a hazard.
-        lights: whether the head lights are on.
+        lights: whether the headlights are on.
         steering: share of the greatest steering angle, positive right; None where the car steers itself.
     """
 
@@ -299,7 +299,7 @@ def _draw_icon(
 
 
 def _draw_needle(panel: NDArray[np.uint8], ahead: float, right: float) -> None:
-    """Draws a needle from the middle of the first icon towards the goal: up is ahead."""
+    """Draws a needle from the centre of the first icon towards the goal: up is ahead."""
     square, middle, reach = panel[HEIGHT - _SIZE :, _ICON : _ICON + _SIZE], _SIZE // 2, pm.hypot(ahead, right)
     square[middle, middle] = SPEED
     if reach > 0.0:

@@ -107,7 +107,7 @@ class DrivingRows(CachedViews):
 
     Attributes:
         town: the map.
-        faces: present session of each environment; None before its first.
+        faces: current session of each environment; None before its first.
         frames: substeps of a decision.
         pedals: whether the agents use throttle, steering and brake.
         threads: number of threads, the caller's included.
@@ -234,12 +234,12 @@ class DrivingRows(CachedViews):
 
     @property
     def vectors(self) -> Vector:
-        """Vectors at the present decision (environments, n), to be copied."""
+        """Vectors at the current decision (environments, n), to be copied."""
         return self._drivers.vector
 
     @property
     def masks(self) -> NDArray[np.int8]:
-        """Feasible actions at the present decision (environments, 18), to be copied."""
+        """Feasible actions at the current decision (environments, 18), to be copied."""
         return self._drivers.mask
 
     @cached_property

@@ -128,7 +128,7 @@ def kind_of(event: Event) -> ExceptionKind | None:
 
 
 def place_of(event: Event) -> tuple[float, float] | None:
-    """Returns the place of an exception (x, y) [m]: of its object, or the middle of its area; None if it has none."""
+    """Returns the place of an exception (x, y) [m]: of its object, or the centre of its area; None if it has none."""
     data = event.data
     x, y = data.get("x"), data.get("y")
     if isinstance(x, int | float) and isinstance(y, int | float):

@@ -28,7 +28,7 @@ class UnitSpan:
 
     Attributes:
         words: number of its words, at least 1.
-        unit: number of its exchange, or transaction; None for none.
+        unit: number of its exchange, or transaction; None if there is none.
         decided: whether the annotator has finished it.
     """
 

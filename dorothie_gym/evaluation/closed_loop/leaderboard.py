@@ -174,7 +174,7 @@ def checked_entries(
     Args:
         entries: the rollouts.
         protocol: protocol of the leaderboard.
-        workers: number of processes, as of `check_submission`.
+        workers: number of processes, as in `check_submission`.
         on_session: called with the numbers of sessions checked and to be checked, of all rollouts.
 
     Raises:

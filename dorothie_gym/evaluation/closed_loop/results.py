@@ -55,7 +55,7 @@ class RolloutRow:
         seed: seed of the session.
         record: measures of the session; None if it ended in an error.
         error: the error, if any.
-        usage: usage of language models, by role; empty for none.
+        usage: usage of language models, by role; empty if there is none.
     """
 
     number: int
@@ -151,7 +151,7 @@ class RolloutResult:
         return RolloutTable.of(self.rows)
 
     def usage(self) -> SessionUsage:
-        """Returns the usage of language models in all sessions, by role; empty for none."""
+        """Returns the usage of language models in all sessions, by role; empty if there is none."""
         return total_usage([row.usage for row in self.rows])
 
     def per_town(self) -> dict[str, RolloutTable]:
@@ -178,7 +178,7 @@ class RolloutResult:
 
 
 class _RowPage(TypedDict):
-    """Row in JSON types; fields as of `RolloutRow`."""
+    """Row in JSON types; fields as in `RolloutRow`."""
 
     number: Annotated[int, Meta(ge=0)]
     town: str

@@ -48,7 +48,7 @@ CLARIFICATIONS: Final = frozenset({DialogueMove.CONFUSE, DialogueMove.CLARIFY, D
 
 
 class TalkPage(TypedDict):
-    """Counts of a session's dialogue in JSON types; fields as of `TalkRecord`."""
+    """Counts of a session's dialogue in JSON types; fields as in `TalkRecord`."""
 
     utterances: Count
     exchanges: Count
@@ -110,7 +110,7 @@ PROBE_PERIOD: Final = 1.0
 
 
 class MetExceptionPage(TypedDict):
-    """Exception in JSON types; fields as of `MetException`."""
+    """Exception in JSON types; fields as in `MetException`."""
 
     kind: str
     met: Amount | None
@@ -254,7 +254,7 @@ _TOUCHED: Final = {ObjectClass.PEDESTRIAN: "pedestrian", ObjectClass.VEHICLES: "
 
 
 class SessionRecordPage(TypedDict):
-    """Measures of one session in JSON types; fields as of `SessionRecord`."""
+    """Measures of one session in JSON types; fields as in `SessionRecord`."""
 
     live: Count
     reached: Count

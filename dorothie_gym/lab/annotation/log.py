@@ -148,7 +148,7 @@ class AnnotationLog:
         text: text of the session.
         path: the file.
         annotator: name of the annotator.
-        annotation: the present marks.
+        annotation: the current marks.
         edits: number of edits so far.
         lines: all edits, in order.
 

@@ -27,8 +27,8 @@ class SpanMark:
         words: number of its words, at least 1.
         move: dialogue move; None if it is not decided.
         slots: slot values.
-        exchange: number of its exchange; None for none.
-        transaction: number of its transaction; None for none.
+        exchange: number of its exchange; None if there is none.
+        transaction: number of its transaction; None if there is none.
         suggested: whether the marks come from the classifier and the annotator has not accepted them yet.
     """
 

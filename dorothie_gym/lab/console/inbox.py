@@ -47,7 +47,7 @@ class TakenActions:
 
     Attributes:
         action: the action of the role.
-        spoken: typed span that begins with it; None for none.
+        spoken: typed span that begins with it; None if there is none.
         done: largest number of the commands that it carries out; 0 for none.
     """
 
@@ -133,7 +133,7 @@ class SeatInbox:
             raise MessageError(str(error)) from None
 
     def take(self, observation: ObservationMapping) -> TakenActions:
-        """Returns the action of the present decision: at most one span, one physical and one mental action.
+        """Returns the action of the current decision: at most one span, one physical and one mental action.
 
         Args:
             observation: observation of the role at the decision.

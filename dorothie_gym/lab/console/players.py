@@ -15,7 +15,7 @@ from dorothie_gym.session.spaces.actions import ActionMapping
 
 
 class Players:
-    """Policies of the roles that no person plays at present.
+    """Policies of the roles that no person currently plays.
 
     Args:
         engine: engine of the sessions.
@@ -60,7 +60,7 @@ class Players:
         return frozenset(self._policies)
 
     def actions(self) -> dict[str, ActionMapping]:
-        """Returns the actions of the policies in the present decision, by role."""
+        """Returns the actions of the policies in the current decision, by role."""
         actions: dict[str, ActionMapping] = {}
         inputs = policy_inputs(self._engine, self._policies)
         for role, policy in self._policies.items():

@@ -60,7 +60,7 @@ class Room:
         seats: seats by name; roles that a policy plays have none.
         state: state of the room.
         windscreen: pictures through the windscreen; None if there are none.
-        record: record of the present session; None if it is not recorded.
+        record: record of the current session; None if it is not recorded.
         failed: whether an error of the program ended the room.
     """
 

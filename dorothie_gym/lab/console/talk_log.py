@@ -23,7 +23,7 @@ class TalkLog:
 
     Attributes:
         entries: lines in order.
-        awaiting: last move that the seat heard, which an answer may follow; None for none.
+        awaiting: last move that the seat heard, which an answer may follow; None if there is none.
 
     Args:
         role: role of the seat; None for spectators, who hear everything with its acts.
@@ -52,7 +52,7 @@ class TalkLog:
 
         Args:
             said: all utterances of the session that are over.
-            time: present time [s].
+            time: current time [s].
         """
         for number in range(self._read, len(said)):
             utterance = said[number]

@@ -37,7 +37,7 @@ class Windscreen:
         return self._session is session and self._camera is not None
 
     def picture(self, session: LiveSession) -> bytes:
-        """Returns the picture at the present decision of the session that was prepared, as JPEG."""
+        """Returns the picture at the current decision of the session that was prepared, as JPEG."""
         assert self._camera is not None
         rgb = self._camera.render(session.world).rgb
         assert rgb is not None

@@ -40,7 +40,7 @@ class Entrance:
 
         Args:
             parameters: parameters of the link; unknown names and placeholders are left out.
-            token: token of an invitation, or of a link for readmission; None for none.
+            token: token of an invitation, or of a link for readmission; None if there is none.
             visit: random text of the browser's tab. If an answer is lost in transit, the same tab gets the same place.
 
         Raises:

@@ -123,7 +123,7 @@ class Progress:
     # --- sessions ---------------------------------------------------------------------------------------------------
 
     def session_of(self, person: Participant) -> SessionRow | None:
-        """Returns the present session of a participant."""
+        """Returns the current session of a participant."""
         group = self.records.group_of(person.id)
         return None if group is None else self.records.sessions(group.id)[person.position]
 

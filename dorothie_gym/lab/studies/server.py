@@ -196,7 +196,7 @@ class StudyServer:
         return person, body
 
     def _view(self, person: Participant) -> Response:
-        """Answers with the present view of a participant."""
+        """Answers with the current view of a participant."""
         self._presence.tell()
         found = self._records.participant(person.id)
         return answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))

@@ -235,7 +235,7 @@ class Study(_Part, frozen=True, kw_only=True):
         questionnaires: questionnaires.
         assignment: method of assignment.
         session: settings of the sessions.
-        tutorial: tutorial drive; None for none.
+        tutorial: tutorial drive; None if there is none.
         absence: rules for people who leave.
         waiting_room: rules of the waiting room.
         recruitment: recruitment.

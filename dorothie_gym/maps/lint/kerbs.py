@@ -261,7 +261,7 @@ def _fault(samples: LaneSamples, rows: slice, over: Array, what: str) -> Fault:
 
 
 def _car_sides(samples: LaneSamples, rows: slice) -> Array:
-    """Returns the left side, middle and right side of a car along a lane (n, 3, 2) [m]."""
+    """Returns the left side, centre and right side of a car along a lane (n, 3, 2) [m]."""
     sides: Array = samples.points[rows, None] + _SIDES[:, None] * samples.right[rows, None]
     return sides
 

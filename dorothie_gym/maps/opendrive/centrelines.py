@@ -158,7 +158,7 @@ def sample_road(road: RoadRecord) -> RoadSamples:
 def _lateral_places(
     road: RoadRecord, section: int, ds: Array, pick: Array, offset: Array
 ) -> dict[int, tuple[Array, Array]]:
-    """Returns lateral position and width of the lanes of a section, stacked from the middle outwards.
+    """Returns lateral position and width of the lanes of a section, stacked from the centre outwards.
 
     A lane with a border ends at it regardless of the lanes between (OpenDRIVE 1.7, section 11.6.2).
     """

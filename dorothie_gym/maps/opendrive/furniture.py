@@ -184,7 +184,7 @@ NARROWEST_SIDEWALK = 0.5
 # Shortest sidewalk [m].
 SHORTEST_SIDEWALK = 1.0
 
-# Largest jump of a middle line from one sample to the next [m].
+# Largest jump of a centre line from one sample to the next [m].
 LARGEST_JUMP = 2.0
 
 # Largest gap between joined sidewalks of successive lane sections [m].
@@ -219,7 +219,7 @@ def lay_sidewalks(
 
 
 def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[Array]:
-    """Yields the middle lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
+    """Yields the centre lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
     open_: list[Array] = []
     for k, section in enumerate(road.sections):
         begun = []
@@ -234,7 +234,7 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
 
 
 def _wide_parts(line: Array) -> list[Array]:
-    """Returns the parts of a middle line with sufficient width, split at jumps in the profiles."""
+    """Returns the parts of a centre line with sufficient width, split at jumps in the profiles."""
     wide = line[:, 3] >= NARROWEST_SIDEWALK
     step = pn.hypot(*np.diff(line[:, :2], axis=0).T)
     edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1

@@ -64,7 +64,7 @@ def _radius(crossing: Crossing, arms: Sequence[Arm], trims: Mapping[tuple[int, b
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Samples:
-    """Points on the middles of roads, those of segments first, then those of crossings.
+    """Points on the centres of roads, those of segments first, then those of crossings.
 
     Attributes:
         points: where they are (n, 3) [m].

@@ -198,7 +198,7 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
 
 
 def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
-    """Returns the distances of the middles of the bends along the `rounded` polyline [m]."""
+    """Returns the distances of the centres of the bends along the `rounded` polyline [m]."""
     stations, here = list[float](), 0.0
     shortened = 0.0  # what the bend before takes of the leg
     for k, radius in enumerate(radii, start=1):

@@ -199,7 +199,7 @@ JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
 ROUNDABOUT_SPEED = 30.0
 """Default speed limit of roundabouts [km/h], unless that of the town is lower."""
 ROUNDABOUT_RADIUS = (8.0, 150.0)
-"""Range of radii of the middle line of a ring [m]."""
+"""Range of radii of the centre line of a ring [m]."""
 ROUNDABOUT_LANES = (1, 3)
 
 

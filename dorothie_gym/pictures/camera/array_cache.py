@@ -45,7 +45,7 @@ def through_cache(
     Args:
         folder: name of the folder in the cache.
         key: bytes that determine the content, in addition to the sources of the camera.
-        most: largest number of archives in the folder; the oldest are removed beyond it.
+        most: maximum number of archives in the folder; the oldest are removed beyond it.
         build: makes the content.
         pack: returns the arrays of the content.
         unpack: returns the content of such arrays; `KeyError` and `ValueError` mean that they are damaged.

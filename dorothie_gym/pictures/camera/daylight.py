@@ -55,8 +55,8 @@ class Daylight(NamedTuple):
         rainfall: strength of the rain in [0, 1].
         wetness: wetness of the road in [0, 1].
         lamps: strength of street lamps, lit windows and signs in [0, 1].
-        head_lights: strength of the car's head lights in [0, 1].
-        beams: strength of the head lights of other vehicles in [0, 1].
+        head_lights: strength of the car's headlights in [0, 1].
+        beams: strength of the headlights of other vehicles in [0, 1].
     """
 
     sun: Array
@@ -84,7 +84,7 @@ def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
 
     Args:
         weather: the ten parameters.
-        head_lights: whether the car's head lights are on.
+        head_lights: whether the car's headlights are on.
     """
     value = weather.values
     altitude = value[WeatherParameter.SUN_ALTITUDE_ANGLE]

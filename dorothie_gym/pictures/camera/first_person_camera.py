@@ -207,7 +207,7 @@ class FirstPersonCamera:
             weather: weather and sun.
             bodies: moving bodies, as from `model_bank.place_bodies`.
             time: simulated seconds, which move the rain.
-            head_lights: whether the car's head lights are on.
+            head_lights: whether the car's headlights are on.
             faults: faulty sensors, which act on RGB.
         """
         config = self.config

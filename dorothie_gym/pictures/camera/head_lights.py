@@ -1,4 +1,4 @@
-"""Light of the head lights of other vehicles on the road and the objects in front of them.
+"""Light of the headlights of other vehicles on the road and the objects in front of them.
 
 For each picture in the dark, the beams are drawn from above into a map of squares of 1 m, with the height of the road.
 Buildings and vehicles do not stop a beam: it reaches few metres.
@@ -22,7 +22,7 @@ from dorothie_gym.support.compilation.records import RecordArray, by_reference
 SQUARES = 128
 """Squares along each side of the map."""
 
-_AHEAD = 50.0  # [m] from the camera to the middle of the map
+_AHEAD = 50.0  # [m] from the camera to the centre of the map
 _FADING, _FARTHEST = 60.0, 90.0  # [m] from the camera over which beams fade
 _REACH = 26.0  # [m] from the front of a vehicle
 _NARROW, _SPREAD = 1.1, 0.34  # [m] half the width of a beam at the front, and its growth per metre
@@ -37,7 +37,7 @@ _FRONT, _LIGHTS = 0.5 * CAR_LENGTH, int(Lamps.LIGHTS)
 
 @by_reference
 class HeadLights(NamedTuple):
-    """Map of the light of head lights.
+    """Map of the light of headlights.
 
     Attributes:
         corner: (2,) x and y of the first square [m], whole numbers.
@@ -105,7 +105,7 @@ def _add_beam(lights: HeadLights, body: PlacementRecord, strength: float) -> Non
 
 @inlined
 def beam_light(lights: HeadLights, x: float, y: float, z: float) -> float:
-    """Returns the factor of the light of head lights at a position [m]."""
+    """Returns the factor of the light of headlights at a position [m]."""
     u, v = x - lights.corner[0] - 0.5, y - lights.corner[1] - 0.5
     i, j = math.floor(u), math.floor(v)
     if i < 0 or j < 0 or i >= SQUARES - 1 or j >= SQUARES - 1:

@@ -59,7 +59,7 @@ def light_samples(
     Args:
         optics: numbers of the picture.
         lamps: light of street lamps.
-        beams: light of the head lights of other vehicles, that was drawn for the picture.
+        beams: light of the headlights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: colours, places and surfaces.
         count: number of the samples.

@@ -41,7 +41,7 @@ _NONE, _WHOLE, _CUT = 0.0, 1.0, 2.0  # what is drawn of a triangle: nothing, all
 
 _ROWS = 4  # whose ends are computed at once
 
-_MARGIN = 0.5 + 1e-6  # [samples] from the left side of a sample to its middle, and a little more
+_MARGIN = 0.5 + 1e-6  # [samples] from the left side of a sample to its centre, and a little more
 
 # what sifting with half the digits may be wrong by, and more: float32 has 24 bits
 _SLACK = 1e-3  # [m]
@@ -176,7 +176,7 @@ def _sift(view: View, mesh: Mesh, first: int, sifted: NDArray[np.int32], count: 
         scale_a, scale_b, scale_c = one / max(a, close), one / max(b, close), one / max(c, close)
         ax, bx, cx = a_right * scale_a, b_right * scale_b, c_right * scale_c
         ay, by, cy = a_up * scale_a, b_up * scale_b, c_up * scale_c
-        around = some + margin * max(max(scale_a, scale_b), scale_c)  # from a corner to the next middle of a sample
+        around = some + margin * max(max(scale_a, scale_b), scale_c)  # from a corner to the next centre of a sample
         low, top = min(min(ay, by), cy), max(max(ay, by), cy)
         left, right = min(min(ax, bx), cx), max(max(ax, bx), cx)
         is_between = (np.ceil(high - top - around) == np.ceil(high - low - one + around)) | (

@@ -16,7 +16,7 @@ from dorothie_gym.support.compilation import inlined
 from dorothie_gym.support.compilation.records import by_reference
 
 ROOM: Final = 192
-"""Largest number of samples that are shaded together: their quantities fit into the processor's nearest cache."""
+"""Maximum number of samples that are shaded together: their quantities fit into the processor's nearest cache."""
 
 # entries of a quantity; were it a multiple of 512, quantities would compete for the same lines of the processor's cache
 _STRETCH = ROOM + 24

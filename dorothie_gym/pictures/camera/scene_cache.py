@@ -20,7 +20,7 @@ from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.town_scene import TownScene
 
 SCENES_KEPT = 16
-"""Largest number of entries; the oldest are removed beyond it. A scene takes 10 to 30 MB."""
+"""Maximum number of entries; the oldest are removed beyond it. A scene takes 10 to 30 MB."""
 
 
 @functools.lru_cache(maxsize=4)

@@ -35,7 +35,7 @@ REACH = 250.0
 """Distance up to which bodies are drawn [m]: a car is then two pixels high in a picture of 480 x 320."""
 
 SHADED = 120.0
-"""Distance up to which bodies out of view are listed, for their shadows and head lights [m]."""
+"""Distance up to which bodies out of view are listed, for their shadows and headlights [m]."""
 
 LIGHTS_BELOW = 6.0
 """Altitude of the sun below which cars drive with their lights on [degrees]; also in rain and fog."""

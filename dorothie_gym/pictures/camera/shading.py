@@ -51,7 +51,7 @@ def shade(
         light: light and air.
         noise: noise of the sky.
         lamps: light of street lamps on the ground.
-        beams: light of the head lights of other vehicles, that was drawn for the picture.
+        beams: light of the headlights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: scratch space.
         faces: scratch space, see `new_faces`.
@@ -128,7 +128,7 @@ def _sample(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) 
 
 @compiled
 def _place_of(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) -> tuple[float, float, float]:
-    """Returns the middle and the share of the samples of a pixel that see the triangle of sample k.
+    """Returns the centre and the share of the samples of a pixel that see the triangle of sample k.
 
     The share is 0 if an earlier sample already sees it.
     """

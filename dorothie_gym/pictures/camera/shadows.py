@@ -224,7 +224,7 @@ def _draw_bodies(
     bodies: RecordArray[PlacementRecord],
     lowest: float,
 ) -> None:
-    """Draws the map of bodies, those near its middle whose shadows may be seen on surfaces from a height on [m]."""
+    """Draws the map of bodies, those near its centre whose shadows may be seen on surfaces from a height on [m]."""
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
     first, reach, box = maps.window, 0.5 * _BODIES * TEXEL, maps.corners
     _empty_bodies(maps)
@@ -363,8 +363,8 @@ def sunlit(
         town_y: first row.
         bodies_x: first column of the map of bodies.
         bodies_y: first row.
-        column: square whose middle is left of the place.
-        row: square whose middle is above the place.
+        column: square whose centre is left of the place.
+        row: square whose centre is above the place.
         a: distance from there to the right [squares].
         b: distance from there downwards [squares].
         level: height above which surfaces cast a shadow on the place [1/50 m].

@@ -18,7 +18,7 @@ from dorothie_gym.pictures.palette import Colour
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
 
-# Larger holes between connectors are islands (such as the middle of a roundabout), not asphalt [m2].
+# Larger holes between connectors are islands (such as the centre of a roundabout), not asphalt [m2].
 _LARGEST_HOLE = 160.0
 _CLOSING = 2.5  # [m]
 _MOUTH = 6.0  # [m] of the lanes before and behind a junction that belong to its asphalt

@@ -17,7 +17,7 @@ from dorothie_gym.support import portable_arrays as pn
 
 _BROADEST_STREET = 45.0  # [m]
 _AHEAD = 1.5  # [m] largest longitudinal offset of points opposite each other
-_FEW = 6  # samples without a middle line, as where turn lanes begin back to back
+_FEW = 6  # samples without a centre line, as where turn lanes begin back to back
 _NEAREST_POINTS = 64  # nearest points to consider, which include those on the same kerb
 _SMOOTHING = 9  # samples
 
@@ -28,7 +28,7 @@ class Roadway:
 
     Attributes:
         street: index of the street.
-        line: middle line (n, 2) [m].
+        line: centre line (n, 2) [m].
         heading: (n,) [rad], unwrapped.
         height: (n,) [m].
         width: (n,) [m].
@@ -223,7 +223,7 @@ class Axis:
 
 
 def street_axes(borders: Borders, scale: float, origin: Array) -> list[Axis]:
-    """Returns the middle lines of all roadways of a town, sorted by street and length.
+    """Returns the centre lines of all roadways of a town, sorted by street and length.
 
     Args:
         borders: borders of the lanes.

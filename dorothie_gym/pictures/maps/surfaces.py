@@ -268,7 +268,7 @@ _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
-_LEVEL_REACH = 14.0  # [m] from the middle of a lane on a bridge or in a tunnel to that of a pavement there, at most
+_LEVEL_REACH = 14.0  # [m] from the centre of a lane on a bridge or in a tunnel to that of a pavement there, at most
 _BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
 BEYOND_BRIDGE = 6.0  # [m] of asphalt and paint beyond a bridge: adjacent lanes begin theirs at different places
 

@@ -43,7 +43,7 @@ def _line(utterance: Utterance, session: LiveSession) -> SpokenLine:
 
 
 def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine] = ()) -> Scene:
-    """Returns the scene of a session at the present decision.
+    """Returns the scene of a session at the current decision.
 
     Args:
         session: the session.

@@ -80,7 +80,7 @@ def judged(
     Args:
         known: what the Co-Wizard believes.
         view: observation.
-        asked: the proposition; without a place, one about the goal is about the present one.
+        asked: the proposition; without a place, one about the goal is about the current one.
         yes: function of a yes.
     """
     if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
@@ -93,7 +93,7 @@ def judged(
 
 
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
-    """Answers a question about the head lights, which is also a request to switch them on."""
+    """Answers a question about the headlights, which is also a request to switch them on."""
     state.intentions = state.intentions.with_lights(True)
     state.say(judged(state.knowledge, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:

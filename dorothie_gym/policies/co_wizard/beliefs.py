@@ -17,7 +17,7 @@ class BeliefState:
     """Beliefs about destinations, and the belief updates that the environment has not received yet.
 
     Attributes:
-        goal: landmark of the present destination.
+        goal: landmark of the current destination.
         place: believed place of the goal.
         exact: whether `place` is taken from the map; otherwise it is a guess.
         described: whether the participant has described where the goal, which is not on the map, lies.
@@ -104,7 +104,7 @@ class BeliefState:
         return replace(self, described=True)
 
     def with_place_ruled_out(self) -> BeliefState:
-        """Excludes the present place from the places of its landmark's name."""
+        """Excludes the current place from the places of its landmark's name."""
         return self if self.place is None else replace(self, ruled_out=(*self.ruled_out, self.place))
 
     def without_place(self) -> BeliefState:

@@ -38,7 +38,7 @@ class CoWizardConfig:
         path_width: largest distance from the waypoints at which an obstacle is on the path [m].
         detour_by_street: probability that a proposed detour is named by its street.
         detour_answer_time: time after which a detour is taken without an answer [s].
-        street_lanes: largest number of lanes of a street that are compared to find the nearest.
+        street_lanes: maximum number of lanes of a street that are compared to find the nearest.
         accepts_changes: probability that a change of tasks is accepted ("skipping Ikea") rather than only heard.
         accepts_goals: probability that a destination is accepted ("KFC it is") rather than only heard ("KFC, got it").
         search_silence: time without navigation instructions after which a described place is searched for [s].
@@ -136,7 +136,7 @@ class CoWizardStyle:
         chats: probability that small talk is answered.
         eases: whether the car slows down well before turns.
         gentle: whether the car slows down well before a place on the map.
-        rambles: probability that the present plan is mentioned along with another remark.
+        rambles: probability that the current plan is mentioned along with another remark.
         offers: probability that a task on the way is proposed as the first one.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
         recalls: probability that the thing or person of an errand is repeated, or mentioned on arrival.

@@ -134,7 +134,7 @@ def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _switch(state: CoWizardState, view: CoWizardView, side: LinkType) -> Physical | None:
-    # a refused command is repeated at the next decision, because there is seldom much room
+    # a refused command is repeated at the next decision, because there is rarely much room
     waited = view.time - state.commands.manoeuvre_sent_at
     ready = not view.manoeuvring and waited >= state.clock.interval and not state.town.lanes[view.lane].in_junction
     if not ready or not can_switch_lane(state.town, view.lane, view.station, side):
@@ -329,7 +329,7 @@ def _goal_is_close(state: CoWizardState, view: CoWizardView) -> bool:
 
 
 def _set_speed_and_lights(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Adjusts cruise speed and head lights."""
+    """Adjusts cruise speed and headlights."""
     intentions = state.intentions
     if intentions.speed < intentions.usual and view.time > intentions.slow_until and not intentions.creeping:
         intentions = state.intentions = intentions.with_speed(intentions.usual)

@@ -177,7 +177,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
 
 
 def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
-    """Goes first to the place that was offered; the present goal becomes pending."""
+    """Goes first to the place that was offered; the current goal becomes pending."""
     name = state.dialogue.offer
     state.dialogue = state.dialogue.with_offer(None)
     mark = known_landmark(state, view, name, ()) if name is not None else None
@@ -281,7 +281,7 @@ def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def abandon(state: CoWizardState, name: LandmarkName | None) -> None:
-    """Gives up a task; without a name, or if it is the present one, the car waits for the next."""
+    """Gives up a task; without a name, or if it is the current one, the car waits for the next."""
     if name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.ABANDONED)
     if name is None or name is state.beliefs.goal:

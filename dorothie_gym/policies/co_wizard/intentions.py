@@ -54,7 +54,7 @@ class Intentions:
         speed: target cruise speed [km/h].
         slow_until: time at which a temporary speed ends [s].
         usual: cruise speed on open road [km/h].
-        lights: target state of the head lights; None if nothing was said about them.
+        lights: target state of the headlights; None if nothing was said about them.
     """
 
     directive: Directive | None = None
@@ -182,5 +182,5 @@ class Intentions:
         return replace(self, speed=speed, usual=usual, slow_until=until)
 
     def with_lights(self, on: bool) -> Intentions:
-        """Sets the target state of the head lights."""
+        """Sets the target state of the headlights."""
         return replace(self, lights=on)

@@ -34,7 +34,7 @@ DETOUR_TIME: Final = 30.0
 """Time for which an obstacle explains a U-turn [s]."""
 
 CROWD: Final = 3
-"""Least number of people or vehicles in a crowd."""
+"""Minimum number of people or vehicles in a crowd."""
 
 Judgement = Callable[[CoWizardKnowledge, CoWizardView, Proposition], bool | None]
 """Returns whether a proposition without negation is true; None if that is not known."""

@@ -18,7 +18,7 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend, repeated
 
 FRAGMENT = 3
-"""Largest number of meaningless words that count as the rest of a misheard utterance."""
+"""Maximum number of meaningless words that count as the rest of a misheard utterance."""
 
 
 _REPEATABLE = act_builders.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}

@@ -43,9 +43,9 @@ class DialogueState:
         blocked_at: time at which an obstacle across the road was last found [s].
         detour_asked_at: time of the open question about a detour [s]; None where none is open.
         hazard_explained_at: time of the last explanation of a hazard [s].
-        weather_mentioned: whether the present bad weather has been mentioned.
+        weather_mentioned: whether the current bad weather has been mentioned.
         noticed: weather and crowds that have been noticed.
-        lost_mentioned: whether the present loss of localization has been mentioned.
+        lost_mentioned: whether the current loss of localization has been mentioned.
         contradicted: destination against whose route instructions were given, and how often; it may be misheard.
         view_fault: fault of the camera that has been noticed and is not over.
     """
@@ -89,7 +89,7 @@ class DialogueState:
         return replace(self, asked_lane=lane, asked_at=now)
 
     def asking_way_again(self) -> DialogueState:
-        """Lets the way be asked for at once although it was asked for at the present junction before."""
+        """Lets the way be asked for at once although it was asked for at the current junction before."""
         return replace(self, asked_lane=-1)
 
     def after_steering(self, now: float) -> DialogueState:
@@ -130,7 +130,7 @@ class DialogueState:
         return replace(self, slower=speed)
 
     def with_view_fault(self, sensor: Sensor | None) -> DialogueState:
-        """Sets the fault of the camera that has been noticed; None for none."""
+        """Sets the fault of the camera that has been noticed; None if there is none."""
         return replace(self, view_fault=sensor)
 
     def after_refusal(self) -> DialogueState:
@@ -150,7 +150,7 @@ class DialogueState:
         return replace(self, hazard_explained_at=now)
 
     def with_weather_mentioned(self, mentioned: bool) -> DialogueState:
-        """Sets whether the present weather has been mentioned."""
+        """Sets whether the current weather has been mentioned."""
         return replace(self, weather_mentioned=mentioned)
 
     def with_noticed(self, noticed: Noticed) -> DialogueState:
@@ -162,7 +162,7 @@ class DialogueState:
         return replace(self, contradicted=(goal, count))
 
     def with_lost_mentioned(self, mentioned: bool) -> DialogueState:
-        """Sets whether the present loss of localization has been mentioned."""
+        """Sets whether the current loss of localization has been mentioned."""
         return replace(self, lost_mentioned=mentioned)
 
 
@@ -177,7 +177,7 @@ class CommandState:
         stop_sent_at: time of the last Stop command [s].
         rest_until: end of a stop because of something in the way [s].
         rest_for: object that the car stops for.
-        rest_decided: whether stopping at the present hazard has been decided on.
+        rest_decided: whether stopping at the current hazard has been decided on.
         ready_at: time before which the Co-Wizard has not reacted to an instruction yet, except to stop [s].
     """
 
@@ -207,7 +207,7 @@ class CommandState:
         return replace(self, turn_sent=turn, turn_sent_at=now)
 
     def with_rest_decided(self, decided: bool) -> CommandState:
-        """Sets whether stopping at the present hazard has been decided on."""
+        """Sets whether stopping at the current hazard has been decided on."""
         return replace(self, rest_decided=decided)
 
     def resting(self, until: float, hazard: ObjectClass) -> CommandState:
@@ -229,7 +229,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
         route: route to the goal.
         intentions: driving goals of the next seconds.
         commands: commands given to the car.
-        standstill: present or last standstill.
+        standstill: current or last standstill.
     """
 
     dialogue: DialogueState = field(default_factory=DialogueState)

@@ -38,7 +38,7 @@ class CoWizardView:
         manoeuvre: manoeuvre prepared or under way.
         angle: its angle [degrees].
         cruise: cruise speed [km/h].
-        lights: whether the head lights are on.
+        lights: whether the headlights are on.
         choice: next junction with a choice.
         landmarks: landmarks on the map.
         objects: objects in sight.

@@ -39,7 +39,7 @@ PROPS_AHEAD = (60, 100)
 """Distances ahead on the car's path at which a prop can be placed, or actors spawned [m]."""
 
 PROP_MARGINS = (30.0, 8.0)
-"""Least distances of a prop from the beginning and the end of its lane, nearer to which it is refused [m]."""
+"""Minimum distances of a prop from the beginning and the end of its lane, nearer to which it is refused [m]."""
 
 SAME_WEATHER = 0.02
 """Difference, as a share of the range of a parameter, below which the weather is so already."""
@@ -74,7 +74,7 @@ class AdWizardMemory(Memory):
     """Memory of the Ad-Wizard.
 
     Attributes:
-        order: change that is to be made; None for none.
+        order: change that is to be made; None if there is none.
         tasks: last observed state of the tasks.
     """
 

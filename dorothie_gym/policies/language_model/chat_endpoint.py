@@ -44,7 +44,7 @@ class IncompleteError(CallError):
     """Completion without a valid answer; its tokens are charged nevertheless.
 
     Attributes:
-        tokens: as of `Completion`.
+        tokens: as in `Completion`.
     """
 
     def __init__(self, fault: Fault, reason: str, tokens: tuple[int, int]) -> None:

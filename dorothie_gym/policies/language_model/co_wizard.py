@@ -57,16 +57,16 @@ class CoWizardMemory(Memory):
     """Memory of the Co-Wizard.
 
     Attributes:
-        goal: place where the Co-Wizard is going; None for none.
+        goal: place where the Co-Wizard is going; None if there is none.
         goal_name: name of the goal in prompts.
         marks: places that were marked on the map, by landmark.
         navigator: route to the goal.
         step: next step on the route; None without a route.
-        drive: action that is to be carried out, with the time until which it is kept [s]; None for none.
+        drive: action that is to be carried out, with the time until which it is kept [s]; None if there is none.
         updates: belief updates that are to be sent, the next first.
         motion: state of motion at the last decision.
         standing_since: time since which the car stands [s]; None if it drives.
-        told_held_up: whether the present standstill before a hazard was pointed out.
+        told_held_up: whether the current standstill before a hazard was pointed out.
         told_step: step that was pointed out last, and when [s].
         told_junction: junction that was pointed out last.
         visited: goals at which the car has stopped.

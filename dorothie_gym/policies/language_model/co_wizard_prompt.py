@@ -124,7 +124,7 @@ def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
 
 
 def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | None:
-    """Returns the middle of the lane of a street that is nearest to the car as the crow flies."""
+    """Returns the centre of the lane of a street that is nearest to the car as the crow flies."""
     indices, (x, y) = streets_named(view.raw["street_names"], street), view.position
     found = []
     for lane in town.lanes:
@@ -191,7 +191,7 @@ def prompt_text(
         navigator: route to the goal.
         step: next step on it.
         events: events since the last call, in words.
-        goal: name of the goal; empty for none.
+        goal: name of the goal; empty if there is none.
         talk: the conversation.
         note: note of the model to itself.
         mark: whether the place of the goal is a mark.

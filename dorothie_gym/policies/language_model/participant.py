@@ -55,12 +55,12 @@ class ParticipantMemory(Memory):
     """Memory of the participant.
 
     Attributes:
-        guide: name of the place that it guides the car to; empty for none.
-        progress: route to that place; None for none.
+        guide: name of the place that it guides the car to; empty if there is none.
+        progress: route to that place; None if there is none.
         told: step of the route that was pointed out last: kind, and lane.
         tasks: last observed list of tasks, with their states.
         standing_since: time since which the car stands [s]; None if it drives.
-        told_standing: whether the present standstill was pointed out.
+        told_standing: whether the current standstill was pointed out.
     """
 
     guide: str = ""

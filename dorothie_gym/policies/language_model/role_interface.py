@@ -136,8 +136,8 @@ class RoleInterface(ABC, Generic[M]):
         """Processes an answer of the schema.
 
         Args:
-            observation: observation of the role at present.
-            memory: memory at present.
+            observation: current observation of the role.
+            memory: current memory.
             answer: value of each field.
 
         Returns:
@@ -196,7 +196,7 @@ def next_speech(observation: ObservationMapping, memory: M) -> tuple[Speech | No
 
 
 def with_heard(memory: M, observation: ObservationMapping, speaker: Role, called: str) -> tuple[M, str]:
-    """Adds an utterance that has ended to the talk; returns its words, empty for none."""
+    """Adds an utterance that has ended to the talk; returns its words, empty if there is none."""
     words = str(observation[f"{speaker}_text"]).strip()
     if not words:
         return memory, ""

@@ -15,7 +15,7 @@ Amount: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e12)]
 
 
 class UsagePage(TypedDict):
-    """Usage in JSON types; fields as of `ModelUsage`."""
+    """Usage in JSON types; fields as in `ModelUsage`."""
 
     model: str
     calls: Count

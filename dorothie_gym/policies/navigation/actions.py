@@ -50,7 +50,7 @@ class NavigationAction(enum.IntEnum):
     FASTER = 7
     SLOWER = 8
     LIGHTS = 9
-    """Switches the head lights."""
+    """Switches the headlights."""
     TURN_BACK = 10
     TURN_SHARP_RIGHT = 11
     TURN_RIGHT = 12

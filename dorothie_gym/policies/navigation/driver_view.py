@@ -75,7 +75,7 @@ class DriverView:
     exit_lane: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # lane behind the exit in each sector, or -1
     exit_angle: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # its angle [degrees, positive left]
     exit_street: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # id of the `StreetName` of its street
-    lights: Flag  # whether the head lights are on
+    lights: Flag  # whether the headlights are on
 
 
 class HeardRecord:

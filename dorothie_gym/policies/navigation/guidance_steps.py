@@ -113,7 +113,7 @@ def instruct(
         graph: routing graph of the town.
         search: scratch space for route searches.
         sectors: sector of each exit of `tables`, or -1.
-        guide: the instructor; `now`, the subgoals and the static bodies in sight describe the present decision.
+        guide: the instructor; `now`, the subgoals and the static bodies in sight describe the current decision.
     """
     view, route, said = guide.now[0], guide.route[0], guide.said[0]
     _choose_goal(graph, search, guide)
@@ -146,7 +146,7 @@ def instruct(
 
 @compiled
 def _choose_goal(graph: RoutingGraph, search: RouteSearch, guide: InstructorArrays) -> None:
-    """Keeps the present subgoal while it is open; otherwise chooses the closest one that may be reached now."""
+    """Keeps the current subgoal while it is open; otherwise chooses the closest one that may be reached now."""
     route, subgoals = guide.route[0], guide.subgoals
     if route.subgoal >= 0:
         now = subgoals[route.subgoal]

@@ -92,10 +92,10 @@ class ThingRecord:
 class RouteRecord:
     """Goal of the instructor, and progress on the route to it; -1 stands for none."""
 
-    subgoal: Int32  # present subgoal
+    subgoal: Int32  # current subgoal
     landmark: Int32  # its landmark
     legs: Int32  # number of legs of the route; 0 without a route
-    leg: Int32  # the present leg
+    leg: Int32  # the current leg
     astray: Int32  # number of decisions for which the car has been off the route
     closed: Int32  # number of rows of `InstructorArrays.closed` in use
     cut: Flag  # whether the route has more legs than there is room for

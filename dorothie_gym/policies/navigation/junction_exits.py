@@ -156,7 +156,7 @@ def exit_arrays(town: Town) -> ExitArrays:
 
 
 def nearest_sector(angle: float) -> int:
-    """Returns the number of the sector whose middle is closest to an angle [degrees, positive left]."""
+    """Returns the number of the sector whose centre is closest to an angle [degrees, positive left]."""
     return round((angle + 180.0) / SECTOR_WIDTH) % len(SECTORS)
 
 

@@ -30,7 +30,7 @@ class ParticipantConfig(GuidanceConfig):
         thinking_time: duration of such a halt [s].
         report_delay: range of the delay before the completion of a task is reported [s].
         next_task_delay: pause before the next task where it does not follow at once [s].
-        goes_first: probability that a new task on the way is done before the present one.
+        goes_first: probability that a new task on the way is done before the current one.
         announces_ahead: probability that the change of a later task is mentioned at once.
         tells_message: probability that the sender and the reason of a message are told with the change.
         leaves_route: probability that the choice of the route is left to the car in words.
@@ -45,16 +45,16 @@ class ParticipantConfig(GuidanceConfig):
         behind_corner: distance from the junction to such a goal [m].
         careful_speeds: speeds asked for where the goal is easily missed [km/h].
         manoeuvre_cost: extra cost of each lane change and U-turn on a route that has to be described in words [m].
-        run_up: least distance from a U-turn to the goal [m].
+        run_up: minimum distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
-        omits_straight: least probability that driving straight across a junction is not announced.
+        omits_straight: minimum probability that driving straight across a junction is not announced.
         states_distance: probability that a place ahead is announced by a statement, not by an instruction.
         way_round_cost: extra cost of each lane change and U-turn after failures [m].
         off_route: number of decisions off the route after which a new one is planned.
         missed_within: distance to the goal below which leaving the route counts as a miss [m].
         wrong_turn_detour: increase of the distance after which a wrong turn is pointed out [m].
-        lost_detour: increase over the least distance after which the car counts as lost [m].
+        lost_detour: increase over the minimum distance after which the car counts as lost [m].
         lost_standstill: standstill after which guidance takes over [s].
         top_speed: largest speed expected of the car [m/s].
         slow_distance: distance to the goal within which an announced stop is timed [m].
@@ -78,7 +78,7 @@ class ParticipantConfig(GuidanceConfig):
         usual_speed: speed asked for when the weather has cleared up [km/h].
         weather_notice: time that the car is given to mention the weather first [s].
         long_stop: standstill after which the reason may be asked for [s].
-        wonder_interval: least time between questions about unexpected behaviour [s].
+        wonder_interval: minimum time between questions about unexpected behaviour [s].
         asks_unseen: probability that a question about objects names one that may not be in sight.
         excuse_time: time for which an explanation excuses a standstill [s].
     """

@@ -44,7 +44,7 @@ _SPEEDING_UP = 130.0
 """Route length to the place below which the participant does not ask for more speed [m]."""
 
 LIGHTS_INTERVAL = 25.0
-"""Time between remarks about the head lights [s]."""
+"""Time between remarks about the headlights [s]."""
 
 WHY_INTERVAL = 40.0
 """Time between questions why the car stands [s]."""
@@ -205,7 +205,7 @@ def _look_around(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Asks for the head lights in the dark."""
+    """Asks for the headlights in the dark."""
     lit = bool(view.raw["lights"])
     if not is_dark(view.raw) or lit or view.time - state.conversation.lights_at < LIGHTS_INTERVAL:
         return

@@ -34,9 +34,9 @@ class ConversationState:
         asked_at: time of the last question why the car stands [s].
         wondered_at: time at which unexpected behaviour was last asked about or ignored [s].
         chat_at: time of the next remark unrelated to the task [s].
-        lights_at: time at which the head lights were last mentioned [s].
+        lights_at: time at which the headlights were last mentioned [s].
         slowed: whether a lower speed for the weather has been requested or was not needed.
-        bad_weather_since: start of the present bad weather [s]; infinite in good weather.
+        bad_weather_since: start of the current bad weather [s]; infinite in good weather.
         hurried: whether the car has been asked to go faster.
         noticed: weather and crowds that have been noticed.
         blind_since: time since which the camera shows less than the weather explains [s]; infinite while it does not.
@@ -77,11 +77,11 @@ class ConversationState:
         return replace(self, chat_at=at)
 
     def after_mentioning_lights(self, now: float) -> ConversationState:
-        """Records a mention of the head lights."""
+        """Records a mention of the headlights."""
         return replace(self, lights_at=now)
 
     def with_weather(self, now: float, *, bad: bool) -> ConversationState:
-        """Updates the start of the present bad weather."""
+        """Updates the start of the current bad weather."""
         since = min(self.bad_weather_since, now) if bad else math.inf
         return self if since == self.bad_weather_since else replace(self, bad_weather_since=since)
 
@@ -208,7 +208,7 @@ class GuidanceState:
 
     Attributes:
         guiding: whether the car is guided turn by turn.
-        best: least distance to the target so far [m].
+        best: minimum distance to the target so far [m].
         step: last step that was announced.
         step_at: time at which it was announced [s].
         repeats: number of repetitions of that step.
@@ -258,11 +258,11 @@ class GuidanceState:
         return replace(kept, step_at=self.step_at, considered=self.considered, left_to_ask=self.left_to_ask)
 
     def with_distance(self, left: float) -> GuidanceState:
-        """Updates the least distance to the target [m]."""
+        """Updates the minimum distance to the target [m]."""
         return self if left >= self.best else replace(self, best=left)
 
     def for_new_route(self, left: float) -> GuidanceState:
-        """Restarts step and least distance on a route around a roadblock."""
+        """Restarts step and minimum distance on a route around a roadblock."""
         return replace(self, best=left, step=None)
 
     def after_step(self, step: StepKey, now: float, return_time: float) -> GuidanceState:

@@ -102,7 +102,7 @@ OTHERS: Final = "(others)"
 
 
 class ReportPage(TypedDict):
-    """Report of a reader in JSON types; fields as of `ReadReport`."""
+    """Report of a reader in JSON types; fields as in `ReadReport`."""
 
     layout: str
     unknown: dict[str, int]

@@ -130,7 +130,7 @@ class SessionWriter:
 
     def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
         """Appends the state of each light at a frame, by id of its signal; raises `SessionError` as `add_actors`."""
-        if self._lights is None or self._lights[0] != lights:  # they seldom change
+        if self._lights is None or self._lights[0] != lights:  # they rarely change
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 

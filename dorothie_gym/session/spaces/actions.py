@@ -63,7 +63,7 @@ ActionMapping: TypeAlias = Mapping[str, Any]
 """Read-only action dict, as accepted by the decoders."""
 
 MAX_SPAWNED = 16
-"""Largest number of actors in one spawn exception."""
+"""Maximum number of actors in one spawn exception."""
 
 MAX_EXTENT = 100
 """Largest half side of the square of a spawn exception [m]."""

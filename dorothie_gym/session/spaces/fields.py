@@ -44,7 +44,7 @@ class SharedText(spaces.Text):
 
 
 class SharedTexts(tuple[str, ...]):
-    """Texts of several environments in shared memory: a tuple of their present values.
+    """Texts of several environments in shared memory: a tuple of their current values.
 
     Like the arrays, it changes with the next step if `AsyncVectorEnv` was made with `copy=False`. Copies are
     plain tuples. The object itself is an empty tuple: code that ignored its methods would fail, not see old texts.

@@ -72,7 +72,7 @@ class Car(CachedViews, Vehicle):
 
     @property
     def position(self) -> Array:
-        """Position of its middle (2,) [m]."""
+        """Position of its centre (2,) [m]."""
         return self._position
 
     @position.setter
@@ -209,7 +209,7 @@ class LocalPlanner(CachedViews):
         self._town, self._arrays, self._holder = town, arrays, holder
 
     def _look_up(self) -> np.void:
-        """Returns the plan in the present arrays."""
+        """Returns the plan in the current arrays."""
         arrays = self._holder.arrays
         if arrays is not self._shown:
             self._shown, self._row, self._car = arrays, plain(arrays.plan)[0], plain(arrays.car)[0]
@@ -238,7 +238,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def path(self) -> Path:
-        """The present path, the same object until it is replaced; every manoeuvre replaces it."""
+        """The current path, the same object until it is replaced; every manoeuvre replaces it."""
         plan = self._look_up()
         if plan["version"] != self._laid:
             self._laid = int(plan["version"])
@@ -259,7 +259,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def roadblock(self) -> float:
-        """Distance from the ego's middle to a roadblock on the path [m], or inf."""
+        """Distance from the ego's centre to a roadblock on the path [m], or inf."""
         self._look_up()
         return float(self._car["roadblock"])
 
@@ -290,12 +290,12 @@ class LocalPlanner(CachedViews):
 
     @property
     def room(self) -> float:
-        """Length of the path ahead of the ego's middle [m]."""
+        """Length of the path ahead of the ego's centre [m]."""
         return float(self._look_up()["length"]) - self.s
 
     @property
     def manoeuvre(self) -> tuple[PhysicalAction | None, int]:
-        """Planned or present manoeuvre, and its angle [degrees]."""
+        """Planned or current manoeuvre, and its angle [degrees]."""
         plan = self._look_up()
         action = int(plan["action"])
         return (PhysicalAction(action) if action else None), int(plan["angle"])
@@ -414,7 +414,7 @@ class EgoController:
 
     @property
     def lights(self) -> bool:
-        """Whether the head lights are on."""
+        """Whether the headlights are on."""
         return bool(self.planner.plan["lights"])
 
     @lights.setter

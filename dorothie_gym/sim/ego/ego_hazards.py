@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 TURN_ROUND_SPEED = 4.0
-"""Least speed assumed for oncoming vehicles before a U-turn [m/s]."""
+"""Minimum speed assumed for oncoming vehicles before a U-turn [m/s]."""
 
 EGO_ASKING = 11.5
 """Distance before the beginning of braking at which the ego requests a junction [m]."""
@@ -52,7 +52,7 @@ BEFORE_IT = 0.5
 """Distance before the beginning of a manoeuvre at which the ego waits [m]."""
 
 SLOWEST_APPROACH = 1.0
-"""Least speed assumed for the ego's approach [m/s]."""
+"""Minimum speed assumed for the ego's approach [m/s]."""
 
 IN_LINE, FACING_COSINE = 2.0, 0.5
 """Distance from a lane [m], and cosine of the heading to it, up to which a vehicle comes along it."""

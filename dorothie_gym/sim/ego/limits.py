@@ -113,7 +113,7 @@ HALF_LENGTH = 2.5
 """Half the length of the ego [m]."""
 
 PROP_DEPTH = 1.25
-"""Half the length of the longest prop [m]: a prop is in sight when its middle is."""
+"""Half the length of the longest prop [m]: a prop is in sight when its centre is."""
 
 LEAD = 1.0
 """Path before the beginning of a manoeuvre [m]."""
@@ -128,7 +128,7 @@ MIN_SWITCH = 14.0
 """Length of the shortest lane switch [m]."""
 
 U_TURN_REACH = 14.0
-"""Room ahead of its middle that the ego needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m
+"""Room ahead of its centre that the ego needs for a U-turn [m]: 11 m for its centre where lanes are 3.5 m apart, 1 m
 for its side, and the clearance beside it."""
 
 U_TURN_SAMPLES = 4
@@ -138,8 +138,8 @@ LANDING = 6.0
 """Oncoming lane left after a U-turn [m], so that the ego stands straight before it waits at the lane's end."""
 
 MANOEUVRE_PROP_GAP = 16.5
-"""Least distance of the ego's middle to that of a prop at the end of a lane switch or U-turn, less the way to stop [m]:
-`obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""
+"""Minimum distance between the centres of ego and prop at the end of a lane switch or U-turn [m], without the
+stopping distance: `obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""
 
 
 # --- Feasibility of physical actions ----------------------------------------------------------------------------------

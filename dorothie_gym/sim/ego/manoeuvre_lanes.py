@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 LEAST_PATH = 120.0
-"""Least length of path ahead [m]."""
+"""Minimum length of path ahead [m]."""
 
 LAID = 180.0
-"""Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is seldom laid again."""
+"""Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is rarely laid again."""
 
 SWITCH_COST = 20.0
 """Misfit by which an exit of the car's lane is preferred to that of an adjacent lane [degrees]."""
@@ -79,7 +79,7 @@ def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
 
 @compiled
 def take_course(town: TownArrays, world: WorldArrays) -> bool:
-    """Begins a plan with the lanes of the present path from the ego's place on."""
+    """Begins a plan with the lanes of the current path from the ego's place on."""
     plan, course, last = world.plan[0], world.course, NOBODY
     plan.steps, fits = 0, True
     for k in range(plan.at, plan.points):
@@ -330,8 +330,8 @@ def lay_head(
 
     Args:
         town: arrays of the town.
-        world: arrays of the world; lane and station of the ego are those on the present path.
-        first: first point of the present path that is kept.
+        world: arrays of the world; lane and station of the ego are those on the current path.
+        first: first point of the current path that is kept.
         end: the point after the last one that is kept.
         oncoming: lane on which a U-turn ends, or -1.
         begin: distance along the ego's lane at which the U-turn begins [m].

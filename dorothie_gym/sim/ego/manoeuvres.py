@@ -267,7 +267,7 @@ def request(
 
 @compiled
 def begin(town: TownArrays, world: WorldArrays, lane: int, station: float, offset: float) -> int:
-    """Lays a first path, or a new one for an ego that has left the present one, and drops the plan.
+    """Lays a first path, or a new one for an ego that has left the current one, and drops the plan.
 
     Args:
         town: arrays of the town.
@@ -431,7 +431,7 @@ def _replace(
         world: arrays of the world, with the first steps of the plan.
         station: beginning of the path on the first of them [m].
         speed: speed of the ego [m/s], which the length of lane switches depends on.
-        first: first point of the present path that is kept, see `lay_head`.
+        first: first point of the current path that is kept, see `lay_head`.
         end: the one after the last.
         oncoming: lane on which a U-turn ends, or -1.
         start: distance along the ego's lane at which the U-turn begins [m].
@@ -439,7 +439,7 @@ def _replace(
         angle: angle of the manoeuvre [degrees].
         connector: connector and lane of a turn, or -1.
         way_out: see there.
-        fresh: whether the ego is not on the present path, but at the beginning of the new one.
+        fresh: whether the ego is not on the current path, but at the beginning of the new one.
         offset: distance of the ego from the new path then, positive right [m].
 
     Returns:

@@ -35,7 +35,7 @@ STANDSTILL_GAP = 2.5
 """Gap left to a standing body [m]."""
 
 ROADBLOCK_GAP = 12.5
-"""Gap left to a prop [m]: room for a U-turn (`limits.U_TURN_REACH` from the ego's middle)."""
+"""Gap left to a prop [m]: room for a U-turn (`limits.U_TURN_REACH` from the ego's centre)."""
 
 EGO_LINE_GAP = 1.5
 """Gap left to the line before a junction [m]."""
@@ -54,7 +54,7 @@ class PerceivedBody:
     Attributes:
         key: identifies the body, the same over time.
         kind: its object class.
-        x: position of its middle [m]; `y` likewise.
+        x: position of its centre [m]; `y` likewise.
         heading: [rad].
         length: [m].
         width: [m].
@@ -93,7 +93,7 @@ SLOW_BODY = 0.5
 """Speed of a body below which the ego comes close to it in a manoeuvre [m/s]."""
 
 SHORTEST_STOP = 0.05
-"""Least way to a stop that braking counts on [m]."""
+"""Minimum stopping distance assumed by the braking controller [m]."""
 
 
 @inlined

@@ -162,11 +162,11 @@ def find_sweeps(
     length: float,
     width: float,
 ) -> None:
-    """Computes directions, and the reach of a car's corners to the left and to the right of the path of its middle.
+    """Computes directions, and the reach of a car's corners to the left and to the right of the path of its centre.
 
     highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
     where the path begins to bend its heading follows with a delay, and in a long bend its front points outwards.
-    A corner that is `along` before or behind the middle is off a path of curvature k by k / 2 along^2 more.
+    A corner that is `along` before or behind the centre is off a path of curvature k by k / 2 along^2 more.
 
     Args:
         course: points of the whole path.

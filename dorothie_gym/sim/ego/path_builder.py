@@ -311,7 +311,7 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
 
 @compiled
 def keep(town: TownArrays, world: WorldArrays, first: int, end: int, write: bool) -> None:
-    """Lays the points from `first` to before `end` of the present path, which is being replaced."""
+    """Lays the points from `first` to before `end` of the current path, which is being replaced."""
     if not count_points(world, end - first, write):
         return
     course, lane, limit = world.course, world.plan[0].lane, _limit_in_manoeuvre(town, world, first)
@@ -362,7 +362,7 @@ def find_end(world: WorldArrays) -> float:
 def find_headings(course: RecordArray[CoursePointRecord], count: int) -> None:
     """Computes the direction of a path at each of its points, unwrapped [rad].
 
-    The directions of the segments are those at their middles, between which they are interpolated; both ends
+    The directions of the segments are those at their centres, between which they are interpolated; both ends
     extrapolate the curvature.
 
     Args:

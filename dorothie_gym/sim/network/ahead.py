@@ -120,7 +120,7 @@ class Neighbours(NamedTuple):
 
 
 def lane_zones(table: LaneTable) -> Array:
-    """Returns least x, least y, greatest x, greatest y [m] of the bodies that count as on each lane: (n, 4)."""
+    """Returns minimum x, minimum y, maximum x, maximum y [m] of the bodies that count as on each lane: (n, 4)."""
     widest = np.maximum.reduceat(table.points[:, WIDTH], table.offsets[:-1])
     reach = (0.5 * widest + LANE_MARGIN + OVERHANG)[:, None]
     return np.hstack((table.boxes[:, :2] - reach, table.boxes[:, 2:] + reach))

@@ -75,7 +75,7 @@ class GridIndex:
         self._arrays: _Arrays = (*table, cells, entries, *self.origin)
 
     def closest(self, x: float, y: float, heading: float | None = None, height: float | None = None) -> int:
-        """Returns the row of the lane with the least distance, the first one of several; see `TownNetwork`."""
+        """Returns the row of the lane with the minimum distance, the first one of several; see `TownNetwork`."""
         weight = 1.0
         if heading is None:
             heading, weight = 0.0, 0.0
@@ -243,7 +243,7 @@ def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[
     nearest = math.sqrt(nearest)
     if nearest > CELL_REACH + radius + SLACK:
         return -1, -1
-    # the distance changes by no more than `radius` between the middle and anywhere in the cell, for every segment
+    # the distance changes by no more than `radius` between the centre and anywhere in the cell, for every segment
     limit = nearest + 2.0 * radius + SLACK
     low, high = last, first
     for k in range(first, last):

@@ -187,7 +187,7 @@ class TownNetwork(RoadNetwork):
                 are considered, or all lanes if there is no such lane in the town.
 
         Returns:
-            The index with the least `distance_with_heading`; the first one in the graph's order of several.
+            The index with the minimum `distance_with_heading`; the first one in the graph's order of several.
         """
         x, y = float(position[0]), float(position[1])
         if (

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 KEEP_RIGHT = 0.4
-"""Offset to the right of the middle at which pedestrians walk [m], so that they pass each other."""
+"""Offset to the right of the centre at which pedestrians walk [m], so that they pass each other."""
 
 FROM_EDGE = 0.4
-"""Least distance to the edge of the way [m]."""
+"""Minimum distance to the edge of the way [m]."""
 
 
 @inlined
 def side_kept(way: WalkwayRecord) -> float:
-    """Returns the offset to the right of the middle of a way at which pedestrians walk [m]."""
+    """Returns the offset to the right of the centre of a way at which pedestrians walk [m]."""
     return float(min(KEEP_RIGHT, max(way.half_width - FROM_EDGE, 0.0)))
 
 
@@ -39,7 +39,7 @@ def locate(town: TownArrays, walker: PedestrianRecord) -> float:
     """Finds the station, segment and height of a pedestrian on its footway.
 
     Returns:
-        Its offset to the right of the middle, along the way's own direction [m].
+        Its offset to the right of the centre, along the way's own direction [m].
     """
     way, points = town.walks[walker.walk], town.walk_points
     k = min(max(walker.segment, way.first), way.last - 1)
@@ -80,7 +80,7 @@ def find_segment(town: TownArrays, walker: PedestrianRecord) -> None:
 def place_beside(
     town: TownArrays, walker: PedestrianRecord, station: float, aside: float
 ) -> tuple[float, float, float, float]:
-    """Returns a place on a pedestrian's footway, to the right of its middle as it walks [m], and the direction there.
+    """Returns a place on a pedestrian's footway, to the right of its centre as it walks [m], and the direction there.
 
     Beyond its ends the way continues straight.
     """

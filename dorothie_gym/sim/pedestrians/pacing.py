@@ -25,7 +25,7 @@ FROM_ENDS = 4.0
 """Distance from the ends of a lane at which pedestrians turn back [m]."""
 
 FROM_JUNCTION = 12.0
-"""Least distance from the ends of a lane at which pedestrians stray, so that they stay out of junctions [m]."""
+"""Minimum distance from the ends of a lane at which pedestrians stray, so that they stay out of junctions [m]."""
 
 WALK_STEP = 2.0
 """Step in which a walkway is looked for [m]."""
@@ -37,13 +37,13 @@ CROSSING_RATE = 1 / 45
 """Rate at which a pedestrian begins to stray [1/s]."""
 
 PERSONAL_SPACE = 0.7
-"""Least distance of a step to a vehicle [m]."""
+"""Minimum distance of a step to a vehicle [m]."""
 
 OBSTACLE_PATIENCE = 2.0
 """Time for which a pedestrian stands before an obstacle that does not move before it turns back [s]."""
 
 ELBOW_ROOM = 0.3
-"""Least distance of a step to a prop [m]."""
+"""Minimum distance of a step to a prop [m]."""
 
 SAFE_TIME = 5.0
 """Time gap to vehicles before stepping out [s]."""
@@ -67,7 +67,7 @@ PASSING_OFFSET = 0.05
 """Offset of another pedestrian to the right from which on it is passed on the left [m]."""
 
 SPACE = 0.55
-"""Least distance between pedestrians, from middle to middle [m]."""
+"""Minimum distance between pedestrians, from centre to centre [m]."""
 
 WALKER_RADIUS, WALKER_SIZE = 0.354, 0.5
 """Half the diagonal and the side of a pedestrian's outline [m], `Pedestrian.LENGTH`."""
@@ -107,7 +107,7 @@ def walk_towards(
         y: place [m].
         cos: direction of its way.
         sin: see there.
-        lateral: offset to the right of the middle of that way [m].
+        lateral: offset to the right of the centre of that way [m].
         half: half the width of that way [m].
         time: until the next decision [s].
 
@@ -144,7 +144,7 @@ def _past_others(
     """Returns the direction that leads past others in the way, on the side with more room.
 
     Oncoming pedestrians, which keep to their right, are passed on the right, slower ones on the left. The arguments are
-    as of `walk_towards`; the first direction is the one to the place.
+    as in `walk_towards`; the first direction is the one to the place.
     """
     walker = world.pedestrians[p]
     x, y = cos, sin

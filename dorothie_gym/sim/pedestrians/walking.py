@@ -185,7 +185,7 @@ EXPECTED_BRAKING = 3.0
 """Deceleration of vehicles that pedestrians count on [m/s^2]."""
 
 ROOM = 4.0
-"""Distance from the front to the crosswalk's middle line at which vehicles are expected to stop [m]."""
+"""Distance from the front to the crosswalk's centre line at which vehicles are expected to stop [m]."""
 
 VEHICLES_SIGHT = 60.0
 """Distance up to which pedestrians look for vehicles [m]."""
@@ -206,7 +206,7 @@ FROM_KERB = 0.9
 """Distance of those places from the kerb [m]."""
 
 FROM_PAINT = 2.0
-"""Largest distance of those places beside the middle of the paint [m]."""
+"""Largest distance of those places beside the centre of the paint [m]."""
 
 READY = 1.0
 """Distance to its place from which a waiting pedestrian steps onto the crosswalk [m]."""

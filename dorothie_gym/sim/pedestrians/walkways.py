@@ -36,7 +36,7 @@ BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
 """Offsets from the straight line at which such ways are tried [m]: round the outside of a bend they lead in a bow."""
 
 LANE_CLEARANCE = 0.8
-"""Least distance of their middles from the lanes' edges [m]."""
+"""Minimum distance of their centres from the lanes' edges [m]."""
 
 STREET_HALF_WIDTH = 0.8
 """Half the width of a way beside a street without a pavement [m]: half of `pacing.KERB`."""
@@ -213,7 +213,7 @@ def _crossings(
 
 
 def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
-    """Returns the two ends of a crosswalk (2, 2) [m], which crosses the lane closest to its middle."""
+    """Returns the two ends of a crosswalk (2, 2) [m], which crosses the lane closest to its centre."""
     middle = crosswalk.outline.mean(axis=0)[:2]
     lane = network.get_lane(network.get_closest_lane_index(middle)).town_lane
     heading = lane.heading_at(lane.project(middle)[0])
@@ -224,7 +224,7 @@ def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
 
 
 def _as_far_as(ends: Array, places: Array) -> Array:
-    """Extends the middle line of a crosswalk (2, 2) to places on the two pavements (2, 3) [m].
+    """Extends the centre line of a crosswalk (2, 2) to places on the two pavements (2, 3) [m].
 
     Pedestrians walk from pavement to pavement, not from kerb to kerb, on the paint also where a pavement ends before
     it.
@@ -261,7 +261,7 @@ def _at(walk: Sidewalk, station: float) -> Array:
 def _passages(
     town: Town, lanes: RecordArray[LaneRecord], crossings: RecordArray[CrossingRecord]
 ) -> RecordArray[PassageRecord]:
-    """Returns the passages of lanes over crosswalks, within half a crosswalk's depth of its middle line."""
+    """Returns the passages of lanes over crosswalks, within half a crosswalk's depth of its centre line."""
     found: list[tuple[float, float, float, int]] = []
     reach = crossings["length"] / 2 + CROSSWALK_DEPTH
     middles = np.column_stack((crossings["x"].mean(axis=1), crossings["y"].mean(axis=1)))

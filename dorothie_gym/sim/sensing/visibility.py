@@ -156,8 +156,8 @@ class Visibility:
         fog: extinction by fog [1/m].
         fog_start: where the fog begins [m].
         rain: extinction by rain [1/m].
-        light: illuminance of the scene, without head lights [lx].
-        lamps: luminous intensity of the head lights [cd], 0 if they are off.
+        light: illuminance of the scene, without headlights [lx].
+        lamps: luminous intensity of the headlights [cd], 0 if they are off.
         clarity: share of the signal that the view itself leaves, in [0, 1].
     """
 

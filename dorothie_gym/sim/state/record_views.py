@@ -171,7 +171,7 @@ class BodyView(CachedViews, Generic[Record_co]):
 
     @property
     def position(self) -> Array:
-        """Place of the middle (2,) [m]; as in highway-env an array that changes when the body moves."""
+        """Place of the centre (2,) [m]; as in highway-env an array that changes when the body moves."""
         self.memory()
         return self._position
 

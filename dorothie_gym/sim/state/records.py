@@ -53,7 +53,7 @@ class EgoRecord:
     wind: Float  # strength in [0, 1]
     wind_heading: Float  # direction to which it blows [rad]
     wind_phase: Annotated[NDArray[np.float64], "f8", (3,)]  # phases of its gusts [rad]
-    roadblock: Float  # distance from its middle to a prop on the path [m], or infinite
+    roadblock: Float  # distance from its centre to a prop on the path [m], or infinite
     sweeping: Flag  # whether it is in a U-turn, and the points of it that are left
     sweep_first: Int32
     sweep_last: Int32
@@ -93,7 +93,7 @@ class PlanRecord:
     connector: Int32  # connector and lane of the planned turn
     exit: Int32
     held: Flag  # whether the ego stands by the action Stop
-    lights: Flag  # whether the head lights are on
+    lights: Flag  # whether the headlights are on
     cruise: Float  # desired speed [km/h]
     manual: Flag  # whether an outside driver gives throttle, steer and brake
     throttle: Float
@@ -248,7 +248,7 @@ class BreachRecord:
     """A breach of a rule by the ego, other than collisions."""
 
     frame: Int64
-    x: Float  # of the car's middle [m]
+    x: Float  # of the car's centre [m]
     y: Float
     height: Float
     station: Float  # along the lane [m]
@@ -298,14 +298,14 @@ class SizedBody(PlacedBody, Protocol):
 class VehicleRecord:
     """A car or cyclist; a free row has the kind `Kind.EMPTY`."""
 
-    x: Float  # position of its middle [m]
+    x: Float  # position of its centre [m]
     y: Float
     heading: Float  # [rad]
     cos: Float
     sin: Float
     speed: Float  # [m/s]
     height: Float  # of the road under it [m]
-    acceleration: Float  # present action: [m/s^2], and sine of the slip angle
+    acceleration: Float  # current action: [m/s^2], and sine of the slip angle
     slip: Float
     desired: Float  # desired speed [m/s]
     length: Float  # [m]
@@ -359,7 +359,7 @@ class PedestrianRecord:
     station: Float  # along the footway or crosswalk [m]
     direction: Float  # 1 or -1
     pace: Float  # desired speed [m/s]
-    aside: Float  # offset to the right of the middle of the way [m]
+    aside: Float  # offset to the right of the centre of the way [m]
     waited: Float
     odometer: Float
     far: Float  # while straying: distance to the other side of the road [m]
@@ -423,7 +423,7 @@ class ClockRecord:
 
 
 class LampRecord:
-    """Present phase of a light programme, which holds until a time [s]."""
+    """Current phase of a light programme, which holds until a time [s]."""
 
     until: Float
     phase: Int32

@@ -36,7 +36,7 @@ from dorothie_gym.support.compilation.records import RecordArray, by_reference, 
 from dorothie_gym.support.copying import shared
 
 PASSING_WIDTH = 2.5
-"""Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""
+"""Two vehicles whose centres are this far apart across their lanes pass one another [m]: they are 2 m wide."""
 
 CAR_REAR = CAR_LENGTH / 2
 """Distance from the centre of a car to its rear [m]."""
@@ -45,7 +45,7 @@ LEVEL_TOWN = 2.0
 """In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
 
 OFF_ROAD_MARGIN = 0.5
-"""Distance of the car's middle outside of all lanes, connectors included, from which on it is off the road [m]."""
+"""Distance of the car's centre outside of all lanes, connectors included, from which on it is off the road [m]."""
 
 WIDE_LANE = 2.0 * (CELL_REACH - 2.0 * OFF_ROAD_MARGIN - SLACK)
 """Width up to which cells list all lanes that a place is within `OFF_ROAD_MARGIN` of [m]."""
@@ -82,7 +82,7 @@ class TownArrays(NamedTuple):
         mouths: mouths of crosswalks, those of a pavement in the order of their stations.
         crossings: crosswalks.
         passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
-        junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
+        junctions: (j, 3) centre [m] of each junction's connectors, and the radius in which they lie [m].
         lines: ends of lanes with a light or stop sign, in the order of the lanes.
         ways: ways on from each lane, by the lanes' ids.
         exits: exits from the ends of lanes.

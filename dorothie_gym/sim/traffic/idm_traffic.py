@@ -46,7 +46,7 @@ NO_ROOM_PATIENCE = 5.0
 """Wait for room behind a junction after which a vehicle draws another route [s]."""
 
 SLOWEST_BEND = 0.5
-"""Least speed in a bend [m/s]."""
+"""Minimum speed in a bend [m/s]."""
 
 CURVES_SIGHT = 40.0
 """Distance up to which bends limit the speed [m]: braking from 14 m/s to 5 m/s takes 43 m."""
@@ -55,10 +55,10 @@ CROSSWALK_GAP = 1.0
 """Room that is left before a crosswalk [m]."""
 
 STEP_AHEAD = 5.0
-"""Distance of a coming pedestrian to the middle of a lane within which vehicles stop before the crosswalk [m]."""
+"""Distance of a coming pedestrian to the centre of a lane within which vehicles stop before the crosswalk [m]."""
 
 STEP_PAST = 2.5
-"""Distance of a pedestrian past the middle of a lane within which vehicles still stop [m]."""
+"""Distance of a pedestrian past the centre of a lane within which vehicles still stop [m]."""
 
 
 @inlined
@@ -84,7 +84,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
     vehicle = world.vehicles[i]
     target, stop = vehicle.desired, math.inf
     front, gap = NOBODY, math.inf
-    begin = -vehicle.station  # of a lane, from the vehicle's middle
+    begin = -vehicle.station  # of a lane, from the vehicle's centre
     junction, line = NOBODY, 0.0
     for k in range(int(vehicle.planned)):
         if begin > HORIZON or (front >= 0 and junction >= 0 and begin > CURVES_SIGHT):
@@ -196,7 +196,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
         k: index of the lane in its plan that enters the junction, -1 for none.
         line: from its front to the start of that lane [m].
         front: node of the body in front, or -1.
-        gap: to its middle [m].
+        gap: to its centre [m].
     """
     vehicle = world.vehicles[i]
     stopping = vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING

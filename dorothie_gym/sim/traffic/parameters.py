@@ -21,7 +21,7 @@ CLOSING = 2.0 * math.sqrt(-IDMVehicle.COMFORT_ACC_MAX * IDMVehicle.COMFORT_ACC_M
 """Twice the root of the product of desired acceleration and deceleration [m/s^2]."""
 
 STANDING_GAP = float(IDMVehicle.DISTANCE_WANTED - IDMVehicle.LENGTH)
-"""Room between two vehicles that stand [m]; highway-env counts it from middle to middle of vehicles of 5 m."""
+"""Room between two vehicles that stand [m]; highway-env counts it from centre to centre of vehicles of 5 m."""
 
 TIME_WANTED = float(IDMVehicle.TIME_WANTED)
 """Desired time gap [s]."""
@@ -132,22 +132,22 @@ GOES_HOME = 45.0
 """Time without progress after which a pedestrian is respawned [s]; longer than the wait at a crosswalk."""
 
 CLEAR_OF_CAR = 25.0
-"""Least distance to the ego at which vehicles are added to a town [m]."""
+"""Minimum distance to the ego at which vehicles are added to a town [m]."""
 
 CLEAR_OF_WALKER = 8.0
-"""Least distance to the ego at which pedestrians are added [m]; to one another it is `CLEAR_OF_PEOPLE`."""
+"""Minimum distance to the ego at which pedestrians are added [m]; `CLEAR_OF_PEOPLE` is that between pedestrians."""
 
 CLEAR_OF_PEOPLE = 1.5
-"""Least distance between pedestrians that are added [m]."""
+"""Minimum distance between pedestrians that are added [m]."""
 
 OUT_OF_SIGHT = 60.0
-"""Least distance to the ego at which bodies respawn [m]."""
+"""Minimum distance to the ego at which bodies respawn [m]."""
 
 CLEAR_OF_OTHERS, CLEAR_BESIDE = 14.0, 2.5
-"""Least distance ahead and behind to others, no farther aside than `CLEAR_BESIDE`, for new vehicles [m]."""
+"""Minimum distance ahead and behind to others, no farther aside than `CLEAR_BESIDE`, for new vehicles [m]."""
 
 CLEAR_OF_BODIES = 6.0
-"""Least distance to the middle of others at which vehicles appear, half of it aside [m]."""
+"""Minimum distance to the centre of others at which vehicles appear, half of it aside [m]."""
 
 
 # --- Junctions --------------------------------------------------------------------------------------------------------
@@ -156,7 +156,7 @@ HARDEST_BRAKING = 6.0
 """Deceleration beyond which a vehicle no longer stops before a red light [m/s^2]."""
 
 CRITICAL_GAP = 4.5
-"""Least time gap to vehicles with priority [s] (Highway Capacity Manual 2010, permitted left turns)."""
+"""Minimum time gap to vehicles with priority [s] (Highway Capacity Manual 2010, permitted left turns)."""
 
 GIVING_WAY_PATIENCE = 30.0
 """Longest time an actor yields before it competes by arrival order [s]."""

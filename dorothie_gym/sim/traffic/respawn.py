@@ -48,7 +48,7 @@ LOOK_EVERY = 6
 """Substeps between two checks whether a standing vehicle waits for its light."""
 
 FACING_DISTANCE = 6.0
-"""Distance from a vehicle's outline to the middle of the ego within which it stands before the ego [m]."""
+"""Distance from a vehicle's outline to the centre of the ego within which it stands before the ego [m]."""
 
 
 @inlined

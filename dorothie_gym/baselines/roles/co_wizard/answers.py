@@ -69,7 +69,7 @@ def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizard
 
 
 def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None:
-    """Returns the proposition of a yes/no question; a check that names no more is about the present goal."""
+    """Returns the proposition of a yes/no question; a check that names no more is about the current goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
     if utterance.places:

@@ -114,7 +114,7 @@ class WorkingMemory:
         town: the map.
         values: value of each variable.
         changed_at: time at which each variable was last changed or set again [s].
-        goal: name of the goal; None for none.
+        goal: name of the goal; None if there is none.
         goal_mark: its row among the landmarks; -1 if it is not on the map.
         goal_at: time of its last change [s].
         former: the goal before.
@@ -126,10 +126,10 @@ class WorkingMemory:
         statuses: status of errands by place.
         updates: belief updates to be sent, the next first.
         plan: junctions of the route as sent last.
-        standstill: present or last standstill, and the reason for it.
+        standstill: current or last standstill, and the reason for it.
         told_to_stop_at: time at which it halted because of an utterance [s].
         told_to_turn_round_at: last time at which an utterance told it to turn round [s].
-        physical: its last physical action; None for none.
+        physical: its last physical action; None if there is none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
         said_at: time of its last remark by predicate or, without content, by move [s].

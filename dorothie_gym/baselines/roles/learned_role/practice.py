@@ -34,7 +34,7 @@ class Turns(Protocol):
 
     @property
     def is_stuck(self) -> bool:
-        """Whether the present turn ends early."""
+        """Whether the current turn ends early."""
         ...
 
     def begin_turn(self, rng: np.random.Generator) -> int:

@@ -94,7 +94,7 @@ def _nearest(value: object, available: Sources) -> str:
 
 
 def filled(form: str, available: Sources, *, joined: bool = False) -> Remark | None:
-    """Returns the remark of a form with the present names and numbers; None if a source is missing."""
+    """Returns the remark of a form with the current names and numbers; None if a source is missing."""
     page = json.loads(form)
     try:
         if "whole" in page:

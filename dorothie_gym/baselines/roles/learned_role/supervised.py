@@ -88,7 +88,7 @@ def entropy(logits: Tensor, target: Tensor) -> Tensor:
 
 
 def changed_weights(before: Tensor, after: Tensor) -> Tensor:
-    """Returns the weights of the predictions of a value (b,): higher where it changes, which is seldom."""
+    """Returns the weights of the predictions of a value (b,): higher where it changes, which is rarely."""
     return 1.0 + (CHANGED_WEIGHT - 1.0) * (before != after)
 
 

@@ -26,7 +26,7 @@ from dorothie_gym.baselines.roles.participant.remarks import STOP_FORM, form_of,
 from dorothie_gym.policies.speech import Remark
 
 MOST_REMARKS: Final = 4
-"""Largest number of remarks of one decision."""
+"""Maximum number of remarks of one decision."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -184,7 +184,7 @@ def _reworded(wording: Wording, content: Proposition | None) -> Wording:
 
 
 def filled(form: str, available: Mapping[str, object], *, joined: bool = False) -> Remark | None:
-    """Returns the remark of a form with the present names, numbers and texts; None if a source is missing."""
+    """Returns the remark of a form with the current names, numbers and texts; None if a source is missing."""
     found = remark_forms.filled(form, available, joined=joined)
     if found is None:
         return None

@@ -26,7 +26,7 @@ class Lesson:
     """Decision of the teacher.
 
     Attributes:
-        target: number of the subgoal that is its target; None for none.
+        target: number of the subgoal that is its target; None if there is none.
         guiding: whether it guides the car.
         remarks: remarks that it chooses now, in one breath or the next.
         action: its action.

@@ -117,7 +117,7 @@ class SessionWorld:
         return False
 
     def lights_on(self, time: float) -> bool:
-        """Returns whether the head lights are on at a time [s]; they are off at first."""
+        """Returns whether the headlights are on at a time [s]; they are off at first."""
         switched = [
             action.up
             for action in self.session.physical_actions
@@ -136,7 +136,7 @@ class SessionWorld:
         return float(table.rows[int(table.offsets[place])][parameter.value])
 
     def sight(self, time: float, *, faulty: bool = True) -> float:
-        """Returns the range of sight at a time [s], by weather, light, head lights and the camera [m].
+        """Returns the range of sight at a time [s], by weather, light, headlights and the camera [m].
 
         Args:
             time: time [s].
@@ -179,7 +179,7 @@ class SessionWorld:
         Args:
             time: [s].
             kinds: kinds of the actors.
-            distance: largest distance from the middle of the car [m].
+            distance: largest distance from the centre of the car [m].
             angle: largest angle to its heading [degrees].
         """
         offsets, heading = self._offsets(time, kinds), float(self.row(time)["heading"])

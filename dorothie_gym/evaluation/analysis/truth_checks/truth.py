@@ -36,13 +36,13 @@ _POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
 _SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
 _NEAR: Final = 130.0  # largest distance of two places near each other [m]
 _BESIDE: Final = 40.0  # largest distance of a light or sign from a place near it [m]
-_CORNER: Final = 80.0  # largest distance of a place near a corner from the middle of the junction [m]
+_CORNER: Final = 80.0  # largest distance of a place near a corner from the centre of the junction [m]
 _SHORT_WAY, _WAY_ERROR = 40.0, 0.25  # errors of a way that agrees [m], as a share of the way
 _NOW: Final = 4.0  # time within which "now" may lie [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
-_CROWD: Final = 3  # least number in a crowd
-_IN_FRONT: Final = 15.0  # largest distance from the middle of the car to what it stands behind [m]
+_CROWD: Final = 3  # minimum number in a crowd
+_IN_FRONT: Final = 15.0  # largest distance from the centre of the car to what it stands behind [m]
 _AHEAD: Final = 25.0  # and its largest angle to the heading [degrees]
 _TOLD: Final = 60.0  # longest time between an order and what it explains [s]
 
@@ -209,7 +209,7 @@ def _arrived(world: SessionWorld, said: Proposition, time: float, speaker: Role)
 
 
 def _lights_on(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether the head lights are on; None if they have been switched since the question."""
+    """Whether the headlights are on; None if they have been switched since the question."""
     now, before = world.lights_on(time), world.lights_on(time - _NOW)
     return now if now is before else None
 

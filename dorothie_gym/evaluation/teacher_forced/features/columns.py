@@ -114,7 +114,7 @@ class ActionRows:
         up: 1 faster or on, -1 slower or off, 0 for other actions.
         label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
         flagged: whether it is a point of NfD.
-        handling: as of `MoveRows`, by the rule of `handling_of_events`.
+        handling: as in `MoveRows`, by the rule of `handling_of_events`.
     """
 
     session: Ints

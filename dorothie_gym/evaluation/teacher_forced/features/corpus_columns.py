@@ -284,7 +284,7 @@ EMPTY: Final = 128
 """Size of an empty `.npy` file, which is its header [bytes]."""
 
 MOST_ENTRIES: Final = 12
-"""Largest number of entries; the least recently used are removed. An entry of 183 sessions has about 40 MB."""
+"""Maximum number of entries; the least recently used are removed. An entry of 183 sessions has about 40 MB."""
 
 
 def features_folder() -> Path | None:

@@ -141,7 +141,7 @@ def utterance_columns(
 
 
 def action_columns(actions: Sequence[ActionRecord], handled: Mapping[int, int]) -> dict[str, NDArray[np.generic]]:
-    """Returns the columns of physical actions; `handled` is as of `utterance_columns`."""
+    """Returns the columns of physical actions; `handled` is as in `utterance_columns`."""
     return {
         "actions.tenth": _ints([act.frame // FRAMES_PER_TENTH for act in actions]),
         "actions.event": _ints([act.index for act in actions]),

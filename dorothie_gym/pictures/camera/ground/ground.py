@@ -14,7 +14,7 @@ from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET, GroundArray
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
 
 _FEW = 1 << 16
-"""Largest number of pairs of a place and a triangle that are compared without a search tree."""
+"""Maximum number of pairs of a place and a triangle that are compared without a search tree."""
 
 _EDGE = 1e-9
 """Share of a triangle by which a place may lie outside: rounded, one on a common edge would lie in neither."""

@@ -203,7 +203,7 @@ def _longer(town: Town, part: LevelStretch, more: float) -> LevelStretch:
 
 
 def _add_pillars(builder: MeshBuilder, sheet: Sheet, field: HeightField, town: Town, ground: GroundArrays) -> None:
-    """Adds pillars below the middles of lanes, except on roads."""
+    """Adds pillars below the centres of lanes, except on roads."""
     stood: list[Array] = []
     reach = _PILLAR_WIDTH * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     for part in sheet.stretches:

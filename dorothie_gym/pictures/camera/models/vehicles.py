@@ -40,7 +40,7 @@ class Lamps(enum.IntFlag):
     OFF = 0
     BRAKES = 1
     LIGHTS = 2
-    """Head lights and tail lights."""
+    """Headlights and tail lights."""
 
 
 PAINTS: tuple[Rgb, ...] = (

@@ -23,7 +23,7 @@ BESIDE = 1.8
 """Ground beside a lane that stays free [m]."""
 
 FOOTWAY = 1.0
-"""Ground on both sides of the middle of a footway that stays free [m]."""
+"""Ground on both sides of the centre of a footway that stays free [m]."""
 
 _TREES = (palette.TREE, palette.COUNTRY_TREE)
 _OPEN = (palette.COUNTRY, palette.BLOCK, palette.PARK, palette.BRIDGE_SHADOW, *_TREES)

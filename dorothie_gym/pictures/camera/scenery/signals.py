@@ -22,9 +22,9 @@ from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 
-_HEAD = 3.4  # [m] height of the middle of a traffic light
+_HEAD = 3.4  # [m] height of the centre of a traffic light
 _LENS, _BETWEEN = 0.2, 0.46  # [m] radius of a lens, distance of two
-_SIGN = 2.4  # [m] height of the middle of a sign
+_SIGN = 2.4  # [m] height of the centre of a sign
 _METAL, _BACK = (100, 104, 104), (150, 152, 154)
 _BLADE = 2.2, 0.55  # [m] width and height of a street name
 _BLADE_HEIGHT = 4.3  # [m] of the lower blade: above the lights at the same corner
