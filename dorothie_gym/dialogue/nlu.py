@@ -90,7 +90,7 @@ _AFTER_ADDRESSEE = frozenset(
         "make", "pull",
     }
 )  # fmt: skip
-"""Words behind a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""
+"""Words after a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""
 _DENIAL = re.compile(
     r"(don't|do not|dont|never|not|instead of|rather than|without)"
     r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
@@ -236,7 +236,7 @@ def _stated(text: str) -> str:
 
 
 def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative at the end ("stop here, man"), at the beginning or behind a greeting."""
+    """Returns the words without a vocative at the end ("stop here, man"), at the beginning or after a greeting."""
     while words and words[-1] == ",":
         words.pop()
     words = _without_addressee(words, lists)

@@ -40,7 +40,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     With `observation="camera"`, `Box(0, 255, (84, 84, 3), uint8)`: the picture of the car's camera, above a dashboard
     in the lowest rows. From the left: icon of the instruction (an arrow into the sector of a turn, lane switch, U-turn,
     stop, start), or needle to the goal that was named; icon of the manoeuvre that the car prepares, in green; distance
-    to the instruction's place on gauges of 112 m and 28 m (red behind it), or to the goal on one of 560 m; speed
+    to the instruction's place on gauges of 112 m and 28 m (red once past it), or to the goal on one of 560 m; speed
     (white) and cruise speed (blue) on gauges of 28 m/s, with red marks at the limit; lamps for a hazard ahead and the
     headlights.
 

@@ -177,7 +177,7 @@ class Exit:
 
     Attributes:
         connector: lane that is entered first: a connector of a junction, or the next lane of the road.
-        lane: lane behind the junction.
+        lane: lane beyond the junction.
         type: turn type.
         angle: change of direction to the exit in whole degrees, at least -180 and below 180, positive left. All exits
             of a lane have different angles: equal ones are moved apart by one degree, from right to left.

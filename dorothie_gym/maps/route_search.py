@@ -92,7 +92,7 @@ def _add_manoeuvres(
                 number += 1
     if station <= nearest:
         number = add_u_turn(graph, lane, station, station, extra, number)
-    # also from the centre of the cell: just behind a junction there may be no oncoming lane
+    # also from the centre of the cell: just beyond a junction there may be no oncoming lane
     middle = (cell_at(graph, lane, station) - row.first + 0.5) * row.cell_size
     if station < middle <= nearest:
         number = add_u_turn(graph, lane, station, middle, extra, number)

@@ -369,7 +369,7 @@ STANDS_BEFORE = 17.0
 """Distance of a car that stops for a prop to the prop, between their centres [m]."""
 
 TURNS_BEHIND = 16.0
-"""Minimum distance behind a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
+"""Minimum distance beyond a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
 ahead first, and half the length of a prop [m]."""
 
 ONE_ROADBLOCK = 3.0
@@ -380,7 +380,7 @@ APART = 22.0
 
 
 def closed_by(place: Place) -> list[Place]:
-    """Places that no car can use because of a prop: right before it, under it, and where none lands behind it."""
+    """Returns places that no car can use because of a prop: right before it, under it, and where no U-turn ends beyond it."""
     lane, station = place
     return [(lane, station + float(on)) for on in np.arange(-STANDS_BEFORE, TURNS_BEHIND, CELL / 2)]
 

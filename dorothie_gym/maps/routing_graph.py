@@ -83,7 +83,7 @@ U_TURN_LENGTH = 20.0
 """Length of a U-turn between junctions [m]."""
 
 U_TURN_REST = 6.0
-"""Distance between a U-turn and the earliest stop behind it [m]."""
+"""Distance between a U-turn and the earliest stop after it [m]."""
 
 SLIGHTLY_BEHIND = 1.0
 """Distance by which a goal may lie behind the start without a detour [m]."""
@@ -311,7 +311,7 @@ def _position(graph: RoutingGraph, lane: int, station: float) -> tuple[float, fl
     begin = points[low, 2] + offset
     if begin == at or high == len(points):
         return points[low, 0], points[low, 1]
-    # rounded, a station may lie behind the end of the lane: in the gap before the next one
+    # after rounding, a station may lie beyond the end of the lane, in the gap before the next one
     end = points[high, 2] + (offset if high < graph.offsets[lane + 1] else graph.lanes[lane + 1].offset)
     width, ahead = end - begin, at - begin
     x = (points[high, 0] - points[low, 0]) / width * ahead + points[low, 0]
@@ -411,7 +411,7 @@ def _add_change(
 def add_u_turn(
     graph: RoutingGraph, lane: int, begin: float, leave: float, edges: RecordArray[RoutingEdge], count: int
 ) -> int:
-    """Adds a U-turn at a station `leave`, if there is an oncoming lane with sufficient length behind it.
+    """Adds a U-turn at a station `leave`, if there is an oncoming lane with sufficient length beyond it.
 
     Args:
         graph: the routing graph.

@@ -50,7 +50,7 @@ class _Movement:
         source: id of the incoming lane.
         speed: speed limit of the incoming lane [m/s].
         connector: lane across the junction.
-        targets: ids of the lanes behind it.
+        targets: ids of the lanes beyond it.
         left: whether it turns left.
     """
 

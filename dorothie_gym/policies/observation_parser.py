@@ -270,13 +270,13 @@ class LaneLength(Protocol):
 
 
 def place_ahead(lanes: Rows[LaneLength], path: Rows[int], lane: int, ahead: float) -> tuple[int, float]:
-    """Returns lane and station of a place on a path; lane -1 beyond its end, and if the path does not begin here.
+    """Returns lane and station of a place on a path; the lane is -1 beyond its end, or if the path starts elsewhere.
 
     Args:
         lanes: lanes of the town.
-        path: 1 + number of each lane of the path, 0 behind its end.
+        path: 1 + index of each lane of the path, padded with 0.
         lane: lane of the car.
-        ahead: distance from the beginning of that lane [m].
+        ahead: distance from the start of that lane [m].
     """
     for k in range(len(path)):
         number = path[k] - 1

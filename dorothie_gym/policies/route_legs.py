@@ -27,7 +27,7 @@ RIGHT_BEHIND = 70.0
 """Distance from a junction to a goal within which there may be no room to change lanes [m]."""
 
 MANOEUVRE_OVERDUE_DISTANCE = 18.0
-"""Distance behind its planned place from which on a lane change or U-turn is given up [m]."""
+"""Distance past its planned place from which on a lane change or U-turn is given up [m]."""
 
 
 @compiled
@@ -58,7 +58,7 @@ def _is_overdue(tables: RouteTables, legs: RecordArray[LegRecord], count: int, l
 
 @compiled
 def distance_left(legs: RecordArray[LegRecord], count: int, leg: int, station: float) -> float:
-    """Returns the distance to the goal along the route [m]; negative just behind the goal."""
+    """Returns the distance to the goal along the route [m]; negative just past the goal."""
     if leg + 1 == count:
         return float(legs[leg].end - station)
     rest = 0.0
@@ -119,7 +119,7 @@ def needs_switch(
     """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
     Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its own
-    lane and end up next to a goal right behind the junction.
+    lane and end up next to a goal right after the junction.
 
     Args:
         tables: lanes and exits.

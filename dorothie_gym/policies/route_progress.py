@@ -254,7 +254,7 @@ class RouteProgress:
         return self.astray >= ASTRAY or self.left(station) < -PASSED
 
     def left(self, station: float) -> float:
-        """Returns the distance to the goal along the route [m]; negative just behind the goal."""
+        """Returns the distance to the goal along the route [m]; negative just past the goal."""
         return distance_left(*self._legs, station) if self.legs else math.inf
 
     @property
@@ -319,7 +319,7 @@ class RouteProgress:
         """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
         Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its
-        own lane and end up next to a goal right behind the junction.
+        own lane and end up next to a goal right after the junction.
         """
         tables = route_tables(town)
         wanted = int(tables.rows[crossing.lane]) + town.exits(crossing.lane).index(crossing.exit)
@@ -350,7 +350,7 @@ class RouteState:
 
     Attributes:
         progress: route to the goal and the progress on it; None without a place to go to.
-        blocked: places behind roadblocks.
+        blocked: places beyond roadblocks.
         avoided: places excluded because the car missed the goal after passing them, the latest last.
         misses: number of times that the car has driven past the goal.
     """
@@ -403,7 +403,7 @@ class RouteState:
         return any(lane == place[0] and abs(station - place[1]) < SAME_ROADBLOCK for lane, station in self.blocked)
 
     def with_roadblock(self, town: Town, place: Place) -> RouteState:
-        """Adds a roadblock: its cell and the one behind it, because the car's own cell counts as free."""
+        """Adds a roadblock: its cell and the next one, because the car's own cell counts as free."""
         behind = place[0], min(place[1] + CELL_BEHIND, town.lanes[place[0]].length)
         return replace(self, blocked=(*self.blocked, place, behind))
 

@@ -189,7 +189,7 @@ class SpeechState:
         return replace(self, queue=(*remarks, *self.queue))
 
     def with_second(self, item: Remark) -> SpeechState:
-        """Inserts a remark behind the first one."""
+        """Inserts a remark after the first one."""
         return replace(self, queue=(self.queue[0], item, *self.queue[1:]))
 
     def led_by(self, item: Remark) -> SpeechState:

@@ -191,7 +191,7 @@ def _mask_shape(space: AnySpace) -> Shape | None:
 @by_reference
 @shared
 class TurnOptions(NamedTuple):
-    """Exits behind each lane of a town.
+    """Exits after each lane of a town.
 
     Attributes:
         first: (lanes + 1,) int32 first row of each lane's exits, and the one after the last.

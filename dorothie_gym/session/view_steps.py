@@ -85,7 +85,7 @@ def observe_share(
         turns: numbers of the sessions, see `threads.take`; shared by all threads that work on them.
         home: number of the block that is this thread's own.
         town: arrays of the town.
-        options: exits behind its lanes.
+        options: exits after its lanes.
         worlds: arrays of the worlds of all sessions.
         participants: observations, written.
         co_wizards: observations, written.
@@ -111,7 +111,7 @@ def observe_share(
 
 @compiled
 def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
-    """Writes the bodies that the ego perceives as rows of `ObjectColumn`, zeros behind them.
+    """Writes the bodies that the ego perceives as rows of `ObjectColumn`, zeros after them.
 
     Args:
         world: arrays of the world.
@@ -209,7 +209,7 @@ def observe_as_co_wizard(
 
     Args:
         town: arrays of the town.
-        options: exits behind its lanes.
+        options: exits after its lanes.
         world: arrays of the world.
         views: observations, one row of which is written.
         number: the row.
@@ -275,7 +275,7 @@ def write_masks(
 
     Args:
         town: arrays of the town.
-        options: exits behind its lanes.
+        options: exits after its lanes.
         world: arrays of the world.
         physical: (n,) mask that is written; actions that are always possible are left as they are.
         angle: (360,) mask that is written.

@@ -65,7 +65,7 @@ BOX_DTYPE: Final = np.dtype(
     [(name, np.int32) for name in ("picture", "kind", "left", "top", "right", "bottom", "pixels")]
     + [(name, np.float32) for name in SPACE_COLUMNS]
 )
-"""Number of the picture in its session, `ObjectClass`, limits behind the last pixel, visible pixels, box in space."""
+"""Number of the picture in its session, `ObjectClass`, limits after the last pixel, visible pixels, box in space."""
 
 CAMERA_FAULTS: Final = tuple(sensor for sensor in Sensor if CLARITY[sensor] < 1.0)
 """Faults that show in pictures."""

@@ -55,7 +55,7 @@ END: Final = 2.0
 """Distance to the end of the path within which a new one is planned [m]."""
 
 PREPARED_UNTIL: Final = 5.0
-"""Distance behind its planned place beyond which a manoeuvre is no longer prepared [m]."""
+"""Distance past its planned place beyond which a manoeuvre is no longer prepared [m]."""
 
 _WET = tuple(WeatherParameter).index(WeatherParameter.WETNESS)
 _KINDS = tuple(int(kind.value) for kind in KINDS)

@@ -30,7 +30,7 @@ FASTEST: Final = 28.0
 
 PANEL = (24, 24, 28)
 AHEAD, PASSED = (255, 210, 0), (255, 40, 40)
-"""Colours of a distance that is left, and of one behind the place."""
+"""Colours of a remaining distance, and of a distance past the place."""
 
 PLANNED, GOAL_COLOUR = (60, 220, 60), (255, 80, 255)
 """Colours of the manoeuvre that the car prepares, and of the goal."""
@@ -53,7 +53,7 @@ class Readings:
     Attributes:
         action: action of the last instruction; None before the first, and where a goal was named instead.
         sector: its direction, an index of `SECTORS`; None without one.
-        distance: from the car to its place, negative behind it [m].
+        distance: from the car to its place, negative past it [m].
         planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None if there is none.
         planned_sector: its direction.
         goal: place of the named goal ahead of the car and to its right [m]; None if it is not known.

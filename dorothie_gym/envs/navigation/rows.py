@@ -313,7 +313,7 @@ class DrivingRows(CachedViews):
         return (int(state["goal_lane"]), float(state["goal_station"])) if state["goal_lane"] >= 0 else None
 
     def blocked(self, number: int) -> tuple[Place, ...]:
-        """Returns the places behind the roadblocks that the instructor of an environment has seen."""
+        """Returns the places beyond the roadblocks that the instructor of an environment has seen."""
         guidance = row_of(self._guidances, number)
         closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
         return tuple((lane, station) for station, lane in closed.tolist())

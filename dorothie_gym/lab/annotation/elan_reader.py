@@ -227,7 +227,7 @@ class _Reader:
         return number
 
     def _unit(self, value: str, names: tuple[str, ...]) -> tuple[int | None, dict[str, str]]:
-        """Returns the number of a unit, and the marks behind it."""
+        """Returns the number of a unit, and the marks after it."""
         if not value:
             return None, {}
         number, *rest = (part.strip() for part in value.split(";"))

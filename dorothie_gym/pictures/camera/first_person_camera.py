@@ -122,7 +122,7 @@ class Boxes:
 
     Attributes:
         keys: (n,) int32 key of each body.
-        limits: (n, 4) int32 left, top, right and bottom, behind the last pixel [pixels].
+        limits: (n, 4) int32 left, top, right and bottom, after the last pixel [pixels].
         pixels: (n,) int32 number of visible pixels.
     """
 

@@ -24,7 +24,7 @@ PLAIN = 0
 """Index of the texture without a pattern."""
 
 PADDING = 8
-"""Columns of `Mesh.components` behind the last triangle, so that vectors of the processor may end there."""
+"""Columns of `Mesh.components` after the last triangle, so that vectors of the processor may end there."""
 
 TOWN = 0
 """Instance of triangles that belong to no body."""

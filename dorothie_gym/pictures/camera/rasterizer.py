@@ -62,7 +62,7 @@ class VisibilityBuffer(NamedTuple):
         kept: (_ROOM,) scratch: their rows.
         parts: (12, _ROOM) float32 scratch: their components, see `Mesh.components`.
         firsts: (h + _ROWS,) scratch: first sample of a triangle in each of its rows.
-        lasts: (h + _ROWS,) scratch: sample behind the last one.
+        lasts: (h + _ROWS,) scratch: sample after the last one.
         corners: (3, 3) scratch: a triangle's corners to the right and up, times the focal length, and forward.
         cut: (4, 2) scratch: the picture coordinates of a triangle clipped by the near plane.
     """
@@ -114,7 +114,7 @@ def collect_triangles(
         buffer: collects the triangles of one mesh.
         mesh: that mesh.
         first: triangle of the range.
-        last: triangle behind the range.
+        last: triangle after the range.
         found: number of the triangles that are collected already.
         shift: number of a triangle minus its row.
 

@@ -57,7 +57,7 @@ class ShadowMaps(NamedTuple):
         town: (n, n) int16 heights [1/50 m], tiles side by side, each at its place modulo their number.
         held: (t, t, 2) int32 place of the tile that is held.
         bodies: (m, m) int16 heights.
-        drawn: (k, 4) int64 parts of the map of bodies that were drawn to: columns and rows, first and behind the last.
+        drawn: (k, 4) int64 parts of the map of bodies that were drawn to: columns and rows, first and after the last.
         parts: (1,) int64 number of those parts.
         slope: (2,) shift towards the sun per metre of height [1].
         window: (4,) int64: first square in x and y of the map of the town, and of that of bodies.

@@ -358,7 +358,7 @@ def _reply(
     """Processes an answer to an open question, or a clarification: an action, a direction or a place."""
     asked_elsewhere = view.choice is not None and state.dialogue.asked_lane not in (-1, view.choice.lane)
     if act.move is DialogueMove.REPLY_W and asked_elsewhere and state.beliefs.exact and words.turns:
-        return  # the junction that was asked about lies behind, and the way is known by now
+        return  # the car has passed the junction in question and now knows the way
     if act.values(Slot.ACTION):
         _instruction(state, view, act, words, rng)
     elif words.turns:

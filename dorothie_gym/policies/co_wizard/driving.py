@@ -167,7 +167,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
         if not progress.turns_round_on(view.lane):
             return None
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
-        # never before the planned place, because the car could otherwise come out behind its goal
+        # never before the planned place, because the manoeuvre could otherwise end past its goal
         return _turn_round(state, view) if distance <= slowing_distance(view.speed) or held_up else None
     if not _needs_switch(state, view, crossing):
         return None

@@ -78,7 +78,7 @@ def _obstacle_on_path(state: CoWizardState, view: CoWizardView) -> SeenObject | 
 
 
 def _is_behind_goal(state: CoWizardState, view: CoWizardView, thing: SeenObject) -> bool:
-    """Returns whether an obstacle lies behind the place where the car will stop."""
+    """Returns whether an obstacle lies beyond the place where the car will stop."""
     progress = state.route.progress
     return progress is not None and state.beliefs.exact and thing.distance > progress.left(view.station)
 

@@ -185,7 +185,7 @@ _FEASIBLE = (
 # --- estimated mask ---------------------------------------------------------------------------------------------------
 
 END_TOLERANCE = 0.5
-"""Distance by which a U-turn may begin behind the end of its lane [m]."""
+"""Distance past the end of its lane at which a U-turn may still begin [m]."""
 
 _OFF_LINE = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN)
 _SIDES = {

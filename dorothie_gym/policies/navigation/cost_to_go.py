@@ -48,7 +48,7 @@ def cost_from(
         passed = ahead < 0.0 and int(station / size) == int(goal_station / size)
     k = min(int(max(station, 0.0) / size), row.cells - 1)
     share = min(max(station, 0.0) / size - k, 1.0)
-    # in the goal's own cell but behind the goal, the cost follows from the end of the cell
+    # in the goal's own cell but past the goal, the cost follows from the end of the cell
     here = math.inf if passed else float(costs[row.first + k])
     if k + 1 < row.cells:
         after = float(costs[row.first + k + 1])

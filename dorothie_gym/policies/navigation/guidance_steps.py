@@ -207,7 +207,7 @@ def _note_roadblocks(graph: RoutingGraph, search: RouteSearch, guide: Instructor
             continue
         one, two = guide.closed[route.closed], guide.closed[route.closed + 1]
         one.lane, one.station = lane, station
-        # its cell and the one behind it, because the car's own cell counts as free
+        # its cell and the next one, because the car's own cell counts as free
         two.lane, two.station = lane, min(station + CELL_BEHIND, graph.lanes[lane].length)
         route.closed += 2
         _find_route(graph, search, guide, route.landmark)
@@ -322,7 +322,7 @@ def _manoeuvre_step(guide: InstructorArrays, entry: int, distance: float) -> Ste
 
 @compiled
 def _stop_after_manoeuvre(guide: InstructorArrays) -> Step:
-    """Returns a stop for a goal right behind the manoeuvre under way, while there is time to stop."""
+    """Returns a stop for a goal right after the manoeuvre in progress, while there is time to stop."""
     view, mark = guide.now[0], guide.marks[guide.route[0].landmark]
     left = mark.station - view.station  # a car in a manoeuvre is reported at the manoeuvre's end
     if mark.lane == view.lane and -_ARRIVED_WITHIN <= left <= _STOP_DISTANCE:

@@ -413,7 +413,7 @@ class NavigationEncoder:
         Args:
             seen: observation of the Co-Wizard.
             heard: last instruction.
-            blocked: places behind the roadblocks known.
+            blocked: places beyond the roadblocks known.
 
         Returns:
             Vector (n,) of `navigation_space`.

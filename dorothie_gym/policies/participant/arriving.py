@@ -30,7 +30,7 @@ REACTION = 1.8
 """Time after which a car that has heard an instruction to stop begins to brake [s]."""
 
 PASSED = 15.0
-"""Distance behind the place up to which a stop instruction that was not obeyed is repeated [m]."""
+"""Distance past the place up to which a stop instruction that was not obeyed is repeated [m]."""
 
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
@@ -189,7 +189,7 @@ def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay:
 def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
     """Returns the distance before the place at which the car stops [m]: instructed now, and at the next decision.
 
-    Negative distances lie behind the place. The words take effect when they end; until then the present
+    Negative distances lie past the place. The words take effect when they end; until then the present
     acceleration is extrapolated.
     """
     interval, config = state.clock.interval, state.config

@@ -41,7 +41,7 @@ class ParticipantConfig(GuidanceConfig):
         turn_late_distance: distance at which a turn is announced even if the car has not asked [m].
         switch_time: time that the car is given for a lane change before the next instruction [s].
         take_over_distance: distance to a described goal at which guidance begins [m].
-        corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
+        corner_distance: distance to a junction within which a goal right after it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
         careful_speeds: speeds asked for where the goal is easily missed [km/h].
         manoeuvre_cost: extra cost of each lane change and U-turn on a route that has to be described in words [m].
@@ -66,7 +66,7 @@ class ParticipantConfig(GuidanceConfig):
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
             rolls on [m].
         nudge_time: time after an instruction to drive on a little in which no other follows [s].
-        late_stop: distance behind the goal beyond which the stop instruction is shortened [m].
+        late_stop: distance past the goal beyond which the stop instruction is shortened [m].
         arrival_distance: distance to the goal within which other remarks are dropped [m].
         elsewhere_distance: distance to the goal beyond which a standing car is elsewhere [m].
         explains_order: probability that the order of two tasks is explained by naming the first one.

@@ -223,7 +223,7 @@ def _is_left_to_ask(
 
 
 def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
-    """Asks the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
+    """Asks the car to slow down for a place that was missed before, or is easily missed after a manoeuvre."""
     progress, config = state.route.to_goal, state.config
     far = progress.left(view.station) > config.stop_distance
     if state.guidance.slowed_early or far or view.speed < config.slow_speed:

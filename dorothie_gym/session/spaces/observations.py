@@ -250,7 +250,7 @@ def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True
 def camera_perception_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
     """Returns the specifications of the additional fields of participant and Co-Wizard with perception by the camera.
 
-    The Co-Wizard's `landmarks` then also contain, behind those that are not hidden, the hidden ones that have been in
+    The Co-Wizard's `landmarks` then also contain, after those that are not hidden, the hidden ones that have been in
     view.
     """
     return (flags("landmarks_in_view", limits.landmarks, meaning="1 for landmarks that the picture shows"),)

@@ -31,7 +31,7 @@ _lock = threading.Lock()
 
 
 class Gate:
-    """Gate at which one thread waits until another one opens it; it shuts behind the thread that passes.
+    """Gate at which one thread waits until another one opens it; it closes once a thread has passed.
 
     The waiting thread polls for a while, without Python's lock, and then sleeps: waking it again takes 0.05 to 0.1 ms.
     """
@@ -191,7 +191,7 @@ def turns_of(count: int, threads: int) -> NDArray[np.int64]:
     """Returns the numbers 0 to `count` - 1 in as many blocks as there are threads, none of them taken.
 
     Returns:
-        (threads, LINE): of each block the next number and the one behind its last.
+        (threads, LINE): of each block the next number and the one after its last.
     """
     turns = np.zeros((threads, LINE), dtype=np.int64)
     borders = np.arange(threads + 1) * count // threads

@@ -69,7 +69,7 @@ def begin_steps(world: WorldArrays, lane: int) -> bool:
 
 @compiled
 def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
-    """Begins a plan with a lane, and inside a junction with those up to the lane behind it."""
+    """Begins a plan with a lane, and inside a junction with those up to the lane after it."""
     fits = begin_steps(world, lane)
     while fits and lane >= 0 and town.lanes[lane].junction >= 0:
         lane = town.ways[lane].onward
@@ -92,7 +92,7 @@ def take_course(town: TownArrays, world: WorldArrays) -> bool:
 
 @compiled
 def enter_exit(town: TownArrays, world: WorldArrays, number: int) -> bool:
-    """Adds the connectors of an exit, a row of `TownArrays.exits`, and the lane behind the junction."""
+    """Adds the connectors of an exit, a row of `TownArrays.exits`, and the lane beyond the junction."""
     way = town.exits[number]
     lane = way.connector
     fits = add_step(world, lane, False)

@@ -190,7 +190,7 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     begin = station + LEAD * (speed > EGO_MOVING) + _u_turn_braking(speed, U_TURN_SPEED * U_TURN_SPEED)
     other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other >= 0:
-        # just behind a junction: begin later, so that the turn ends before the end of the oncoming lane
+        # just beyond a junction: begin later, so that the turn ends before the end of the oncoming lane
         short = LANDING - (town.lanes[other].length - there)
         if short > 0.0:
             begin += short
@@ -397,7 +397,7 @@ def _turn(town: TownArrays, world: WorldArrays, angle: int, speed: float) -> int
 
 @compiled
 def _under_way(world: WorldArrays) -> tuple[int, int, float]:
-    """Returns the points of a lane switch or U-turn under way that are still to come, and the station behind [m]."""
+    """Returns the points that remain of a lane switch or U-turn in progress, and the station where it ends [m]."""
     plan, course = world.plan[0], world.course
     first = int(plan.at)
     end = first
@@ -405,7 +405,7 @@ def _under_way(world: WorldArrays) -> tuple[int, int, float]:
         end += 1
     if end - first < 2:
         return 0, 0, plan.station
-    # the lane continues where it did before, just behind the end of a U-turn; else the path would turn back
+    # the lane continues where it did before, just after the end of a U-turn; else the path would turn back
     landing = end if end < plan.points and course[end].lane == plan.lane else end - 1
     return first, end, course[landing].station
 

@@ -173,7 +173,7 @@ def find_sweeps(
         sweeps: sweeps of the points from `first` on, which are written; the car enters the path there along its
             direction.
         first: first point.
-        end: point behind the last one.
+        end: point after the last one.
         length: length of the car [m].
         width: width of the car [m].
     """

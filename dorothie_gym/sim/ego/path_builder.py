@@ -160,7 +160,7 @@ END_GAP = 0.8
 """Room between the nose of a waiting ego and the end of its lane [m]."""
 
 SEARCH_RANGE = 6.0
-"""Range before and behind the last place in which the ego is searched [m]."""
+"""Range before and after the last place in which the ego is searched [m]."""
 
 # --- Points -----------------------------------------------------------------------------------------------------------
 

@@ -91,7 +91,7 @@ class Wait(enum.IntEnum):
     CLOSED = 6
     """The ego turns round in the junction."""
     NO_ROOM = 7
-    """There is no room behind the junction."""
+    """There is no room beyond the junction."""
 
 
 class Group(enum.IntEnum):

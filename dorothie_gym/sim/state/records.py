@@ -24,7 +24,7 @@ class SweepRecord:
 class EgoRecord:
     """Control of the ego, the vehicle of the kind `Kind.DRIVEN`."""
 
-    first: Int32  # stretch of the path that the motion control follows: its first point, and the one behind its last
+    first: Int32  # stretch of the path that the motion control follows: its first point, and the one after its last
     points: Int32
     at: Int32  # the point at or before the ego
     s: Float  # distance along the path, and offset to its right [m]

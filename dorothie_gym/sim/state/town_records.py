@@ -35,7 +35,7 @@ class LaneRecord:
     left: Int32  # lanes that one may change to
     right: Int32
     junction: Int32  # junction that it crosses
-    exit: Int32  # of a connector: the first lane behind the junction
+    exit: Int32  # of a connector: the first lane beyond the junction
     place: Int32  # of a connector: its place among those of its junction
     relation: Int32  # of a connector: beginning of its row of `relations`
     control: Int32  # `TrafficControl`

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NO_ROOM_PATIENCE = 5.0
-"""Wait for room behind a junction after which a vehicle draws another route [s]."""
+"""Wait for room beyond a junction after which a vehicle draws another route [s]."""
 
 SLOWEST_BEND = 0.5
 """Minimum speed in a bend [m/s]."""
@@ -221,7 +221,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
 
 @compiled
 def _choose_another_way(town: TownArrays, vehicle: VehicleRecord, k: int, now: float) -> None:
-    """Draws another route beyond the first `k` planned lanes after a long wait for room behind the junction.
+    """Draws another route beyond the first `k` planned lanes after a long wait for room beyond the junction.
 
     This resolves gridlocks: rings of full lanes in which every vehicle waits for the next one.
     """

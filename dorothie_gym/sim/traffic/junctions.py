@@ -1,4 +1,4 @@
-"""Admission to junctions: lights, signs, right of way, order of arrival, room behind the junction.
+"""Admission to junctions: lights, signs, right of way, order of arrival, room beyond the junction.
 
 Lights and signs come first, then priority, then the order of arrival. Vehicles with crossing paths are never admitted
 together: one that is on its way across clears the junction first.
@@ -88,7 +88,7 @@ def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int
 # --- Admission --------------------------------------------------------------------------------------------------------
 
 CLEAR = 0.5
-"""Distance of a vehicle's rear behind a junction at which the vehicle has left it [m]."""
+"""Distance of a vehicle's rear beyond a junction at which the vehicle has left it [m]."""
 
 
 @inlined
@@ -326,7 +326,7 @@ def _is_occupied(town: TownArrays, world: WorldArrays, i: int) -> bool:
 
 @compiled
 def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
-    """Returns whether there is room behind a junction for a vehicle and all others that are on their way there.
+    """Returns whether there is room beyond a junction for a vehicle and all others that are on their way there.
 
     They have to fit behind the first slow vehicle, and before the next junction.
 

@@ -200,17 +200,17 @@ LINE_GAP = 1.0
 """Room left before a line [m]."""
 
 ROOM_BEHIND = 10.5
-"""Free lane that a vehicle wants behind a junction before it enters: its length, the distance that it keeps when it
+"""Free lane that a vehicle wants beyond a junction before it enters: its length, the distance that it keeps when it
 stands, and the length needed to clear the junction [m]."""
 
 ROOM_SIGHT = 60.0
-"""Distance behind a junction within which slow vehicles count against its room [m]."""
+"""Distance beyond a junction within which slow vehicles count against its room [m]."""
 
 ROOM_EACH = 10.0
 """Lane that a vehicle takes up in a queue: its length and the distance that highway-env's IDM keeps [m]."""
 
 SLOW = 4.0
-"""Speed below which a vehicle behind a junction may be in the way [m/s]; in a U-turn the ego does 3.5 m/s."""
+"""Speed below which a vehicle beyond a junction may be in the way [m/s]; in a U-turn the ego does 3.5 m/s."""
 
 CROSSING_SIGHT = 40.0
 """Distance within which traffic gives way to a U-turn of the ego [m]."""

@@ -146,5 +146,5 @@ def word_tensor(rows: Sequence[NDArray[np.int64]]) -> torch.Tensor:
 
 
 def forms_in(remarks: Iterable[str | None]) -> tuple[str, ...]:
-    """Returns the different forms of some remarks, sorted, behind silence."""
+    """Returns the distinct forms of remarks: silence first, then the others in sorted order."""
     return ("", *sorted({form for form in remarks if form}))

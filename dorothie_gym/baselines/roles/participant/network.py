@@ -84,6 +84,6 @@ class ParticipantNetwork(RoleNetwork):
         return self.first(hidden), hidden
 
     def then(self, hidden: Tensor, before: Tensor) -> Tensor:
-        """Returns the logits of the remark (b, r) behind another one (b,)."""
+        """Returns the logits of the remark (b, r) that follows another one (b,)."""
         scores: Tensor = self.next(torch.cat([hidden, self.remarks(before)], dim=1))
         return scores

@@ -42,7 +42,7 @@ _NOW: Final = 4.0  # time within which "now" may lie [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
 _CROWD: Final = 3  # minimum number in a crowd
-_IN_FRONT: Final = 15.0  # largest distance from the centre of the car to what it stands behind [m]
+_IN_FRONT: Final = 15.0  # largest distance from the centre of the car to the body that it waits behind [m]
 _AHEAD: Final = 25.0  # and its largest angle to the heading [degrees]
 _TOLD: Final = 60.0  # longest time between an order and what it explains [s]
 

@@ -76,7 +76,7 @@ class HeightField:
         }
         walks = _sidewalk_samples(town)
         away, beside = (np.asarray(row) for row in cKDTree(samples.centre).query(walks.centre))
-        # level from the road on, and as far behind
+        # level from the road to the pavement, and equally far on its other side
         verge = np.clip(away - samples.half_width[beside], 0.0, _WIDEST_VERGE)
         walks = replace(walks, half_width=np.maximum(walks.half_width, verge))
         # those in tunnels count before the mouths; above, only lanes do

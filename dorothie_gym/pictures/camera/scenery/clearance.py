@@ -39,7 +39,7 @@ _PAINT = (
     palette.ONE_WAY,
 )
 _SEEN_FROM = (42.0, 26.0)  # [m] before the stop at a site
-_SIGN = (2.4, 3.4)  # [m] extent of signs before and behind the front of a lot
+_SIGN = (2.4, 3.4)  # [m] extent of signs in front of and behind the front of a lot
 BESIDE_LOT = 1.2
 """Room at both sides of a lot, for a sign [m]."""
 
