@@ -246,12 +246,12 @@ Point: TypeAlias = InferencePoint | DecisionPoint
 
 
 def ufn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the participant, from event number `since` on."""
+    """Yields a point for each flagged dialogue move of the participant, starting with event number `since`."""
     yield from _inference_points(SessionHistory(session), Task.UFN, since)
 
 
 def rfn_points(session: Session, *, since: int = 0, strict: bool = False) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the Co-Wizard, from event number `since` on.
+    """Yields a point for each flagged dialogue move of the Co-Wizard, starting with event number `since`.
 
     Args:
         session: the session.
@@ -262,7 +262,7 @@ def rfn_points(session: Session, *, since: int = 0, strict: bool = False) -> Ite
 
 
 def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
-    """Yields a point for each flagged navigation action of the Co-Wizard, from event number `since` on."""
+    """Yields a point for each flagged navigation action of the Co-Wizard, starting with event number `since`."""
     history = SessionHistory(session)
     for record in history.actions:
         if record.index >= since and is_decision(record):
@@ -283,7 +283,7 @@ def _inference_points(history: SessionHistory, task: Task, since: int) -> Iterat
 
 
 def task_points(session: Session, task: Task, *, since: int = 0, strict: bool = False) -> tuple[Point, ...]:
-    """Returns the points of a task in a session, from event number `since` on; `strict` as in `rfn_points`."""
+    """Returns the points of a task in a session, starting with event number `since`; `strict` as in `rfn_points`."""
     match task:
         case Task.UFN:
             return tuple(ufn_points(session, since=since))

@@ -21,7 +21,7 @@ _AT_FRONT = 0.5
 """Share of hesitations at the beginning of the sentence; the others follow its first words."""
 
 _LEAST_WORDS = 5
-"""Number of words from which on a sentence may be interrupted by a hesitation."""
+"""Minimum number of words of a sentence that a hesitation may interrupt."""
 
 _FILLER = rf"(?:{'|'.join(FILLED_PAUSES)})"
 _RESTART = re.compile(rf"\b((?:[\w'-]+ ){{0,2}}[\w'-]+),? {_FILLER},? (?=\1\b)", re.IGNORECASE)

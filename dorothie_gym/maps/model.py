@@ -33,8 +33,7 @@ STRAIGHT_RATIO = 3.0
 """A segment this many times longer than its neighbour is a straight beside a curve."""
 
 LEVEL_HEIGHT = 2.5
-"""Difference of height from which on lanes and bodies are on different levels and do not meet [m]: a bridge leaves
-more."""
+"""Difference in height at which lanes and bodies are on different levels and do not meet [m]; bridges leave more."""
 
 
 class LinkType(enum.StrEnum):

@@ -46,13 +46,13 @@ class AdWizardConfig:
 
     Attributes:
         first_at: earliest time of a trick [s].
-        window: range of planned times from then on [s].
+        window: length of the period after it in which tricks are planned [s].
         spacing: minimum time between two tricks [s].
-        expires_after: time after which a trick that finds no moment is given up [s].
-        weights: weight of each trick in the draw of those of a session.
+        expires_after: time after which a trick that could not be played is dropped [s].
+        weights: relative frequency with which each trick is drawn for a session.
         roadblock_ahead: range of distances ahead of the car at which a roadblock is placed [m].
-        roadblock_margins: minimum distances of a roadblock from the beginning and the end of its lane [m].
-        roadblock_speed: least speed of the car when one is placed [m/s].
+        roadblock_margins: minimum distances of a roadblock from the start and the end of its lane [m].
+        roadblock_speed: minimum speed of the car when one is placed [m/s].
         roadblock_clearance: minimum distance of a roadblock from a place where the car may have to stop [m].
         roadblock_time: time after which a roadblock is removed [s].
         most_roadblocks: maximum number of roadblocks in a session.
@@ -114,7 +114,7 @@ FOGS: Mapping[WeatherParameter, tuple[float, tuple[float, float]]] = MappingProx
 check_complete({*WEATHERS, *FOGS}, WeatherParameter, "WEATHERS", __name__)
 
 FOGS_FROM = 0.4
-"""Share of the density from which on there is fog."""
+"""Density that counts as fog, as a share of the maximum."""
 
 PROPS: Mapping[PropKind, float] = MappingProxyType(
     {kind: 3.0 if kind is PropKind.STREET_BARRIER else 1.0 for kind in PropKind}
@@ -378,7 +378,7 @@ def suits_roadblock(
         lane: number of the lane.
         station: distance along it [m].
         length: its length [m].
-        margins: minimum distances from its beginning and its end [m].
+        margins: minimum distances from the start and the end of its lane [m].
         clearance: minimum distance from places where a car stops for a landmark [m].
     """
     if not margins[0] < station < length - margins[1]:

@@ -48,7 +48,7 @@ CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = complete(
     "CONSPICUOUS",
     __name__,
 )
-"""Conspicuousness of each parameter, which is noticed from 1 on, and whose end is noticed below `OVER`. The sun is
+"""Conspicuousness of each parameter: a value of at least 1 is noticed, and so is a fall below `OVER`. The sun is
 noticed when it is within 15 degrees of the horizon, or stands elsewhere than at noon."""
 
 OVER: Final = 0.6

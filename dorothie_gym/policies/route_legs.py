@@ -12,7 +12,7 @@ from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import RecordArray
 
 PASSED = 3.0
-"""Distance behind the car from which on a goal has been passed [m]."""
+"""Distance behind the car at which a goal counts as passed [m]."""
 
 SWITCH_ROOM = 16.0
 """Minimum distance to the end of a lane for a lane switch [m]."""
@@ -27,7 +27,7 @@ RIGHT_BEHIND = 70.0
 """Distance from a junction to a goal within which there may be no room to change lanes [m]."""
 
 MANOEUVRE_OVERDUE_DISTANCE = 18.0
-"""Distance past its planned place from which on a lane change or U-turn is given up [m]."""
+"""Distance past its planned place at which a lane change or U-turn is given up [m]."""
 
 
 @compiled

@@ -385,11 +385,11 @@ class RouteState:
         return replace(self, progress=self.to_goal.replanned(town, start, self.closed))
 
     def has_missed(self, before: float, station: float) -> bool:
-        """Returns whether the goal, `before` metres ahead on the former route, now needs a long detour."""
+        """Returns whether the goal, `before` metres ahead on the previous route, now needs a long detour."""
         return before < NEAR_MISS and self.to_goal.left(station) > before + WAY_ROUND
 
     def after_miss(self, town: Town, start: Place, former: RouteProgress) -> RouteState:
-        """Counts a drive past the goal; from the second one on, avoids the last lane change of the former route."""
+        """Counts a drive past the goal; after the second one, avoids the last lane change of the previous route."""
         counted = replace(self, misses=self.misses + 1)
         way_in = former.way_in()
         return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted

@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND, speech_seconds
 from dorothie_gym.support import portable_math as pm
 
 FULL_TURN = 7
-"""Words from which on a turn is spoken at the speaker's full rate; shorter ones are slower (Yuan et al., 2006)."""
+"""Number of words of a turn that is spoken at the speaker's full rate; shorter turns are slower (Yuan et al., 2006)."""
 
 SHORT_TURN = 0.8
 """Rate of a turn of one word, relative to the full rate; set by hand."""

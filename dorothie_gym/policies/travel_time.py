@@ -56,7 +56,7 @@ def _arrival(town: Town, progress: RouteProgress, station: float, begun: float, 
 
 
 def _seconds_on(town: Town, leg: Leg, start: float) -> float:
-    """Returns the time on a leg from a place on [s]; the whole leg from minus infinity, with the U-turn into it."""
+    """Returns the time for a leg after a place [s]; for minus infinity, of the whole leg with the U-turn into it."""
     length = max(leg.end - max(leg.start, start), 0.0)
     if town.lanes[leg.lane].in_junction:
         return _CROSSING + length / _CROSSING_PACE

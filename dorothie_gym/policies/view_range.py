@@ -18,7 +18,7 @@ from dorothie_gym.sim.sensing.visibility import SHORTEST_SIGHT
 from dorothie_gym.sim.weather import Weather
 
 FAR_SIGHT: Final = 60.0
-"""Range of sight from which on an agent sees far enough [m]: it stops in time from 45 km/h."""
+"""Minimum range of sight that is far enough for an agent [m]: it can stop in time from 45 km/h."""
 
 DENSE: Final = 30.0
 """Range of sight below which fog is dense [m]."""

@@ -143,7 +143,7 @@ def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
 
 @compiled
 def write_lanes(course: RecordArray[CoursePointRecord], count: int, here: int, table: NDArray[np.int64]) -> None:
-    """Writes the lanes of a path from a point on, in order and without repetition, as 1 + lane number; then zeros."""
+    """Writes the lanes of a path after a point, in order without repetition, as 1 + lane index, padded with zeros."""
     row, last = 0, -1
     for k in range(here, count):
         if row == len(table):

@@ -157,7 +157,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
                 rest.pop(0)
             onward = network.along_route(network.successors(here), rest)
             if not onward:
-                break  # drawn at random from here on, as highway-env does where a route does not fit the road
+                break  # the rest is drawn at random, as highway-env does where a route does not fit the road
             lanes.append(network.lane_id(onward[0]))
         self._plan(lanes)
 

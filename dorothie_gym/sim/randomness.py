@@ -2,7 +2,7 @@
 
 - xorshift32 (Marsaglia, 2003) for the choices of traffic and pedestrians, one stream a body.
 - PCG64 (O'Neill, 2014) with the ziggurat of Marsaglia and Tsang (2000) for normal numbers: those of
-  `numpy.random.Generator.standard_normal`, from the state of a generator on.
+  `numpy.random.Generator.standard_normal`, continuing from the state of a generator.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 AGAINST = pm.cos(math.radians(120.0))
-"""Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
+"""Cosine of the angle to a lane above which the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
 
 NEARBY = 10.0
 """Range around the car for the nearest lane [m]: more than half of any lane's width."""

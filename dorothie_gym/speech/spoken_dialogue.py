@@ -174,7 +174,7 @@ class SpokenDialogue:
 
 
 def _add(target: Samples, samples: Samples, offset: int) -> None:
-    """Adds samples to others from an offset on, which may be negative or beyond the end."""
+    """Adds samples to others at an offset, which may be negative or beyond the end."""
     first, last = max(offset, 0), min(offset + len(samples), len(target))
     if first < last:
         target[first:last] += samples[first - offset : last - offset]

@@ -102,7 +102,7 @@ def write_atomically(
         path: the file.
         content: text or bytes.
         shared: see `replacing`.
-        mode: permissions of the file from its creation on; those of the process if None.
+        mode: permissions with which the file is created; those of the process if None.
         synced: see `replacing`.
     """
     with replacing(path, shared=shared, synced=synced) as part:

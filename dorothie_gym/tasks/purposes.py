@@ -222,7 +222,7 @@ def _tidy(clause: str) -> str:
 
 
 def _imperative(clause: str) -> str | None:
-    """Returns the clause from its verb on, "buy a newspaper at Ikea"; None if it is not an instruction."""
+    """Returns the clause starting at its verb, "buy a newspaper at Ikea"; None if it is not an instruction."""
     text = _tidy(clause)
     while found := _LEADS.match(text):
         text = text[found.end() :]

@@ -41,19 +41,19 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     """Checks that the Co-Wizard observes neither hidden landmarks nor the participant's tasks.
 
     A session is played with random and with scripted actions. The same actions are then played in two altered
-    scenarios: hidden landmarks stand at other sites; the story and the order of the tasks differ. Observation,
-    action mask and refusals of the Co-Wizard must be equal to the bit at every decision (with other tasks: up to the
+    scenarios: hidden landmarks are at other sites; the story and the order of the tasks differ. Observation,
+    action mask and refusals of the Co-Wizard must be bit-identical at every decision (with other tasks: up to the
     first arrival, which all roles may notice, and with an idle Ad-Wizard, because its refusals depend on the task). The
     participant's observation must differ, or the check would prove nothing.
 
     Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
-    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera, all
-    is compared until the first decision at which one is in view: the Co-Wizard, and the car, may know it from then on.
+    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,
+    everything is compared until the first decision at which one is in view; afterwards, the Co-Wizard and the car may know it.
 
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
             `reset(options={"scenario": ...})`. It is reset several times.
-        seed: seed of the first session; the first seed from here on whose scenario has a hidden landmark is used.
+        seed: first candidate for the seed of the session; it counts up until a scenario has a hidden landmark.
         decisions: decisions played in each session, at 2 Hz by default.
 
     Raises:

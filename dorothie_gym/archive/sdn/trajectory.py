@@ -176,7 +176,7 @@ MAX_COORDINATE: Final = 1e9
 """Largest magnitude of a valid coordinate or yaw [m, degrees]."""
 
 MIN_MOTION: Final = 0.2
-"""Distance between two frames from which on the motion gives the heading [m]."""
+"""Minimum distance between two frames for deriving the heading from the motion [m]."""
 
 
 @dataclass(frozen=True)

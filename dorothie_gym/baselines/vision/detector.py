@@ -43,7 +43,7 @@ class DetectorConfig:
         size: numbers of a query.
         feed_forward: width of the feed-forward layers.
         heads: number of attention heads.
-        levels: resolutions of the backbone that are looked at, from 1/8 on.
+        levels: number of resolutions of the backbone that are used, the first of which is 1/8.
         encoded: channels into which the five are encoded.
         backbone_sizes: channels of the four stages of the backbone.
         backbone_depths: blocks of the stages.
@@ -57,7 +57,7 @@ class DetectorConfig:
         batch_size: pictures of a step.
         epochs: passes over the training pictures.
         zoom: share of a picture's width and height in the smallest part that training enlarges to a whole picture.
-        least_pixels: visible pixels from which on an object has to be found in training.
+        least_pixels: minimum number of visible pixels of an object that training requires to be found.
         solid_loss: weight of the loss of boxes in space.
     """
 

@@ -186,7 +186,7 @@ class SegFormer(nn.Module):
         return enlarged(F.pixel_shuffle(logarithm, self.config.depth_detail), size)[:, 0].exp()
 
     def _median_bins(self, features: Tensor) -> Tensor:
-        """Returns the medians of the bins (B, places of a cell, h / 4, w / 4), in bins from the nearest depth on."""
+        """Returns the medians of the bins (B, places of a cell, h / 4, w / 4), in bins counted from the nearest."""
         config = self.config
         scores = self.depth_head(features.contiguous()).float()
         batch, _, height, width = scores.shape

@@ -25,7 +25,7 @@ from dorothie_gym.ontology.slots import Slot
 from dorothie_gym.session.recording.session import Session
 
 MAX_UNDEFINED_SHARE: Final = 0.5
-"""Share of undefined bootstrap samples from which on the interval is undefined."""
+"""Share of undefined bootstrap samples at which the interval becomes undefined."""
 
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
 _ENV, _TASK, _NONE = Handled.ENVIRONMENTAL, Handled.TASK, Handled.NONE

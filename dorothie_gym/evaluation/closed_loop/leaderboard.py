@@ -46,7 +46,7 @@ PART_TITLES: Final[Mapping[str, str]] = {
 """Parts of the page and their titles."""
 
 ENOUGH: Final = 100
-"""Number of sessions of a row from which on it is compared; as `submission.LeaderboardProtocol`."""
+"""Minimum number of sessions of a row that is compared, as in `submission.LeaderboardProtocol`."""
 
 _KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind if kind is not ExceptionKind.NONE), NO_EXCEPTION)
 

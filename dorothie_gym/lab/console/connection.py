@@ -19,7 +19,7 @@ BURST, RATE = 60.0, 30.0
 
 
 class CloseCode(enum.IntEnum):
-    """Codes with which the server closes a connection; browsers do not connect again after those from 4400 on."""
+    """Codes with which the server closes a connection; browsers do not reconnect after codes of 4400 and above."""
 
     RESTART = 1012
     TOO_SLOW = 1013

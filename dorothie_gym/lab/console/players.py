@@ -40,13 +40,13 @@ class Players:
                 self.start(role)
 
     def start(self, role: Role) -> None:
-        """Lets the policy of a role play from now on."""
+        """Hands a role over to its policy."""
         policy = self._plans[role].player.make(role, self._engine.limits)
         self._policies[role] = policy
         self._states[role] = policy.initial_state(policy_seed(self._seed, role), self._engine.town)
 
     def stop(self, role: Role) -> None:
-        """Lets a person play a role from now on."""
+        """Hands a role over to a person."""
         self._policies.pop(role, None)
         self._states.pop(role, None)
 

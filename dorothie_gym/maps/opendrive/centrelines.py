@@ -66,7 +66,7 @@ class RoadSamples:
             x = self.x[here] - across * pn.sin(self.heading[here])
             y = self.y[here] + across * pn.cos(self.heading[here])
             z = self.z[here] + lateral * pn.sin(self.tilt[here])
-            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y south from here on
+            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y points south below
         return np.concatenate(rows)
 
 

@@ -220,7 +220,7 @@ def connect(entry: Pose, exit_: Pose) -> Curve:
 
 
 def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
-    """Returns one arc between the lines through both poses, if they meet ahead of the first and behind the second pose."""
+    """Returns one arc between the lines through both poses if they meet ahead of the first and behind the second."""
     turn = wrap_radians(exit_[2] - entry[2])
     if abs(pm.sin(turn)) < 1e-3:  # as good as parallel
         return None

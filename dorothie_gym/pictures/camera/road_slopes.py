@@ -17,7 +17,7 @@ from dorothie_gym.support.copying import shared
 
 _CELL = 5.0  # [m]; samples as far away count
 _LEVEL = 1.5  # [m] of height between a vehicle and its road, at most
-_SMALLEST = 1e-3  # slope from which on samples are kept
+_SMALLEST = 1e-3  # minimum slope of the samples that are kept
 _FAINT = 1e-3  # weight, of 1 for a sample at the place itself, of level ground
 
 

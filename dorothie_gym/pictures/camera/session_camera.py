@@ -40,7 +40,7 @@ SHADED = 120.0
 LIGHTS_BELOW = 6.0
 """Altitude of the sun below which cars drive with their lights on [degrees]; also in rain and fog."""
 
-_LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
+_LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # minimum precipitation and density of fog for this [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
 _PAINTS = np.zeros((2, max(Colour) + 1, 3), np.uint8)  # of lenses that are off and on, by `Colour`
 for _colour in Colour:

@@ -218,7 +218,7 @@ def _add_run(
 
 @inlined
 def _write(samples: Samples, count: int, picture: NDArray[np.uint8], first: int) -> int:
-    """Writes the colours of pixels from one on; returns the pixel after the last."""
+    """Writes the colours of pixels, starting with a given one; returns the pixel after the last."""
     values, pixel, k = samples.values, first, 0
     while k < count:
         parts = int(samples.parts[k])

@@ -224,7 +224,7 @@ def _draw_bodies(
     bodies: RecordArray[PlacementRecord],
     lowest: float,
 ) -> None:
-    """Draws the map of bodies, those near its centre whose shadows may be seen on surfaces from a height on [m]."""
+    """Draws the map of bodies, those near its centre whose shadows may be seen on surfaces above a height [m]."""
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
     first, reach, box = maps.window, 0.5 * _BODIES * TEXEL, maps.corners
     _empty_bodies(maps)
@@ -286,7 +286,7 @@ def _cast(
     maps: ShadowMaps, target: NDArray[np.int16], mesh: Mesh, k: int, left: int, top: int, x: float, y: float, z: float,
     c: float, s: float,
 ) -> None:  # fmt: skip
-    """Draws a triangle that is turned and moved, if it faces the sun, to a part of a map from a square on."""
+    """Draws a rotated and translated triangle, if it faces the sun, to the part of a map that starts at a square."""
     slope, corners = maps.slope, maps.corners
     nx, ny = mesh.normals[k, 0] * c - mesh.normals[k, 1] * s, mesh.normals[k, 0] * s + mesh.normals[k, 1] * c
     rise = nx * slope[0] + ny * slope[1] + mesh.normals[k, 2]  # of the height, seen from the sun

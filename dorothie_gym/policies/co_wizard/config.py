@@ -21,7 +21,7 @@ class CoWizardConfig:
 
     Attributes:
         turn_lead: distance to the junction at which a turn is commanded [m].
-        passed: distance behind the car from which on a place is not stopped at any more [m].
+        passed: distance behind the car at which a place counts as passed and is no longer stopped at [m].
         command_interval: time after which a command without effect is repeated [s].
         straight_on_distance: distance to the junction at which a guided car goes straight on without an answer [m].
         pause_distance: distance before a junction at which a car that does not know the way stops [m].

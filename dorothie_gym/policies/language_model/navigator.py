@@ -30,7 +30,7 @@ from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.portable_math import wrap_degrees
 
 TURN_LEAD = 85.0
-"""Distance to a junction from which on its turn is due [m]; as the scripted Co-Wizard commands it."""
+"""Distance to a junction below which its turn is due [m], as for the scripted Co-Wizard."""
 
 STOP_SIGHT = 80.0
 """Distance along the lanes ahead within which the place to stop at is looked for [m]."""
@@ -39,7 +39,7 @@ STOP_MARGIN = 0.2
 """Distance by which a stop is due early rather than late [m]."""
 
 PASSED = 2.0
-"""Distance behind the car from which on a place is not stopped at any more [m]."""
+"""Distance behind the car at which a place counts as passed and is no longer stopped at [m]."""
 
 REPLAN_AFTER = 2
 """Decisions off the route after which another one is planned."""

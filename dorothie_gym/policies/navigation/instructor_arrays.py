@@ -30,7 +30,7 @@ LEGS = 96
 """Most legs of a route that an instructor keeps; of a longer one, the first. Routes through the towns have some 30."""
 
 LEGS_LEFT = 12
-"""Number of legs from which on the rest of a longer route is planned."""
+"""Number of legs after which the rest of a longer route is planned separately."""
 
 
 class StepKind(enum.IntEnum):

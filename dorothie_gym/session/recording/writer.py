@@ -214,7 +214,7 @@ class SessionWriter:
             raise SessionError(
                 f"{self.folder}: holds a session already ({', '.join(present)}); choose another folder or overwrite it"
             )
-        # The header goes first: from then on, whenever the process dies, the folder holds no session with parts of two.
+        # The header is removed first: if the process dies after that, the folder holds no session with parts of two.
         for name in present:
             (self.folder / name).unlink()
         for name in (PICTURES_FOLDER, AUDIO_FOLDER):

@@ -26,7 +26,7 @@ PATH_BEHIND, PATH_AHEAD = 12.0, 150.0
 """Stretch of path behind and ahead of the ego that is written for the motion control at least [m]."""
 
 PASSED = 1.0
-"""Distance from which on a place on the path or beyond the end of a lane is left out [m]."""
+"""Distance at which a place on the path or beyond the end of a lane is left out [m]."""
 
 
 @compiled

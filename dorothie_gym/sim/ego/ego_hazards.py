@@ -43,7 +43,7 @@ BEFORE_MANOEUVRE = 15.0
 """Distance before the beginning of braking for a lane switch or U-turn at which others are considered [m]."""
 
 REACHED = 0.2
-"""Overlap with the new lane from which on a switching ego is in the way there [m]."""
+"""Overlap with the new lane at which a switching ego obstructs it [m]."""
 
 BESIDE_EGO = 7.0
 """Distance ahead and behind within which vehicles are beside the ego [m]; as are those within a second behind."""

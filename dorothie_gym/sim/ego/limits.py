@@ -85,7 +85,7 @@ APPROACH_SPEED = 14.0 * KMH
 """Speed near a goal, under the design's 15 km/h [m/s]."""
 
 APPROACH_DISTANCE = 20.0
-"""Distance to a goal from which on `APPROACH_SPEED` holds [m]."""
+"""Distance to a goal below which `APPROACH_SPEED` applies [m]."""
 
 BLIND_SPEED = 1.5
 """Speed with hardly any sight [m/s]."""
@@ -99,7 +99,7 @@ PROFILE_BRAKING = 2.0
 """Deceleration towards a curve or the end of the path [m/s^2]."""
 
 SURE_BRAKING = 1.8
-"""Deceleration from which on the brake that is needed overrides the speed controller [m/s^2]."""
+"""Required deceleration at which the brake overrides the speed controller [m/s^2]."""
 
 PLANNED_BRAKING = 3.0
 """Deceleration of the action Stop, and the one that plans count on [m/s^2]."""

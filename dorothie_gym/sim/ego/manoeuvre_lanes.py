@@ -79,7 +79,7 @@ def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
 
 @compiled
 def take_course(town: TownArrays, world: WorldArrays) -> bool:
-    """Begins a plan with the lanes of the current path from the ego's place on."""
+    """Begins a plan with the lanes of the current path ahead of the ego."""
     plan, course, last = world.plan[0], world.course, NOBODY
     plan.steps, fits = 0, True
     for k in range(plan.at, plan.points):

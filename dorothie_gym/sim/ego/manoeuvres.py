@@ -414,7 +414,7 @@ def _under_way(world: WorldArrays) -> tuple[int, int, float]:
 def _lay_from_here(
     town: TownArrays, world: WorldArrays, speed: float, action: int, angle: int, connector: int, way_out: int
 ) -> int:
-    """Replaces the path from the ego's place on; the rest of a lane switch or U-turn under way is kept."""
+    """Replaces the path ahead of the ego; the rest of a lane switch or U-turn in progress is kept."""
     first, end, station = _under_way(world)
     return _replace(town, world, station, speed, first, end, -1, 0.0, action, angle, connector, way_out, False, 0.0)
 

@@ -68,7 +68,7 @@ def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
 # --- Speed and steering -----------------------------------------------------------------------------------------------
 
 HARD = 3.5
-"""Deceleration for a body ahead from which on it is a hazard stop [m/s^2]."""
+"""Deceleration for a body ahead at which a stop becomes a hazard stop [m/s^2]."""
 
 HAZARD_SPEED = 1.0
 """Speed of ego and body below which standing before the body is a hazard stop, too [m/s]."""
@@ -77,7 +77,7 @@ HAZARD_PAUSE = 15
 """Time without anything in the way after which a hazard stop is over [substeps]."""
 
 LIMITING = 0.5
-"""Reduction of the speed from which on a body is in the way [m/s]."""
+"""Reduction of the speed at which a body counts as an obstruction [m/s]."""
 
 CREEPING = 0.3
 """Speed below which the distance from the path is not corrected [m/s]."""

@@ -26,7 +26,7 @@ SIDE_MARGIN = 0.35
 """Room kept beside the ego [m]."""
 
 CROSSING = 0.35
-"""Sine of the angle to the path from which on a moving body counts as crossing it."""
+"""Sine of the minimum angle to the path at which a moving body counts as crossing it."""
 
 BRAKE_DELAY = 0.4
 """Time until the brakes act [s]."""

@@ -170,7 +170,7 @@ def find_sweeps(
 
     Args:
         course: points of the whole path.
-        sweeps: sweeps of the points from `first` on, which are written; the car enters the path there along its
+        sweeps: sweeps of the points, written from `first`; the car enters the path there along its
             direction.
         first: first point.
         end: point after the last one.

@@ -342,7 +342,7 @@ def network_of(town: Town) -> TownNetwork:
 # Tables of the ways on from each lane, built once for each town: exits, default successors, lanes beside, oncoming.
 
 ANOTHER_WAY = 15.0
-"""Difference of angle from which on exits are different turns [degrees]."""
+"""Difference in angle at which exits count as different turns [degrees]."""
 
 SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 

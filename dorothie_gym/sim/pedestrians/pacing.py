@@ -64,7 +64,7 @@ AVOIDING = 1.6
 """Distance within which pedestrians step out of each other's way [m]."""
 
 PASSING_OFFSET = 0.05
-"""Offset of another pedestrian to the right from which on it is passed on the left [m]."""
+"""Offset to the right at which another pedestrian is passed on the left [m]."""
 
 SPACE = 0.55
 """Minimum distance between pedestrians, from centre to centre [m]."""

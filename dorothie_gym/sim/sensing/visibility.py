@@ -37,7 +37,7 @@ FIVE_PERCENT = pm.log(20.0)
 """Optical depth that leaves 5 % of the contrast."""
 
 FULL_LIGHT = 300.0
-"""Illuminance from which on more light does not help [lx]: asphalt (reflectance 0.1) then has 10 cd/m^2, about where
+"""Illuminance above which more light does not help [lx]: asphalt (reflectance 0.1) then has 10 cd/m^2, about where
 Weber's law begins (Blackwell 1946)."""
 
 STREET_LIGHT = 2.0

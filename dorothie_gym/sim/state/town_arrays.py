@@ -45,7 +45,7 @@ LEVEL_TOWN = 2.0
 """In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
 
 OFF_ROAD_MARGIN = 0.5
-"""Distance of the car's centre outside of all lanes, connectors included, from which on it is off the road [m]."""
+"""Distance of the car's centre from all lanes and connectors at which the car counts as off the road [m]."""
 
 WIDE_LANE = 2.0 * (CELL_REACH - 2.0 * OFF_ROAD_MARGIN - SLACK)
 """Width up to which cells list all lanes that a place is within `OFF_ROAD_MARGIN` of [m]."""
@@ -317,7 +317,7 @@ def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[Sibling
 
 
 def _parting(lane: Lane, other: Lane) -> float:
-    """Returns the station on the other lane from which on it is clear of a lane with the same beginning [m]."""
+    """Returns the station on the other lane at which it has separated from a lane with the same start [m]."""
     for station in np.arange(0.0, other.length, 1.0):
         if abs(lane.project(other.position(float(station)))[1]) > PASSING_WIDTH:
             return float(station) + CAR_REAR

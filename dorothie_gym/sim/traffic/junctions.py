@@ -69,7 +69,7 @@ def colour_at(town: TownArrays, number: int, time: float) -> int:
 
 @compiled
 def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int:
-    """Returns the `Colour` of the light at the end of a lane at a time from now on; green where there is none."""
+    """Returns the `Colour` of the light at the end of a lane, now or at a later time; green if there is no light."""
     lane = town.lanes[number]
     if lane.programme < 0:
         return 0  # Colour.GREEN

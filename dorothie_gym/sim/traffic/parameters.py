@@ -60,7 +60,7 @@ CAR_LENGTH, CAR_WIDTH = float(Vehicle.LENGTH), float(Vehicle.WIDTH)
 """Size of a car [m]."""
 
 AFTER_END = CAR_LENGTH / 2
-"""Distance before the end of a lane from which on the next one is followed [m], `AbstractLane.after_end`."""
+"""Distance before the end of a lane at which the next one begins to be followed [m], `AbstractLane.after_end`."""
 
 # --- Sizes of arrays, lanes -------------------------------------------------------------------------------------------
 
@@ -171,7 +171,7 @@ AT_LINE = 3.5
 """Distance of the front to the line within which a vehicle stands at it [m]."""
 
 OVER_LINE = 0.5
-"""Distance over the line from which on a vehicle no longer stops for its light [m]."""
+"""Distance past the line at which a vehicle no longer stops for its light [m]."""
 
 TRAFFIC_STANDING = 0.3
 """Speed below which a vehicle of the traffic counts as standing [m/s]."""

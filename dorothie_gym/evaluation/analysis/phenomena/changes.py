@@ -21,7 +21,7 @@ M = DialogueMove
 DIM: Mapping[WeatherParameter, float] = MappingProxyType(
     {WeatherParameter.FOG_DENSITY: 30.0, WeatherParameter.PRECIPITATION: 30.0, WeatherParameter.SUN_ALTITUDE_ANGLE: 5.0}
 )
-"""Weather that reduces sight: fog and rain from these values on [%], the sun at most at this height [degrees]."""
+"""Weather that reduces sight: minimum values of fog and rain [%], maximum altitude of the sun [degrees]."""
 
 SLOWER = re.compile(r"\bslow\w*|\beasy\b|\bcareful\w*|\bnot so fast\b|\btoo fast\b|\bdown to\b|\bbrake\b")
 LIGHTS = re.compile(r"\blights?\b|\bheadlights?\b|\bbeams?\b")

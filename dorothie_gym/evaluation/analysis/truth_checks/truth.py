@@ -19,8 +19,8 @@ from dorothie_gym.session.recording.header import LandmarkRow
 from dorothie_gym.tasks.landmark_designs import features_of
 
 CLOSE, FAR = 130.0, 200.0
-"""Routes up to the first length count as short, and from the second on as long [m]; in between, both statements are
-true.
+"""Routes up to the first length count as short, and those of at least the second as long [m]; in between, both
+statements are true.
 """
 
 PLAIN_SIGHT, SIGHT = 20.0, 120.0

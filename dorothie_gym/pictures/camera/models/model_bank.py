@@ -42,7 +42,7 @@ LAMP_STATES = 4
 """Number of combinations of `Lamps`; the state of a vehicle is the rest of its model's index."""
 
 COARSE_FROM = 40.0
-"""Distance from which on people have few triangles [m]."""
+"""Distance beyond which people have few triangles [m]."""
 
 BRAKING = -0.6
 """Acceleration below which brake lamps are on [m/s^2]: less is engine drag."""
