@@ -53,7 +53,7 @@ class Labels:
         return len(self.task)
 
     def take(self, rows: Tensor) -> Labels:
-        """Returns the labels of some points."""
+        """Returns the labels of the given points."""
         return Labels(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def to(self, device: torch.device) -> Labels:
@@ -90,7 +90,7 @@ class Examples:
         return len(self.labels)
 
     def take(self, rows: Tensor, device: torch.device | None = None) -> tuple[dict[str, Tensor], Labels]:
-        """Returns inputs and labels of some points."""
+        """Returns inputs and labels of the given points."""
         inputs = {name: values[rows] for name, values in self.inputs.items()}
         labels = self.labels.take(rows)
         if device is None or device.type == "cpu":
@@ -99,7 +99,7 @@ class Examples:
 
     @classmethod
     def gather(cls, columns: Columns, tables: Sequence[PointTable], spec: BatchSpec) -> Self:
-        """Gathers all points of some tables, in their order.
+        """Gathers all points of the given tables, in their order.
 
         Raises:
             ValueError: there is no point.

@@ -246,7 +246,7 @@ class Proposition:
         return same and set(other.arguments) <= set(self.arguments)
 
     def without(self, *names: str) -> Proposition:
-        """Returns the proposition without some arguments."""
+        """Returns the proposition without the given arguments."""
         kept = tuple((name, value) for name, value in self.arguments if name not in names)
         return Proposition(self.predicate, kept, self.negated)
 

@@ -79,7 +79,7 @@ def draw_style(role: Role, rng: np.random.Generator, leanings: Mapping[str, floa
     Args:
         role: the Ad-Wizard shares the distribution of the participant, the car itself that of the Co-Wizard.
         rng: source of randomness; the same numbers are drawn for all leanings.
-        leanings: places in [0, 1] of some shares in their ranges, and of "register" from blunt to polite.
+        leanings: places in [0, 1] of shares within their ranges, and of "register" from blunt to polite.
     """
     leanings = leanings or {}
     spread = _spreads()[Role.PARTICIPANT if role in (Role.PARTICIPANT, Role.AD_WIZARD) else Role.CO_WIZARD]

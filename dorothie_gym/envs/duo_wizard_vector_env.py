@@ -250,7 +250,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     # --- Parts of a step ----------------------------------------------------------------------------------------------
 
     def _play(self, actions: Sequence[Mapping[str, ActionMapping]], playing: Flags) -> dict[int, StepOutcome]:
-        """Plays a decision in some environments; returns the outcomes by number of the environment."""
+        """Steps the given environments by one decision; returns the outcomes by number of the environment."""
         decoded = [
             batch.decode({row: actions[number] for row, number in enumerate(batch.numbers) if playing[number]})
             for batch in self.batches

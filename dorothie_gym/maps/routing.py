@@ -380,7 +380,7 @@ APART = 22.0
 
 
 def closed_by(place: Place) -> list[Place]:
-    """Returns the places that a prop closes to cars: right before it, under it, and too close beyond it for a U-turn."""
+    """Returns the places that a prop closes to cars: right before it, under it, or too close beyond it to turn."""
     lane, station = place
     return [(lane, station + float(on)) for on in np.arange(-STANDS_BEFORE, TURNS_BEHIND, CELL / 2)]
 

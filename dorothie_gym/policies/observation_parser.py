@@ -229,7 +229,7 @@ def scalar(observation: ObservationMapping, name: str) -> float:
 def place_on_lanes(
     town: Town, lanes: Sequence[int], x: float, y: float, width: float = 2.0
 ) -> tuple[int, float] | None:
-    """Returns the first of some lanes on which a point lies, and the distance along it; None if it lies on none.
+    """Returns the first of the given lanes on which a point lies, and the distance along it; None if it lies on none.
 
     Args:
         town: the map.

@@ -110,7 +110,7 @@ class Persona:
 
         Args:
             rng: source of randomness; the same numbers are drawn whatever is given.
-            given: values of some traits, or ranges of them.
+            given: values or ranges of the traits that are given.
         """
         drawn = {name: float(rng.random()) for name in SHARES}
         directions = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})

@@ -132,7 +132,7 @@ class RoleObservations(Protocol):
     """Observations of the roles at one decision."""
 
     def of(self, roles: Sequence[Role]) -> Mapping[str, ObservationMapping]:
-        """Returns the observations of some roles by agent."""
+        """Returns the observations of the given roles by agent."""
         ...
 
 

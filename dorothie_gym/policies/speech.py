@@ -209,7 +209,7 @@ class SpeechState:
         )
 
     def without_statements(self, predicates: Collection[Predicate]) -> SpeechState:
-        """Drops the queued remarks about some predicates; keeps remarks joined to them."""
+        """Drops the queued remarks about the given predicates; keeps remarks joined to them."""
         return self._without(lambda item: any(said.predicate in predicates for said in item.meaning))
 
     def _without(self, drops: Callable[[Remark], bool]) -> SpeechState:

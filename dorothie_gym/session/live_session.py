@@ -160,7 +160,7 @@ class LiveSession:
         )
 
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Builds the observations of some roles, by agent; what several of them need is computed once."""
+        """Builds the observations of the given roles, by agent; what several of them need is computed once."""
         return self.observer.observations(roles, self.decisions)
 
     @property

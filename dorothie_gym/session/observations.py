@@ -182,7 +182,7 @@ class ObservationBuilder(CachedViews):
         return self._views.tables()
 
     def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
-        """Builds the observations of some roles, by agent, each in its observation space.
+        """Builds the observations of the given roles, by agent, each in its observation space.
 
         Args:
             delivered: speech and messages of the last decision.
@@ -401,7 +401,7 @@ class SessionObserver:
             self._beliefs.recognised = self.camera_perception.recognised
 
     def observations(self, roles: Sequence[Role], decision: int) -> dict[str, Observation]:
-        """Builds the observations of some roles at the decision of a number, by agent."""
+        """Builds the observations of the given roles at the decision of a given number, by agent."""
         observations = self._builder.build(self.delivered, roles)
         if self.camera_perception is not None:
             self.camera_perception.add_to(observations)
@@ -425,7 +425,7 @@ class Observable(Protocol):
     decisions: int
 
     def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
-        """Builds the observations of some roles at the current decision, by agent."""
+        """Builds the observations of the given roles at the current decision, by agent."""
         ...
 
 
@@ -450,7 +450,7 @@ class LazyObservations(Mapping[str, Observation]):
         return len(_AGENTS)
 
     def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Returns the observations of some roles by agent; those that are missing are built together."""
+        """Returns the observations of the given roles by agent; those that are missing are built together."""
         missing = [role for role in roles if role not in self._built] if self._built else roles
         if not missing:
             return {_NAMES[role]: self._built[role] for role in roles}

@@ -110,7 +110,7 @@ class SessionBatch(CachedViews):
     # --- A decision -------------------------------------------------------------------------------------------------
 
     def decode(self, actions: Mapping[int, Mapping[str, ActionMapping]]) -> dict[int, dict[Role, RoleAction]]:
-        """Returns the actions of some sessions, decoded.
+        """Returns the actions of the given sessions, decoded.
 
         Args:
             actions: actions by row of the session and agent.
@@ -127,7 +127,7 @@ class SessionBatch(CachedViews):
         return decoded
 
     def step(self, actions: Mapping[int, Mapping[Role, RoleAction]]) -> dict[int, StepOutcome]:
-        """Plays a decision in some sessions; `observe` is to follow.
+        """Steps the given sessions by one decision; `observe` is to follow.
 
         Args:
             actions: decoded actions by row of the session.
@@ -143,7 +143,7 @@ class SessionBatch(CachedViews):
         }
 
     def observe(self, rows: Sequence[int] | None = None) -> None:
-        """Writes the observations and masks of some sessions, or of all that have begun."""
+        """Writes the observations and masks of the given sessions, or of all that have begun."""
         if rows is not None:
             for row in rows:
                 self.engines[row].session.observer.observe()
@@ -157,7 +157,7 @@ class SessionBatch(CachedViews):
         self._draw([row for row, engine in enumerate(self.engines) if engine.has_begun])
 
     def _draw(self, rows: Sequence[int]) -> None:
-        """Draws the pictures of some sessions, if they have cameras."""
+        """Draws the pictures of the given sessions, if they have cameras."""
         if not self.pictures or not rows:
             return
         self._show(rows[0])  # here: threads would compile one after another

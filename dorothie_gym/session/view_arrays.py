@@ -107,7 +107,7 @@ def _named(kind: type[_Named], arrays: Arrays) -> _Named:
 
 
 class RoleArrays(CachedViews):
-    """Observations and action masks of some sessions, by role: arrays with a row for each session, and their texts.
+    """Observations and action masks of sessions, by role: arrays with a row for each session, and their texts.
 
     Attributes:
         observations: buffers of the numbers in the observations.

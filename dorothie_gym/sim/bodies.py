@@ -162,7 +162,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         self._plan(lanes)
 
     def _plan(self, lanes: Sequence[int]) -> None:
-        """Follows some lanes, each a continuation of the one before, and plans on from there."""
+        """Follows the given lanes, each a continuation of the one before, and plans on from there."""
         town, record = town_arrays(self.road.network), self.record
         moves_on = lanes[0] != record.plan[0]
         record.plan[: len(lanes)] = lanes

@@ -364,7 +364,7 @@ def _fill_lanes(
     town: TownArrays, world: WorldArrays, lanes: NDArray[np.int64], stations: Array, rideable: NDArray[np.bool_],
     cycles: NDArray[np.bool_], shares: Array, pool: NDArray[np.int64],
 ) -> int:  # fmt: skip
-    """Adds vehicles at the first free ones of some places; returns how many.
+    """Adds vehicles at the first free ones of the given places; returns how many.
 
     Args:
         town: arrays of the town.

@@ -65,7 +65,7 @@ def weighted_sentences() -> Iterator[tuple[list[str], float]]:
 
 
 def build_language(dictionary: Path, phonemes: Callable[[str], str]) -> SpokenLanguage:
-    """Returns the language model and dictionary; takes some seconds.
+    """Returns the language model and dictionary; takes a few seconds.
 
     Args:
         dictionary: CMU's dictionary.

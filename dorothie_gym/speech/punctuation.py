@@ -100,7 +100,7 @@ class PunctuationModel:
     def _extend(
         self, following: dict[tuple[str, str], _Path], ends: tuple[str, str], path: _Path, added: Sequence[str]
     ) -> None:
-        """Adds a path that is continued by some tokens, if it is the best one to its last two tokens."""
+        """Adds a path continued by the given tokens, if it is the best path that ends in its last two tokens."""
         (first, second), (score, tokens) = ends, path
         for token in added:
             score += self.trigrams.log_probability(first, second, token)

@@ -82,7 +82,7 @@ class _Run:
         }
 
     def play(self, decisions: int) -> list[ActionDict]:
-        """Plays some decisions; returns the actions of the checked policy."""
+        """Plays a number of decisions; returns the actions of the checked policy."""
         actions_of_policy: list[ActionDict] = []
         for _ in range(decisions):
             if not self._env.agents:

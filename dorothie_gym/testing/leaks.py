@@ -48,7 +48,7 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
 
     Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
     equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,
-    everything is compared until the first decision at which one is in view; afterwards, the Co-Wizard and the car may know it.
+    everything is compared until one is in view for the first time; afterwards, the Co-Wizard and the car may know it.
 
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and

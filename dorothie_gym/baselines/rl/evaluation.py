@@ -133,7 +133,7 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
 
 
 def play_singles(make: MakeEnv, act: Act, episodes: int, seed: int) -> Episodes:
-    """Plays the episodes of `evaluate_policy` in some single environments."""
+    """Plays the episodes of `evaluate_policy` in single environments."""
     envs = [make() for _ in range(min(PARALLEL_EPISODES, episodes))]
     outcomes = Episodes.of(episodes)
     playing = dict(enumerate(range(len(envs))))  # environment: episode

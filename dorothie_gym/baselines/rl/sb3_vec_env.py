@@ -104,14 +104,14 @@ class NativeVecEnv(VecEnv):
         return hasattr(self.env, attr_name)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Returns an attribute of the vector environment for each of some environments."""
+        """Returns an attribute of the vector environment for each of the given environments."""
         return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Sets an attribute of the vector environment, which all environments share.
 
         Raises:
-            ValueError: it is to be set for some environments only.
+            ValueError: it is to be set for a part of the environments only.
         """
         if indices is not None and len(list(self._get_indices(indices))) != self.num_envs:
             raise ValueError(f"{attr_name} is one attribute of all {self.num_envs} environments; set it for all")
@@ -120,7 +120,7 @@ class NativeVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls a method of the vector environment once, and returns the results of some environments.
+        """Calls a method of the vector environment once, and returns the results of the given environments.
 
         The method has to return one result for each environment, as `action_masks` does.
         """
@@ -141,7 +141,7 @@ class NativeVecEnv(VecEnv):
 
 
 def unrelated_seeds(seed: int | None, count: int) -> list[int | None]:
-    """Returns the seeds of some environments of a run; runs with neighbouring seeds get different ones."""
+    """Returns the seeds of the given environments of a run; runs with neighbouring seeds get different ones."""
     return [int(number) for number in np.random.SeedSequence(seed).generate_state(count)]
 
 

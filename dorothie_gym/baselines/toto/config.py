@@ -222,7 +222,7 @@ class TOTOConfig(HistorySizes):
         return BatchSpec(**{name: getattr(self, name) for name in HISTORY}, strict=self.strict)
 
     def without(self, *channels: Channel) -> Self:
-        """Returns the config without some inputs."""
+        """Returns the config without the given inputs."""
         return replace(self, channels=tuple(channel for channel in self.channels if channel not in channels))
 
     def only(self, channels: Iterable[Channel]) -> Self:

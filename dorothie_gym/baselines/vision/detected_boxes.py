@@ -201,7 +201,7 @@ class DetectedBoxes:
     def _found_at(
         self, records: Sequence[int], pictures: RecordedPictures, frames: NDArray[np.int64]
     ) -> tuple[list[Rows], NDArray[np.float16]]:
-        """Returns the detections in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
+        """Returns the detections in the pictures of records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
         reader, detector = self._models
         drawn, views = [], []
         for record in records:

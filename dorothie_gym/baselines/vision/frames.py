@@ -258,7 +258,7 @@ class FrameSet:
         return int(self._ends[-1]) if len(self._ends) else 0
 
     def take(self, rows: Sequence[int]) -> Pictures:
-        """Returns some pictures."""
+        """Returns the pictures at the given positions."""
         places = [self._place(row) for row in rows]
         return Pictures(
             np.stack([session.rgb[k] for session, k in places]),

@@ -69,7 +69,7 @@ class ObjectLearner(Learner):
         return [(others, 1.0), (backbone, self.config.backbone_rate)]
 
     def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
-        """Returns the mean loss of some training pictures, half of them mirrored, enlarged parts of the whole."""
+        """Returns the mean loss of the given training pictures, half of them mirrored, enlarged parts of the whole."""
         pictures = self._training.take(rows)
         rgb, depth, semantic = inputs(pictures, self.device)
         images, wanted = [], []

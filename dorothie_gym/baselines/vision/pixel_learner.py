@@ -42,7 +42,7 @@ class PixelLearner(Learner):
         return len(self._training)
 
     def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
-        """Returns the mean loss of some training pictures, half of them mirrored."""
+        """Returns the mean loss of the given training pictures, half of them mirrored."""
         rgb, semantic, depth = labelled(self._training.take(rows), self.device)
         if epoch < self.config.coarse_epochs:
             rgb, semantic, depth = F.avg_pool2d(rgb, 2), semantic[:, ::2, ::2], depth[:, ::2, ::2]

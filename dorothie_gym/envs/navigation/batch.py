@@ -67,7 +67,7 @@ class DrivingBatch(DrivingRows):
         return super().nbytes + (0 if self._cameras is None else self._cameras.nbytes)
 
     def _draw(self, numbers: Sequence[int]) -> None:
-        """Draws the pictures of some environments, if they observe any."""
+        """Draws the pictures of the given environments, if they observe any."""
         if self._cameras is not None:
             self._cameras.draw(self, numbers, self._pool)
 
@@ -114,7 +114,7 @@ class DrivingBatch(DrivingRows):
     # --- A decision ---------------------------------------------------------------------------------------------------
 
     def play(self, actions: NDArray[np.generic] | int, playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in some environments.
+        """Steps the given environments by one decision.
 
         Args:
             actions: `NavigationAction` of each environment (n,), or throttle, steering and brake of each (n, 3).

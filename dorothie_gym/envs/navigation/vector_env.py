@@ -198,7 +198,7 @@ class DrivingVectorEnv(
                     self._views[number].note(*self._places[number])
 
     def _note(self, batch: DrivingBatch, members: NDArray[np.int64], rows: slice | list[int] = slice(None)) -> None:
-        """Copies the outcomes of some rows of a batch, by default of all."""
+        """Copies the outcomes of the given rows of a batch, by default of all."""
         outcomes, changed = batch.outcomes[rows], members[rows]
         numbers = slice(None) if len(changed) == self.num_envs else changed
         self._observations[numbers] = batch.observations[rows]

@@ -98,7 +98,7 @@ class Estimate:
 
 
 def half_width(values: list[float]) -> float | None:
-    """Returns half the width of the 95 % interval of the mean of some numbers; None with fewer than two.
+    """Returns half the width of the 95 % interval of the mean of numbers; None with fewer than two.
 
     t(0.975, n - 1) x standard deviation (n - 1) / sqrt(n).
     """

@@ -24,7 +24,7 @@ _Key = TypeVar("_Key", Role, Loudness, WordClass)
 
 @dataclass
 class WordErrors:
-    """Errors in the words of some utterances.
+    """Errors in the words of utterances.
 
     Attributes:
         words: number of words that were spoken.
@@ -105,7 +105,7 @@ def _classified(text: str) -> tuple[list[str], list[WordClass]]:
 
 @dataclass
 class WordErrorCounts:
-    """Word errors of some sessions.
+    """Word errors of sessions.
 
     Attributes:
         speakers: errors by speaker.

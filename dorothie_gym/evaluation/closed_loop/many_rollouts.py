@@ -59,7 +59,7 @@ def roll_out_all(
 
 
 def _finished(folder: Path, settings: RolloutSettings) -> RolloutResult | None:
-    """Returns the result in a folder if it is that of a whole rollout with some settings, without errors."""
+    """Returns the result in a folder if it is that of a whole rollout with the given settings, without errors."""
     if not (folder / RESULT_FILE).is_file():
         return None
     result = read_result(folder)

@@ -74,7 +74,7 @@ class RolloutRow:
 
 @dataclass(frozen=True, kw_only=True)
 class RolloutTable:
-    """Metrics over some sessions of a rollout.
+    """Metrics over sessions of a rollout.
 
     Attributes:
         sessions: number of sessions.
@@ -90,7 +90,7 @@ class RolloutTable:
 
     @classmethod
     def of(cls, rows: Sequence[RolloutRow]) -> RolloutTable:
-        """Returns the table of some rows."""
+        """Returns the table of the given rows."""
         records = [row.record for row in rows if row.record is not None]
         return cls(
             sessions=len(rows),

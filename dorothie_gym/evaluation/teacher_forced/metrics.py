@@ -31,7 +31,7 @@ PredictionsT = TypeVar("PredictionsT", ActPredictions, ActionPredictions)
 
 
 class Metric(ABC, Generic[PredictionsT, PointT]):
-    """Metric of the predictions at some points.
+    """Metric of predictions.
 
     Attributes:
         name: name of the metric in tables.

@@ -170,7 +170,7 @@ class _Constant:
 
 
 def _rows(inputs: Any, rows: NDArray[np.bool_]) -> Any:
-    """Returns some rows of a dense or sparse matrix."""
+    """Returns the given rows of a dense or sparse matrix."""
     return inputs[np.flatnonzero(rows)]
 
 

@@ -88,7 +88,7 @@ Spans: TypeAlias = tuple[SpanMark, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """New marks of some utterances, exchanges and transactions, which replace the former ones.
+    """New marks of utterances, exchanges and transactions, which replace the previous ones.
 
     Attributes:
         utterances: spans by utterance.

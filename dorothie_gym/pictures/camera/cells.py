@@ -79,7 +79,7 @@ def sorted_by_cell(mesh: Mesh, size: float = CELL) -> tuple[Mesh, CellTable, NDA
 
 
 def new_order(cells: CellTable, width: int, height: int) -> CellOrder:
-    """Returns scratch space for some cells and a picture."""
+    """Returns scratch space for the given number of cells and a picture."""
     count, rows, columns = len(cells.ranges), -(-height // TILE), -(-width // TILE)
     return CellOrder(
         np.zeros(_RINGS + 1, np.int32),

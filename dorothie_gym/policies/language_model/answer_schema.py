@@ -29,7 +29,7 @@ _WORDS: Final = "[A-Za-z0-9 ,.?!':;()-]"
 
 @dataclass(frozen=True, kw_only=True)
 class ChoiceField:
-    """Field that takes one of some labels; the first is the default of an answer without the field."""
+    """Field that takes one of the given labels; the first is the default of an answer without the field."""
 
     name: str
     labels: tuple[str, ...]

@@ -97,7 +97,7 @@ class RoleInterface(ABC, Generic[M]):
     patience: ClassVar[float] = 1.0
 
     def __init__(self, limits: SpaceLimits) -> None:
-        """Prepares the interface for spaces of some sizes."""
+        """Prepares the interface for spaces of given sizes."""
         self.limits = limits
 
     @property

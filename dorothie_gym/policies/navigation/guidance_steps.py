@@ -216,7 +216,7 @@ def _note_roadblocks(graph: RoutingGraph, search: RouteSearch, guide: Instructor
 
 @compiled
 def _place_on(graph: RoutingGraph, lanes: NDArray[np.int32], count: int, x: float, y: float) -> tuple[int, float]:
-    """Returns the first of some lanes on which a point lies (-1: none), and the distance along it [m]."""
+    """Returns the first of the given lanes on which a point lies (-1: none), and the distance along it [m]."""
     points = graph.points
     for n in range(count):
         best, at, share = math.inf, 0, 0.0

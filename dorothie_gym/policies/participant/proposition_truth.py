@@ -30,7 +30,7 @@ ARRIVED_WITHIN: Final = 2.0
 
 
 def has_just_finished(state: ParticipantState, view: ParticipantView, landmarks: Collection[object]) -> bool:
-    """Returns whether the errand at one of some landmarks was done a moment ago."""
+    """Returns whether the errand at one of the given landmarks was done a moment ago."""
     place, at = state.task.finished
     return place in landmarks and view.time - at <= JUST_DONE
 

@@ -69,7 +69,7 @@ class WorldRows:
                 world.actors.arrays = new
 
     def step(self, rows: Sequence[int], frames: int) -> list[list[WorldEvent]]:
-        """Runs some worlds for a number of physics frames, as `World.step`; returns the events of each."""
+        """Runs the given worlds for a number of physics frames, as `World.step` does; returns the events of each."""
         worlds = [world for world in map(self._worlds.__getitem__, rows) if world is not None]
         playing = np.zeros(len(self._batch), dtype=np.bool_)
         playing[list(rows)] = True

@@ -175,7 +175,7 @@ def may_change_cruise(cruise: float, up: bool) -> bool:
 
 
 def is_past_stopping(speed: float, room: float) -> bool:
-    """Returns whether a moving ego cannot stop within some room [m] any more, at a speed [m/s]."""
+    """Returns whether a moving ego can no longer stop within a distance [m], at a speed [m/s]."""
     return speed > EGO_MOVING and speed * speed / (2 * HARD_STOP) > room
 
 

@@ -200,7 +200,7 @@ def _beside(points: Array, lane: LaneRecord) -> Array | None:
 
 
 def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Array:
-    """Returns the rows of `_beside` at some stations, to the right of a lane (side 1) or to the left (-1)."""
+    """Returns the rows of `_beside` at the given stations, to the right of a lane (side 1) or to the left (-1)."""
     own = points[lane.first : lane.last + 1]
     x, y, heading, height, width = (np.interp(stations, own[:, 2], own[:, k]) for k in (0, 1, 3, 4, 5))
     lateral = side * (width / 2 + KERB)

@@ -88,7 +88,7 @@ class TownArrays(NamedTuple):
         exits: exits from the ends of lanes.
         lane_lists: int32 lists of lanes, see `ways`.
         flat: whether all lanes are so level that heights do not matter.
-        wide: whether some lane is wider than `WIDE_LANE`.
+        wide: whether any lane is wider than `WIDE_LANE`.
     """
 
     points: Array

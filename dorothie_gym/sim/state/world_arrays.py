@@ -211,7 +211,7 @@ def empty_world(
     seed: int | np.random.SeedSequence = 0,
     driven: bool = False,
 ) -> WorldArrays:
-    """Returns an empty world with room for some bodies.
+    """Returns an empty world with room for the given number of bodies.
 
     Args:
         town: arrays of the town.

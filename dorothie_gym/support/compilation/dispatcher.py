@@ -399,7 +399,7 @@ class CompiledFunction(CPUDispatcher):
         return isinstance(self._cache, ContentCache) and not self._cache.is_empty()
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Returns the signature of the part that compiled code calls with arguments of some types."""
+        """Returns the signature of the part that compiled code calls with arguments of the given types."""
         pysig, args = self._compiler.fold_argument_types(args, kws)
         args = tuple(_widest(types.unliteral(kind)) for kind in args)
         part = self._part(args)

@@ -132,7 +132,7 @@ def filled_records(kind: type[Record], rows: Sequence[tuple[object, ...]]) -> Re
 
 
 def argument(records: RecordArray[Record]) -> RecordArray[Record]:
-    """Returns the same records as an array that calls of compiled functions from Python pass several times faster."""
+    """Returns the same records as an array that Python passes to compiled functions several times faster."""
     return cast("RecordArray[Record]", np.ndarray.view(cast("NDArray[np.void]", records), np.ndarray))
 
 
@@ -143,7 +143,7 @@ def plain(records: RecordArray[Record]) -> NDArray[np.void]:
 
 
 def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
-    """Returns some fields of the first record as an array without axes, to be read or written at once in Python.
+    """Returns fields of the first record as an array without axes, which Python can read or write at once.
 
     ``fields(...).item()`` is a tuple of plain numbers, and ``fields(...)[()] = numbers`` takes one, either in about the
     time that a single field of `plain` takes.

@@ -50,7 +50,7 @@ class CoWizardLayout:
 
     @classmethod
     def of(cls, remarks: int) -> CoWizardLayout:
-        """Returns the layout of this version for a vocabulary of some size."""
+        """Returns the layout of this version for a vocabulary of a given size."""
         return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, place=PLACE_SIZE, command=COMMAND_SIZE, remarks=remarks)
 
 

@@ -32,7 +32,7 @@ class Rows(Protocol):
         ...
 
     def rows(self, numbers: Tensor) -> Self:
-        """Returns the examples with some numbers (n,)."""
+        """Returns the examples with the given numbers (n,)."""
         ...
 
 
@@ -55,7 +55,7 @@ def fit(
     Args:
         network: the network; it is changed.
         examples: examples.
-        loss_of: loss of the network in some examples.
+        loss_of: loss of the network in the given examples.
         epochs: number of passes.
         seed: seed of their order.
         on_epoch: called after each epoch.

@@ -46,7 +46,7 @@ class LearnedRole(Generic[Network, Batch, Example, Settings]):
     Attributes:
         files: files and network of its models.
         examples: class of its examples.
-        loss: loss of a network in some examples [nats].
+        loss: loss of a network in the given examples [nats].
         follow: simulates a recorded session again, and hands on the examples of the role.
         practise: plays the session of a seed, in which a network with a vocabulary and the teacher act in turns, and
             hands on the teacher's decisions.

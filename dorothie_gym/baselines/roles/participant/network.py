@@ -41,7 +41,7 @@ class ParticipantLayout:
 
     @classmethod
     def of(cls, remarks: int) -> ParticipantLayout:
-        """Returns the layout of this version for a vocabulary of some size."""
+        """Returns the layout of this version for a vocabulary of a given size."""
         return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, errand=ERRAND_SIZE, remarks=remarks)
 
 

@@ -150,20 +150,20 @@ class SessionWorld:
         return weather.visibility(lights=self.lights_on(time), clarity=clarity).sight
 
     def distance_of(self, time: float, kinds: Sequence[ActorKind]) -> float:
-        """Returns the distance of the nearest recorded actor of some kinds at a time [m]; infinity if there is none."""
+        """Returns the distance of the nearest recorded actor of the given kinds at a time [m]; infinity without one."""
         return float(self._distances(time, kinds).min(initial=math.inf))
 
     def count_near(self, time: float, kinds: Sequence[ActorKind], distance: float) -> int:
-        """Returns the number of recorded actors of some kinds within a distance at a time [m, s]."""
+        """Returns the number of recorded actors of the given kinds within a distance at a time [m, s]."""
         return int((self._distances(time, kinds) <= distance).sum())
 
     def _distances(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
-        """Returns the distances of the recorded actors of some kinds (n,) [m]."""
+        """Returns the distances of the recorded actors of the given kinds (n,) [m]."""
         offsets = self._offsets(time, kinds)
         return np.hypot(offsets[:, 0], offsets[:, 1])
 
     def _offsets(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
-        """Returns the positions of the recorded actors of some kinds relative to the car (n, 2) [m]."""
+        """Returns the positions of the recorded actors of the given kinds relative to the car (n, 2) [m]."""
         table = self.session.scene.actors
         place = bisect.bisect_right(table.frames.tolist(), round(time * FRAME_RATE)) - 1
         if place < 0:
@@ -174,7 +174,7 @@ class SessionWorld:
         return np.column_stack((rows["x"] - x, rows["y"] - y)).astype(np.float64)
 
     def is_ahead(self, time: float, kinds: Sequence[ActorKind], distance: float, angle: float) -> bool:
-        """Returns whether a recorded actor of some kinds is in front of the car at a time [s].
+        """Returns whether a recorded actor of the given kinds is in front of the car at a time [s].
 
         Args:
             time: [s].
@@ -187,7 +187,7 @@ class SessionWorld:
         return bool(((np.hypot(*offsets.T) <= distance) & (angles <= angle)).any())
 
     def hazards(self, time: float, around: float) -> set[str]:
-        """Returns the labels of the objects that the car brakes for within some seconds of a time [s]."""
+        """Returns the labels of the objects that the car brakes for within a few seconds of a time [s]."""
         found: set[str] = set()
         for begun, ended, reason in self._hazards:
             if begun - around <= time <= ended + around:
@@ -263,7 +263,7 @@ class SessionWorld:
         return True if done else None if near and self.stands(time) else False
 
     def told_to(self, time: float, action: ActionValue, within: float) -> bool:
-        """Returns whether the participant has named an action within some seconds before a time [s]."""
+        """Returns whether the participant has named an action in the last seconds before a time [s]."""
         return any(
             action in move.act.slots and 0.0 <= time - move.end <= within
             for move in self.session.moves(Role.PARTICIPANT)

@@ -205,7 +205,7 @@ class IncrementalColumns:
 
 
 def trajectory_at_tenths(frames: Sequence[ObservedFrame]) -> Trajectory:
-    """Returns the rows of the trajectory between the first and the last of some frames, ten a second.
+    """Returns the rows of the trajectory between the first and the last of the given frames, ten a second.
 
     Positions and speeds are interpolated; the lane is that of the nearer frame. As in a recording, nothing precedes the
     first tenth of a second.
@@ -241,7 +241,7 @@ def _headings(wanted: NDArray[np.int64], known: NDArray[np.int64], heading: NDAr
 
 
 def _surroundings(looks: Sequence[ObservedFrame]) -> Surroundings:
-    """Returns the surroundings at some frames (at least one) as they are recorded."""
+    """Returns the surroundings at the given frames (at least one) as they are recorded."""
     frames = np.array([each.frame for each in looks], dtype=np.int64)
 
     def table(rows: Sequence[Rows]) -> SceneTable:

@@ -186,7 +186,7 @@ def _sidewalk_samples(town: Town) -> TownSamples:
 
 
 class _Lanes:
-    """Samples of some lanes or pavements with their slopes."""
+    """Samples of lanes or pavements with their slopes."""
 
     def __init__(self, samples: TownSamples, keep: NDArray[np.bool_]) -> None:
         slope = np.zeros(len(keep))
