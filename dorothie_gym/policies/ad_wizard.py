@@ -125,7 +125,7 @@ SAME_PROP = 3.0
 """Distance within which a prop is recognized as the one placed [m]."""
 
 MOST_TRICKS = 4
-"""Largest average number of tricks in a session that can be asked for."""
+"""Largest average number of tricks per session that can be set."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +152,7 @@ class AdWizardState:
         seed: seed of all random draws.
         town: the map.
         config: tunable numbers.
-        planned: tricks to come.
+        planned: remaining tricks.
         count: number of decisions taken.
         restorations: changes to be undone.
         roadblocks: number of roadblocks placed.
@@ -222,7 +222,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 
     Of a storyboard that is not shipped, it plays every change of the task that the storyboard marks.
 
-    Every change of a task comes with the message that the storyboard gives, or with one made of its texts. Bad weather
+    Every change of a task is announced by the message in the storyboard, or by one composed of its texts. Bad weather
     clears up, and roadblocks are removed after a while.
 
     Attributes:
@@ -288,7 +288,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 def idle_until(policy: ScriptedAdWizard, state: AdWizardState, story: str) -> float:
     """Returns the earliest time at which the next step may do more than count a decision [s].
 
-    A caller that knows that the time has not come need not observe: `state.advanced()` is the state after the step.
+    Before that time a caller need not observe: `state.advanced()` is the state after the step.
 
     Args:
         policy: the policy.

@@ -1,10 +1,10 @@
-"""Feasibility of manoeuvres as far as a role's observation shows.
+"""Feasibility of manoeuvres, judged from a role's observation.
 
 Policies that need to know which actions the car would accept read the engine's mask (`Policy.reads_mask`). The
 functions here
 are for roles that decide by their own belief: the scripted Co-Wizard, whose refused commands are part of the recorded
 sessions, and drivers that are trained and measured with an estimated mask. The engine knows the planned path and the
-true place of the car; its mask differs where the pose is inaccurate, a manoeuvre is under way, or a roadblock leaves
+true place of the car; its mask differs where the pose is inaccurate, a manoeuvre is in progress, or a roadblock leaves
 too little room.
 """
 

@@ -31,8 +31,8 @@ class Standstill:
     Attributes:
         since: start of the current standstill [s]; None while the car moves.
         until: end of the last standstill [s].
-        reason: why the car stands, or stood last, as far as that is known.
-        reason_since: time since which it has stood for this reason [s].
+        reason: why the car stands, or last stood; None if unknown.
+        reason_since: start of the standstill for this reason [s].
     """
 
     since: float | None = 0.0
@@ -67,11 +67,11 @@ class CoWizardKnowledge:
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
         halted: whether the car is to stand.
         arrived: whether the car has stopped at its goal and waits for the next task.
-        sent_on: whether the car has only stopped where it was told to drive to, which may be the goal.
+        sent_on: whether the stop ends a short advance on request, at a place that may be the goal.
         pausing: whether the car stops before the junction ahead until the way is known.
-        directed: whether a turn that the participant asked for is ahead.
-        to_turn_round: whether a U-turn that the participant asked for has not begun yet.
-        asks_for_detour: whether a question about a way round an obstacle is open.
+        directed: whether a turn that the participant requested is ahead.
+        to_turn_round: whether a U-turn that the participant requested has not begun yet.
+        asks_for_detour: whether a question about a detour around an obstacle is open.
         blocked_at: time at which an obstacle across the road was last found [s].
         told_to_stop_at: time of the last instruction to stop [s].
         stop_reason: why the car stopped on that instruction.

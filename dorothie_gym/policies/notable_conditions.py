@@ -157,7 +157,7 @@ def notice(
         objects: objects in sight.
         rng: random generator of the decision.
         chance: probability that a noticed condition is mentioned.
-        handled: parameters whose beginning the agent reacts to elsewhere.
+        handled: parameters whose onset the agent reacts to elsewhere.
 
     Returns: The remark, or None, and the noticed conditions.
     """

@@ -26,7 +26,7 @@ class Directions(enum.StrEnum):
     LANDMARKS = "landmarks"
     """By visible objects along the route and at the goal."""
     VAGUE = "vague"
-    """Late and without details, so that the car has to ask."""
+    """Gives directions late and without details, so that the car must ask."""
 
 
 class Driving(enum.StrEnum):
@@ -52,7 +52,7 @@ class Persona:
         attention: attention to weather, crowds and the route; below `INATTENTIVE`, the speaker makes no remarks on
             them.
         humour: amount of small talk.
-        directions: way of giving directions (participant).
+        directions: style of giving directions (participant).
         driving: driving style (Co-Wizard).
         pace: speaking rate relative to the average.
         gap: median of the time before a reply [s].
@@ -158,7 +158,7 @@ _TIMES: Final[Mapping[str, tuple[float, float, float, float]]] = MappingProxyTyp
         "reaction": (0.75, 0.2, 0.5, 1.4),
     }
 )
-"""Median, spread of the logarithm between speakers, minimum and maximum value of the traits with a unit."""
+"""Median, spread of the logarithm between speakers, minimum and maximum of the traits with a unit."""
 
 _NAMED: Final[Mapping[str, type[enum.StrEnum]]] = MappingProxyType({"directions": Directions, "driving": Driving})
 
@@ -202,7 +202,7 @@ def _range(name: str, text: str) -> tuple[float, float]:
 
 
 def within(low: float, high: float, trait: float, rng: np.random.Generator) -> float:
-    """Returns a value of a range at the place of a trait, three quarters of it; the rest is the speaker's own."""
+    """Returns a value in a range, determined to three quarters by a trait and otherwise by the individual speaker."""
     return low + (high - low) * (0.75 * trait + 0.25 * float(rng.random()))
 
 

@@ -1,10 +1,10 @@
 """Contract of a policy: a stateless object whose memory is passed in and handed back, so that replay is exact.
 
-A policy plays one role. Whoever plays a session (`evaluation/rollout/play.py`, the console, a user's loop) asks each
-role's policy for an action at each decision and gives all three to the engine. Scripted, learned and language-model
-policies fill the same contract; `policies/policy_loader.py` finds them by name.
+A policy plays one role. The code that runs a session (`evaluation/rollout/play.py`, the console, a user's loop) asks
+each role's policy for an action at each decision and gives all three to the engine. Scripted, learned and
+language-model policies fulfil the same contract; `policies/policy_loader.py` finds them by name.
 
-Last of the five files that explain the package. The ways in docs/architecture.md lead on from here.
+Last of the five files that explain the package. docs/architecture.md continues with paths through the code.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ def needs_switch(
     blocked: RecordArray[PlaceRecord],
     places: int,
 ) -> bool:
-    """Returns whether a lane change before a junction has to be commanded apart from the turn.
+    """Returns whether a lane change before a junction must be commanded apart from the turn.
 
     Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its own
     lane and end up next to a goal right after the junction.

@@ -123,7 +123,7 @@ def default_lane_distance(town: Town, here: Place, place: Place, distance: float
 
 
 def default_lane_place(town: Town, here: Place, distance: float) -> Place:
-    """Returns the place some way ahead [m] on the default lanes; the end of the last lane before a junction."""
+    """Returns the place at a distance ahead [m] on the default lanes, or the end of the last lane before a junction."""
     lane, station = here
     lanes, left = lanes_ahead(town, lane, station, distance), station + distance
     for passed in lanes[:-1]:
@@ -316,7 +316,7 @@ class RouteProgress:
         return None
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: RouteJunction) -> bool:
-        """Returns whether a lane change before a junction has to be commanded apart from the turn.
+        """Returns whether a lane change before a junction must be commanded apart from the turn.
 
         Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its
         own lane and end up next to a goal right after the junction.
@@ -341,7 +341,7 @@ class RouteProgress:
 
 
 MOST_AVOIDED = 3
-"""Maximum number of places that are excluded after misses; more would close a road of several lanes altogether."""
+"""Maximum number of places that are excluded after misses; more could close all lanes of a road."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -362,7 +362,7 @@ class RouteState:
 
     @property
     def to_goal(self) -> RouteProgress:
-        """Progress on the route, for what is done on a route only; raises `PolicyStateError` without one."""
+        """Progress on the route, for code that requires a route; raises `PolicyStateError` without one."""
         if self.progress is None:
             raise PolicyStateError("the agent has no route: it was given no place to go to, or gave it up")
         return self.progress
@@ -425,5 +425,5 @@ def first_new_street(
 
 
 def streets_named(street_names: Iterable[int], name: StreetName) -> frozenset[int]:
-    """Returns the indices of the streets of a name."""
+    """Returns the indices of the streets with a name."""
     return frozenset(k for k, value in enumerate(street_names) if int(value) == name.value)

@@ -96,7 +96,7 @@ def intend(
 
     Args:
         function: communicative function of the content.
-        content: proposition that is stated, asked, requested or answered; None where there is no content.
+        content: proposition that is stated, asked, requested or answered; None without content.
         also: further contents of the same span: "forget KFC, go to Ikea".
         elided: arguments of the contents that are left out of the words.
         wording: further particulars for the words; where no topic is given it is the predicate of the content, with
@@ -233,8 +233,8 @@ class SpeechState:
         Args:
             now: time [s].
             acts: acts of the utterance.
-            rng: source of the gap before a reply; None if there is none.
-            late: time for which the utterance has been over, as far as is known [s].
+            rng: generator of the gap before a reply; None for no gap.
+            late: time since the utterance ended, if known [s].
         """
         gap = self.delivery.draw_gap(rng) if rng is not None else 0.0
         values = frozenset(value for act in acts for value in act.slots)
@@ -301,7 +301,7 @@ class SpeechState:
         return (self.asked_back if self.has_just_spoken(now, IN_A_ROW) else 0) + 1
 
     def _punctuated(self, queue: Sequence[Remark], continues: bool) -> str:
-        """Returns the words of the next remark with the capital and the comma that its neighbours want."""
+        """Returns the words of the next remark with the capital and the comma that its neighbours require."""
         text = queue[0].text
         begins = not continues or (self.last is not None and self.last.text.endswith((".", "?")))
         if begins and self.style is not None and self.style.proper:

@@ -27,7 +27,7 @@ class Delivery:
         pace: speaking rate relative to `WORDS_PER_SECOND`.
         gap: median of the time between the other's last word and the speaker's first one [s]; 0 replies at once.
         pause: median of the silence between two utterances of the speaker [s].
-        patience: silence after a move that wants an answer [s].
+        patience: silence after a move that requires an answer [s].
     """
 
     pace: float = 1.0

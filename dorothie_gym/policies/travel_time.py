@@ -15,7 +15,7 @@ from dorothie_gym.policies.route_progress import RouteProgress
 # Of 408 times in 20 of these sessions, 83 % are right within a factor of 1.5, with a median ratio of 0.96.
 _PACE: Final = 10.3  # speed between junctions [m/s]
 _APPROACH: Final = 1.2  # time lost before a junction [s]
-_CROSSING, _CROSSING_PACE = 2.3, 20.6  # time in a junction [s], and what its length adds [m/s]
+_CROSSING, _CROSSING_PACE = 2.3, 20.6  # constant time in a junction [s], and speed for its length [m/s]
 _TURNING_ROUND: Final = 8.0  # time lost in a U-turn [s]
 _DELAYS: Final = (0.8, 0.9, 1.0, 1.1, 1.2)  # factors on the time of driving, equally probable
 _SETTING_OFF: Final = 2.0  # from a standstill, also before a light that turns green [s]
@@ -26,7 +26,7 @@ _LONGEST_RED: Final = 120.0  # [s]
 def travel_time(town: Town, progress: RouteProgress, station: float, now: float, speed: float) -> float:
     """Returns the expected time until the car stops at the goal of a route [s]; infinity without a route.
 
-    The car waits at the lights that are red when it reaches them: navigation systems are told of their programmes. As
+    The car waits at the lights that are red when it reaches them: navigation systems know their programmes. As
     it may just miss a green light, or just catch it, the time is the mean of those of quicker and slower drives.
 
     Args:

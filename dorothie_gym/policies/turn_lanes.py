@@ -1,4 +1,4 @@
-"""Turn lanes: lanes that end at a junction with a single exit, while the lanes beside them lead other ways.
+"""Turn lanes: lanes that end at a junction with a single exit, while the lanes beside them lead elsewhere.
 
 A lane before a junction offers a choice where it has several exits. On roads with turn lanes, the lane decides, so that
 "turn left" refers to such a junction as well.

@@ -229,7 +229,7 @@ def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence
 
 
 def _holds(path: Path, wanted: Sequence[bytes]) -> bool:
-    """Returns whether a file contains any of the given texts; False for an unreadable file, which other checks report."""
+    """Returns whether a file contains any of the given texts; False if it is unreadable, which other checks report."""
     longest, rest = max(map(len, wanted), default=0), b""
     with contextlib.suppress(OSError), path.open("rb") as file:
         while part := file.read(_CHUNK):

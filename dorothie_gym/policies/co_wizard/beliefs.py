@@ -25,7 +25,7 @@ class BeliefState:
         plan: junctions of the route as sent in the last plan update.
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
         updates: belief updates (mental actions) to be sent, the next first.
-        told: purposes of errands that the participant has stated, the latest last.
+        told: purposes of errands that the participant has stated, most recent last.
         sent_goal: landmark of the last goal update with a guessed place.
         owner: person whose house is the goal, according to the participant; None if it is not a house, or a house
             without a named owner.
@@ -104,7 +104,7 @@ class BeliefState:
         return replace(self, described=True)
 
     def with_place_ruled_out(self) -> BeliefState:
-        """Excludes the current place from the places of its landmark's name."""
+        """Excludes the current place as a candidate for the name of its landmark."""
         return self if self.place is None else replace(self, ruled_out=(*self.ruled_out, self.place))
 
     def without_place(self) -> BeliefState:

@@ -55,7 +55,7 @@ def drive(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _stand(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops a car that has been told to stand."""
+    """Stops a car that is meant to stand."""
     if not state.intentions.halted or view.motion is Motion.STOPPED:
         return None
     return _stop_unless_sent(state, view)
@@ -106,7 +106,7 @@ def distance_ahead(state: CoWizardState, view: CoWizardView, place: Place) -> fl
 
 
 def _carry_out_wish(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Commands the manoeuvre that the participant asked for, as soon as it is possible."""
+    """Commands the manoeuvre that the participant requested as soon as it is feasible."""
     wish = state.intentions.wish
     if wish is None:
         return None
@@ -219,7 +219,7 @@ def wanted_exit(state: CoWizardState, view: CoWizardView) -> Exit | None:
 
 
 def _straight_on(state: CoWizardState, choice: Choice) -> Exit | None:
-    """Returns the way straight on for a guided car that has not asked and got no instruction in time."""
+    """Returns the exit straight on for a guided car that has not asked and received no instruction in time."""
     intentions = state.intentions
     waits = intentions.pausing or intentions.creeping or state.dialogue.asked_lane == choice.lane
     if state.beliefs.goal is None or waits or choice.distance > state.config.straight_on_distance:
@@ -247,7 +247,7 @@ def _turn(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def rest(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Decides, once for each hazard that holds up the car, whether to stop for good meanwhile."""
+    """Decides, once for each hazard that holds up the car, whether to command a stop of limited duration."""
     commands, config = state.commands, state.config
     if view.motion is not Motion.HAZARD or state.standstill.since is None:
         state.commands = commands.with_rest_decided(commands.rest_decided and view.motion is Motion.STOPPED)
@@ -278,7 +278,7 @@ def _rest(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _pause(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops before a junction at which the way has been asked for, until it is known."""
+    """Stops before a junction after asking for the way, until the way is known."""
     intentions = state.intentions
     knows = (
         state.route.progress is not None

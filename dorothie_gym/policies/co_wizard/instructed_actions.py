@@ -40,7 +40,7 @@ Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText
 
 
 def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    """Intends the turn that was asked for."""
+    """Intends the requested turn."""
     streets, junction = act_builders.named_streets(act), junction_meant(state.town, view.here, view.choice)
     directive = Directive(
         direction=words.direction,
@@ -92,7 +92,7 @@ def do_stop(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     state.intentions = state.intentions.started()
-    if view.motion is Motion.WAITING:  # for the way, which the instruction does not tell
+    if view.motion is Motion.WAITING:  # for the way, which the instruction leaves open
         state.dialogue = state.dialogue.asking_way_again()
 
 

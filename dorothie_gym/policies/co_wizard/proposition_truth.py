@@ -48,7 +48,7 @@ def believes(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) ->
 
 
 def distance_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> float | None:
-    """Returns the way to a goal on the map [m]; None without one, or without a route."""
+    """Returns the route length to a goal on the map [m]; None without a goal or route."""
     return None if known.progress is None or not known.goal_is_on_map else known.progress.left(view.station)
 
 

@@ -271,7 +271,7 @@ def _goal_line(view: CoWizardView, navigator: Navigator, goal: str, mark: bool) 
 
 
 def step_words(step: RouteStep, view: CoWizardView, town: Town) -> str:
-    """Returns a step of the route in words, beginning with the label of its action."""
+    """Returns a step of the route in words, starting with the label of its action."""
     where = f"in {step.distance:.0f} m"
     if step.action is PhysicalAction.J_TURN:
         way = next((way for way in town.exits(step.place) if way.angle == step.angle), None)

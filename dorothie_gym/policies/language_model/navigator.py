@@ -161,7 +161,7 @@ class Navigator:
         return self._turn(town, view, crossing)
 
     def _stop(self, town: Town, view: CoWizardView, interval: float, delay: float) -> RouteStep | None:
-        """Returns the stop at the goal if that is ahead on the default lanes and no nearer step is to come before."""
+        """Returns the stop at the goal if it is ahead on the default lanes with no other step before it."""
         if self.goal is None or view.motion is Motion.STOPPED or view.manoeuvring:
             return None
         distance = default_lane_distance(town, view.here, self.goal, STOP_SIGHT)

@@ -120,7 +120,7 @@ class ModelUsage:
 
     @classmethod
     def total(cls, parts: Sequence[ModelUsage]) -> ModelUsage:
-        """Returns the usage of several sessions, at least one, in all; of the first model, by name."""
+        """Returns the total usage of one or more sessions, under the name of the first model."""
         silences: dict[str, int] = {}
         for part in parts:
             for name, count in part.silences.items():

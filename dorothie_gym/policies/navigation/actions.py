@@ -107,7 +107,7 @@ def physical_of(action: NavigationAction, driver: DriverArrays) -> Physical | No
 
 @compiled
 def order_of(driver: DriverArrays, action: int) -> tuple[int, int]:
-    """Returns the `PhysicalAction` that a `NavigationAction` stands for, or 0 for none, and its angle [degrees]."""
+    """Returns the `PhysicalAction` of a `NavigationAction`, 0 if it has none, and its angle [degrees]."""
     order, angle = LANE_FOLLOW, 0
     if action == _NOTHING or prepares(driver, action):
         order = 0

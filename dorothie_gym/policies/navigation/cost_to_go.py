@@ -17,7 +17,7 @@ from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.copying import shared
 
 REACHED_BEHIND = 2.0
-"""Largest distance behind the car at which a goal counts as reached instead of passed [m]."""
+"""Largest distance behind the car at which a goal counts as reached rather than passed [m]."""
 
 ROWS = 512
 """Rows of costs that a process keeps: one takes 4 to 30 KB."""

@@ -146,7 +146,7 @@ def instruct(
 
 @compiled
 def _choose_goal(graph: RoutingGraph, search: RouteSearch, guide: InstructorArrays) -> None:
-    """Keeps the current subgoal while it is open; otherwise chooses the closest one that may be reached now."""
+    """Keeps the current subgoal while it is open; otherwise chooses the closest one that may be done now."""
     route, subgoals = guide.route[0], guide.subgoals
     if route.subgoal >= 0:
         now = subgoals[route.subgoal]
@@ -189,7 +189,7 @@ def _take_route(search: RouteSearch, guide: InstructorArrays) -> None:
 
 @compiled
 def _note_roadblocks(graph: RoutingGraph, search: RouteSearch, guide: InstructorArrays) -> None:
-    """Adds the roadblocks that have come into sight, and plans around them."""
+    """Adds roadblocks that have become visible, and plans around them."""
     view, route = guide.now[0], guide.route[0]
     if view.things == 0:
         return
@@ -276,7 +276,7 @@ def _send_on(waits: bool, distance: float) -> Step:
 
 @compiled
 def _next_step(tables: RouteTables, sectors: NDArray[np.int32], guide: InstructorArrays) -> Step:
-    """Returns the next step on the route if it is near; a stopped car is sent on."""
+    """Returns the next step on the route if it is near; a stopped car is instructed to continue."""
     view, route, legs = guide.now[0], guide.route[0], guide.legs
     if route.astray:
         return _nothing()
@@ -332,7 +332,7 @@ def _stop_after_manoeuvre(guide: InstructorArrays) -> Step:
 
 @compiled
 def _stop_step(guide: InstructorArrays, left: float) -> Step:
-    """Returns a stop in so many metres; a car that stands elsewhere than at the goal is sent on."""
+    """Returns a stop at a distance [m]; a car that stands elsewhere than at the goal is instructed to continue."""
     view, row = guide.now[0], guide.route[0].landmark
     if view.waits:
         return _nothing() if abs(left) <= _ARRIVED_WITHIN else _send_on(True, left)

@@ -50,7 +50,7 @@ class NavigationInstruction:
 
     @property
     def action(self) -> ActionValue | None:
-        """Action asked for."""
+        """Requested action."""
         return next((value for value in self.act.slots if isinstance(value, ActionValue)), None)
 
     @property

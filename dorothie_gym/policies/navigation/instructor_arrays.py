@@ -54,7 +54,7 @@ class ViewRecord:
     station: Float  # place of the car [m]
     speed: Float  # [m/s]
     time: Float  # [s]
-    turning: Float  # remaining length of the lane switch or U-turn under way [m], else 0
+    turning: Float  # remaining length of the lane switch or U-turn in progress [m], else 0
     lane: Int32
     things: Int32  # number of rows of `InstructorArrays.things` in use
     waits: Flag  # whether the car was instructed to stop, and stands
@@ -152,7 +152,7 @@ def instructor_arrays(*, subgoals: int, landmarks: int, streets: int, things: in
         subgoals: most subgoals.
         landmarks: most landmarks.
         streets: most streets.
-        things: most static bodies in sight.
+        things: maximum number of static bodies in sight.
     """
     arrays = InstructorArrays(
         now=argument(empty_records(ViewRecord, 1)),

@@ -170,7 +170,7 @@ def _lanes_by_exits(town: Town) -> dict[tuple[tuple[int, int], ...], list[int]]:
 
 
 def _assign_sectors(angles: dict[int, int]) -> dict[int, int]:
-    """Assigns a sector to each road by the angle of its exit, best fit first; roads beyond the eighth get none."""
+    """Assigns a sector to each road by the angle of its exit, in order of fit; roads beyond the eighth get none."""
     count = len(SECTORS)
 
     def misfit(road: int, sector: int) -> float:

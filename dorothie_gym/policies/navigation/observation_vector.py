@@ -69,7 +69,7 @@ DISTANCE_UNIT = 100.0
 """Unit of distances to junctions, instructions and hazards [m]."""
 
 CLOSE_UNIT = 10.0
-"""Second, finer unit of distances that have to be met to the metre [m]."""
+"""Second, finer unit for distances that matter to the metre [m]."""
 
 DETOUR_UNIT = 200.0
 """Unit of differences between routes [m]."""
@@ -413,7 +413,7 @@ class NavigationEncoder:
         Args:
             seen: observation of the Co-Wizard.
             heard: last instruction.
-            blocked: places beyond the roadblocks known.
+            blocked: places beyond the known roadblocks.
 
         Returns:
             Vector (n,) of `navigation_space`.

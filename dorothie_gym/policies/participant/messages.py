@@ -43,7 +43,7 @@ def seconds_to_take_in(view: ParticipantView) -> float:
 def message_remark(
     state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
-    """Returns remarks on sender and reason of the last message about an errand; none without a reason, or by chance."""
+    """Returns, with some probability, remarks on sender and reason of the last message about an errand that has one."""
     read = _message(view)
     if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
         return ()
