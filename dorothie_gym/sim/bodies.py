@@ -64,7 +64,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         height: height of the road under it [m].
         lane_id: closest lane, its id in the town; `station` [m] along it.
         target_speed: desired speed [m/s].
-        standing: duration of its stand, its light not being red [s].
+        standing: time for which it has stood while its light was not red [s].
         odometer: distance driven [m].
     """
 
@@ -162,7 +162,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         self._plan(lanes)
 
     def _plan(self, lanes: Sequence[int]) -> None:
-        """Follows the given lanes, each a continuation of the one before, and plans on from there."""
+        """Follows the given lanes, each a continuation of the previous one, and extends the plan from the last."""
         town, record = town_arrays(self.road.network), self.record
         moves_on = lanes[0] != record.plan[0]
         record.plan[: len(lanes)] = lanes
@@ -295,7 +295,7 @@ class Prop(_Thing[PropRecord], Obstacle):
     Attributes:
         key: identifies the body.
         height: height of the road under it [m].
-        lane_id: lane that it stands on; `station` [m] along it.
+        lane_id: lane of the body; `station` [m] along it.
         crashed: highway-env's mark of a collision; the compiled loops keep none for props.
     """
 

@@ -37,7 +37,7 @@ from dorothie_gym.support.compilation import compiled, direct
 from dorothie_gym.support.compilation.records import RecordArray, empty_records, plain
 
 STREET_WAY_REACH = 1.0
-"""Distance to the way beside a street within which a pedestrian is placed on it [m]."""
+"""Distance to the footway beside a street within which a pedestrian is placed on it [m]."""
 
 PROP_LEVEL = 2.0
 """Difference of height up to which a prop is on a lane [m]."""
@@ -170,7 +170,7 @@ def add_street_walker(
         station: along it [m].
 
     Returns:
-        Its row; None if there is no way, if a pedestrian or the ego is there already, or if all rows are taken.
+        Its row; None if there is no footway, if a pedestrian or the ego is there already, or if all rows are taken.
     """
     beside = network.town.lanes[rightmost(network.town, lane)]
     station = min(station, beside.length)
@@ -364,7 +364,7 @@ def _fill_lanes(
     town: TownArrays, world: WorldArrays, lanes: NDArray[np.int64], stations: Array, rideable: NDArray[np.bool_],
     cycles: NDArray[np.bool_], shares: Array, pool: NDArray[np.int64],
 ) -> int:  # fmt: skip
-    """Adds vehicles at the first free ones of the given places; returns how many.
+    """Adds vehicles at the first free places among the given ones; returns their number.
 
     Args:
         town: arrays of the town.
@@ -432,7 +432,7 @@ def _fill_footways(
         town: arrays of the town.
         world: arrays of the world.
         walks: (n,) footways that are tried.
-        shares: (n + room,) in [0, 1): of the way's length, and after each free place of the range of the speeds.
+        shares: (n + room,) in [0, 1): of the footway's length; after each free place, of the range of the speeds.
         room: how many at most.
         place: (1,) scratch.
         pool: see `randomness.seed_of`.

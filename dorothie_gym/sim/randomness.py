@@ -1,4 +1,4 @@
-"""Random numbers whose state lies in records, the same in every process.
+"""Random numbers whose state is kept in records, the same in every process.
 
 - xorshift32 (Marsaglia, 2003) for the choices of traffic and pedestrians, one stream a body.
 - PCG64 (O'Neill, 2014) with the ziggurat of Marsaglia and Tsang (2000) for normal numbers: those of

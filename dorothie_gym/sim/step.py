@@ -39,7 +39,7 @@ def step(
 ) -> int:
     """Steps a world; then localizes the ego that follows a path, if there is one, and watches over its driving.
 
-    As on a highway-env road, all bodies decide on the state at the beginning of a substep, then all move. The path of
+    As on a highway-env road, all bodies decide by the state at the start of a substep, then all move. The path of
     an ego with a plan is lengthened before.
 
     Args:

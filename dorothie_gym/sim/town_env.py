@@ -211,7 +211,7 @@ def parts_of(kind: ObservationType) -> list[ObservationType]:
 
 
 class Grayscale(CachedViews, GrayscaleObservation):
-    """highway-env's `GrayscaleObservation`, whose viewer is made again in copies."""
+    """highway-env's `GrayscaleObservation`, whose viewer is recreated in copies."""
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("viewer",)
 
@@ -282,7 +282,7 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
     ## Action Space
     Set by `config["action"]` (default: highway-env's `DiscreteMetaAction`); all types work. There is no action mask,
     neither in the infos nor as `action_masks()`: an action without effect, such as a lane change on the outer lane, is
-    ignored. sb3-contrib's MaskablePPO refuses the environment therefore, unless a wrapper makes a mask of highway-env's
+    ignored. Therefore sb3-contrib's MaskablePPO refuses the environment, unless a wrapper makes a mask of highway-env's
     `get_available_actions()` ([example](../integrations.md#sb3-contrib)).
 
     ## Rewards

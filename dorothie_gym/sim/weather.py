@@ -40,7 +40,7 @@ PUDDLES = 5.0
 """Depth of the puddles of precipitation deposits 100 % [mm]."""
 
 _TEXTURE, _DRAINAGE, _SLOPE = 0.5, 5.0, 0.02
-"""Depth of the road's texture [mm], way of the water to the kerb [m] and crossfall, for the film that rain makes."""
+"""Depth of the road's texture [mm], length of the water's path to the kerb [m] and crossfall, for the film of rain."""
 
 
 class Weather:
@@ -187,7 +187,7 @@ class Wind:
         return GALE * strength * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
 
     def drift(self, strength: float, time: float, *, heading: float, speed: float) -> float:
-        """Returns the angle of a car's course to its heading, positive right [rad]; 0 without wind and for a stand.
+        """Returns the angle of a car's course to its heading, positive right [rad]; 0 without wind or at standstill.
 
         Args:
             strength: strength of the wind in [0, 1].

@@ -188,7 +188,7 @@ LINE = 8
 
 
 def turns_of(count: int, threads: int) -> NDArray[np.int64]:
-    """Returns the numbers 0 to `count` - 1 in as many blocks as there are threads, none of them taken.
+    """Returns the numbers 0 to `count` - 1, all free, in as many blocks as there are threads.
 
     Returns:
         (threads, LINE): of each block the next number and the one after its last.
@@ -207,7 +207,7 @@ def take(turns: NDArray[np.int64], home: int) -> int:
         home: number of the thread's block.
 
     Returns:
-        A number that no other thread gets, or -1 when there is none left.
+        A number that no other thread receives, or -1 if none is left.
     """
     for k in range(len(turns)):
         block = turns[(home + k) % len(turns)]

@@ -21,7 +21,7 @@ class WorldRows:
         """Makes rows.
 
         Args:
-            world: a world of the town; the rows have room for as many bodies, and more when one of them needs it.
+            world: a world of the town; the rows have room for equally many bodies, and grow when one needs more.
             rows: how many.
             threads: number of threads at most, the caller's included.
         """

@@ -92,7 +92,7 @@ class VectorWorld(CachedViews):
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
     threads have not reached yet, so that a late or busy thread does fewer. A world depends only on its own arrays: not
-    on the other worlds, its place among them, or the threads. Threads share nothing that is written to, and hold the
+    on the other worlds, its row in the batch, or the threads. Threads share nothing that is written to, and hold the
     interpreter's lock between calls only.
 
     Attributes:
@@ -108,7 +108,7 @@ class VectorWorld(CachedViews):
 
         Args:
             town: arrays of the town.
-            world: a world of it; the others have room for as many bodies.
+            world: a world of the town; the others have room for equally many bodies.
             worlds: how many.
             threads: how many threads at most, by default as many as there are processors for this process.
 
@@ -157,7 +157,7 @@ class VectorWorld(CachedViews):
         steering: Array | float = 0.0,
         playing: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Steps worlds, as `sim.step.step` does with one; where a path needs more room, all worlds get it.
+        """Steps worlds, as `sim.step.step` does with one; if a path needs more room, the arrays of all worlds grow.
 
         Args:
             substeps: how many.
@@ -167,7 +167,7 @@ class VectorWorld(CachedViews):
             playing: (worlds,) those that are stepped; None for all.
 
         Raises:
-            ValueError: the actions do not fit the number of worlds.
+            ValueError: the number of actions differs from the number of worlds.
         """
         actions = (self._one_each("acceleration", acceleration), self._one_each("steering", steering))
         answers = np.full(len(self), NO_SPACE, dtype=np.int64)

@@ -33,7 +33,7 @@ from dorothie_gym.support.copying import CachedViews, shared
 
 
 class Car(CachedViews, Vehicle):
-    """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), as of the last step of the world.
+    """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), in the state of the last step of the world.
 
     Setting its position, heading or speed moves it.
     """
@@ -127,7 +127,7 @@ class CarRecord:
 
     Attributes:
         hazard: hazard and hazard_gap: the cause of a hazard stop.
-        outcome: numbers of events, breaches of rules and collisions.
+        outcome: numbers of events, infractions and collisions.
         props: number of props that it sees.
         air: friction, wind, wind_heading and wind_phase: effects of the weather.
     """
@@ -238,7 +238,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def path(self) -> Path:
-        """The current path, the same object until it is replaced; every manoeuvre replaces it."""
+        """The current path, the same object until a manoeuvre replaces it."""
         plan = self._look_up()
         if plan["version"] != self._laid:
             self._laid = int(plan["version"])
@@ -265,7 +265,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def lane(self) -> int:
-        """Lane that the ego counts as being on."""
+        """Lane to which the ego is assigned."""
         return int(self._look_up()["lane"])
 
     @property
@@ -280,12 +280,12 @@ class LocalPlanner(CachedViews):
 
     @property
     def held(self) -> bool:
-        """Whether the ego stands by the action Stop."""
+        """Whether the ego stands because of the action Stop."""
         return bool(self._look_up()["held"])
 
     @property
     def waits_at_end(self) -> bool:
-        """Whether the path ends where a turn has to be chosen, or at the end of the map."""
+        """Whether the path ends where a turn must be chosen, or at the end of the map."""
         return bool(self._look_up()["open_end"])
 
     @property
@@ -320,7 +320,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def choice(self) -> tuple[int, float]:
-        """Lane before the next junction with a choice, -1 if the path comes to none, and the distance to it [m]."""
+        """Lane before the next junction with a choice, -1 if the path reaches none, and the distance to it [m]."""
         plan = self._look_up()
         lane = int(plan["choice"])
         return lane, float(plan["choice_at"]) - self.s if lane >= 0 else 0.0

@@ -76,7 +76,7 @@ EGO_STANDING = 0.1
 """Speed below which the ego counts as standing [m/s]."""
 
 EGO_MOVING = 0.5
-"""Speed above which the way to stop matters for a manoeuvre [m/s]."""
+"""Speed above which the stopping distance matters for a manoeuvre [m/s]."""
 
 U_TURN_SPEED = 3.5
 """Speed of a U-turn [m/s]."""
@@ -88,7 +88,7 @@ APPROACH_DISTANCE = 20.0
 """Distance to a goal below which `APPROACH_SPEED` applies [m]."""
 
 BLIND_SPEED = 1.5
-"""Speed with hardly any sight [m/s]."""
+"""Speed when there is almost no sight [m/s]."""
 
 # --- Accelerations ----------------------------------------------------------------------------------------------------
 
@@ -116,10 +116,10 @@ PROP_DEPTH = 1.25
 """Half the length of the longest prop [m]: a prop is in sight when its centre is."""
 
 LEAD = 1.0
-"""Path before the beginning of a manoeuvre [m]."""
+"""Path before the start of a manoeuvre [m]."""
 
 BEGUN = 1.0
-"""Way after which a manoeuvre from a stand has begun [m]."""
+"""Distance after which a manoeuvre from a standstill counts as begun [m]."""
 
 SWITCH_TIME = 3.0
 """Duration of a lane switch [s]."""
@@ -158,7 +158,7 @@ class FeasibleManoeuvres(NamedTuple):
         switch_left: lane switch with a positive angle.
         switch_right: lane switch with a negative angle.
         u_turn: U-turn.
-        j_turn: a turn at the next junction with a choice, if the path comes to one; refused for the turn that is
+        j_turn: a turn at the next junction with a choice, if the path reaches one; refused for the turn that is
             planned already, see `LocalPlanner.turn_ahead`.
     """
 

@@ -378,7 +378,7 @@ def _turn_round(town: TownArrays, world: WorldArrays, speed: float) -> int:
 @compiled
 def _turn(town: TownArrays, world: WorldArrays, angle: int, speed: float) -> int:
     plan = world.plan[0]
-    _, _, free = _under_way(world)  # after the end of a manoeuvre under way, lanes may be changed again
+    _, _, free = _under_way(world)  # after the end of a manoeuvre in progress, lanes may be changed again
     if not cross_junction(town, world, plan.lane):
         return Refusal.NO_SPACE
     number = find_turn(town, world, free, angle)
@@ -405,7 +405,7 @@ def _under_way(world: WorldArrays) -> tuple[int, int, float]:
         end += 1
     if end - first < 2:
         return 0, 0, plan.station
-    # the lane continues where it did before, just after the end of a U-turn; else the path would turn back
+    # just after a U-turn, the lane continues at the same station; else the path would turn back
     landing = end if end < plan.points and course[end].lane == plan.lane else end - 1
     return first, end, course[landing].station
 
@@ -429,7 +429,7 @@ def _replace(
     Args:
         town: arrays of the town.
         world: arrays of the world, with the first steps of the plan.
-        station: beginning of the path on the first of them [m].
+        station: start of the path on the first of them [m].
         speed: speed of the ego [m/s], which the length of lane switches depends on.
         first: first point of the current path that is kept, see `lay_head`.
         end: the one after the last.
@@ -439,7 +439,7 @@ def _replace(
         angle: angle of the manoeuvre [degrees].
         connector: connector and lane of a turn, or -1.
         way_out: see there.
-        fresh: whether the ego is not on the current path, but at the beginning of the new one.
+        fresh: whether the ego is at the start of the new path instead of on the current one.
         offset: distance of the ego from the new path then, positive right [m].
 
     Returns:

@@ -99,7 +99,7 @@ class Path:
         return float(values[k] + t * (values[k + 1] - values[k]))
 
 
-# --- Place of the ego on its path (compiled) --------------------------------------------------------------------------
+# --- Position of the ego on its path (compiled) -----------------------------------------------------------------------
 
 WIDEST_SWEEP = 2.5
 """Largest distance of the ego's corners from its path [m]: in a U-turn it is 2.4 m."""
@@ -196,7 +196,7 @@ def find_sweeps(
 
 @inlined
 def take_lanes(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
-    """Makes the lanes of the path ahead the vehicle's plan, and updates its place on the first of them."""
+    """Copies the lanes of the path ahead to the vehicle's plan, and updates its station on the first of them."""
     car = world.car[0]
     r = 0
     while r + 1 < car.runs and car.run_first[r + 1] <= car.at:

@@ -160,7 +160,7 @@ END_GAP = 0.8
 """Room between the nose of a waiting ego and the end of its lane [m]."""
 
 SEARCH_RANGE = 6.0
-"""Range before and after the last place in which the ego is searched [m]."""
+"""Range around the last position in which the ego is searched [m]."""
 
 # --- Points -----------------------------------------------------------------------------------------------------------
 
@@ -462,7 +462,7 @@ def place_of_ego(world: WorldArrays) -> tuple[float, float]:
 
 @compiled
 def enter(world: WorldArrays, x: float, y: float) -> None:
-    """Finds the ego's place at the beginning of a new path from its position [m]."""
+    """Finds the ego's place at the start of a new path from its position [m]."""
     car, course, last = world.car[0], world.course, int(world.plan[0].points) - 1
     best, s, offset = math.inf, 0.0, 0.0
     for k in range(min(point_before(world, SEARCH_RANGE) + 1, last)):

@@ -16,7 +16,7 @@ from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 from dorothie_gym.support.compilation import allocating
 
 HORIZON = 80.0
-"""Range ahead and behind, beyond the own lane, in which neighbours are searched [m]."""
+"""Range ahead and behind, beyond the vehicle's own lane, in which neighbours are searched [m]."""
 LANE_MARGIN = 1.0
 """Distance outside of a lane up to which a body counts as on it [m], as in highway-env."""
 OVERHANG = 5.0
@@ -50,7 +50,7 @@ class LaneChains:
 
         Args:
             index: lane to start from.
-            route: edges or lanes to come, beginning with this lane's edge or the next one.
+            route: remaining edges or lanes, starting with this lane's edge or the next one.
 
         Returns:
             Lanes that begin within `HORIZON` of the lane's end or end within it of its start; the lane itself first,
@@ -88,7 +88,7 @@ class LaneChains:
         step: Callable[[LaneIndex, _Rest], list[tuple[LaneIndex, _Rest]]],
         start: float,
     ) -> list[tuple[int, float]]:
-        """Rows and distances of the lanes that one comes to, nearest first (Dijkstra's search)."""
+        """Rows and distances of the lanes that are reached, nearest first (Dijkstra's search)."""
         seen = {self._network.row(index)}
         order = itertools.count()  # so that lanes equally far keep the order of the links
         found: list[tuple[int, float]] = []
@@ -183,5 +183,5 @@ def neighbours_on(
             if at < s and at > s_rear:
                 rear, s_rear = i, at
             if j == 0:
-                break  # as in highway-env; elsewhere it may be met by several ways, round a block even ahead and behind
+                break  # as in highway-env; elsewhere several routes may lead to it, round a block both ahead and behind
     return front, s_front - s, rear, s - s_rear

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 GRID_CELL = 8.0
 """Side of a cell [m]."""
 CELL_REACH = 6.0
-"""A cell lists the lanes whose centre line comes this close to it [m]: cars on a road are settled by their cell."""
+"""A cell lists the lanes whose centre line comes this close to it [m]; for cars on a road, this list suffices."""
 SAME_LEVEL = 3.0
 """Lanes within this height [m] of a body may carry it; overpasses leave more room than that."""
 SLACK = 1e-6
@@ -48,11 +48,11 @@ in the entries (m,); and the corner of the first cell, x and y [m]. A named tupl
 
 
 class GridIndex:
-    """Lanes by square cells.
+    """Lanes listed by square grid cells.
 
-    The distance by which highway-env ranks lanes is never less than the plain distance to the centre line. So when the
-    best lane of a cell's list ranks below the reach of the list, no lane that is not listed can beat it. Where this
-    does not settle the question (off the road), all lanes are asked whose bounding boxes are closer than the best one.
+    The distance by which highway-env ranks lanes is at least the Euclidean distance to the centre line. If the best
+    lane in the list of a cell is closer than the reach of the list, unlisted lanes cannot be better. Otherwise (off
+    the road), all lanes are examined whose bounding boxes are closer than the best lane found so far.
 
     Attributes:
         origin: corner of the first cell, x and y [m].
@@ -75,7 +75,7 @@ class GridIndex:
         self._arrays: _Arrays = (*table, cells, entries, *self.origin)
 
     def closest(self, x: float, y: float, heading: float | None = None, height: float | None = None) -> int:
-        """Returns the row of the lane with the minimum distance, the first one of several; see `TownNetwork`."""
+        """Returns the row of the closest lane, the first one of equally close lanes; see `TownNetwork`."""
         weight = 1.0
         if heading is None:
             heading, weight = 0.0, 0.0
@@ -437,7 +437,7 @@ def closest_lane(
 
 @inlined
 def _is_out_of_question(entry: CellEntryRecord, x: float, y: float, cos: float, sin: float, best: float) -> bool:
-    """Returns whether a lane runs another way than a body, or lies farther away, than the best lane is off."""
+    """Returns whether the heading or distance of a lane alone exceeds the deviation of the best lane."""
     if best <= TURNED and entry.cos * cos + entry.sin * sin < entry.limit:
         return True
     across = y * entry.cos - x * entry.sin

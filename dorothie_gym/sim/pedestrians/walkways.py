@@ -1,4 +1,4 @@
-"""Arrays of the footways of a town: pavements, ways round corners, crosswalks, ways beside streets."""
+"""Arrays of the footways of a town: pavements, footways round corners, crosswalks, footways beside streets."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ SAME_END = 0.5
 """Distance within which ends of pavements are one place [m]."""
 
 LONGEST_CORNER = 45.0
-"""Longest way from the end of one pavement to one of another, if no lane lies between [m]."""
+"""Longest footway between the ends of two pavements, if no lane lies between [m]."""
 
 CORNER_WIDTH = 1.4
-"""Width of such ways round corners [m]."""
+"""Width of such footways round corners [m]."""
 
 BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
-"""Offsets from the straight line at which such ways are tried [m]: round the outside of a bend they lead in a bow."""
+"""Offsets from the straight line at which such footways are tried [m]: round the outside of a bend they are curved."""
 
 LANE_CLEARANCE = 0.8
 """Minimum distance of their centres from the lanes' edges [m]."""
 
 STREET_HALF_WIDTH = 0.8
-"""Half the width of a way beside a street without a pavement [m]: half of `pacing.KERB`."""
+"""Half the width of a footway beside a street without a pavement [m]: half of `pacing.KERB`."""
 
 HEEDED = 8.0
-"""Distance from a crosswalk's line within which lanes end whose lights are heeded there [m]."""
+"""Distance from a crosswalk's line within which lanes end whose lights apply to the crosswalk [m]."""
 
 KERB_REACH = 6.0
 """Distance from a crosswalk's end to its pavement, at most [m]."""
@@ -55,7 +55,7 @@ CROSSWALK_DEPTH = 3.0
 
 
 _End: TypeAlias = tuple[int, int]
-"""Number of a way, and 0 for its beginning or 1 for its end."""
+"""Index of a footway, and 0 for its start or 1 for its end."""
 
 
 class Walkways(NamedTuple):
@@ -112,7 +112,7 @@ def _pavement(points: Array, width: float) -> Array:
 
 
 class _Corner(NamedTuple):
-    """A way from one end of a pavement to one of another."""
+    """A footway between the ends of two pavements."""
 
     ends: tuple[_End, _End]
     points: Array
@@ -128,7 +128,7 @@ class _Corners(NamedTuple):
 def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
     """Returns the footway from each end of a pavement to the nearest end of another one, across no lane.
 
-    Ends that are one place need no way between them. An end from which no other one is reached is a dead end.
+    Ends at the same place need no footway between them. An end without a reachable other end is a dead end.
     """
     ends = [(k, end) for k in range(len(sidewalks)) for end in (0, 1)]
     found = _Corners([], {})
@@ -166,7 +166,8 @@ def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
 
 def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) -> tuple[int, Array] | None:
     """Returns the first of the given ends that can be reached without crossing a lane, and the path to it: straight, or
-    curved if necessary."""
+    curved if necessary.
+    """
     for bow in BOWS:
         for other in others:
             line = places[[one, other]]

@@ -1,6 +1,6 @@
 """Perception of bodies by the ego: misses beyond the range of sight, and errors of place.
 
-All chance is a hash of the seed, the body and the time: it does not depend on the number or order of calls.
+All random values are hashes of the seed, the body and the time: they do not depend on the number or order of calls.
 """
 
 from __future__ import annotations

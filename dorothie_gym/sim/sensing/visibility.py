@@ -4,7 +4,7 @@ A body of a road user's size is seen while its signal is at least that at the ed
 
     S(d) = (CLEAR_SIGHT / d)^2 * G(d),    G(d) = clarity * exp(-tau(d)) * min(1, sqrt(E(d) / FULL_LIGHT))
 
-- (1 / d)^2: a small target is detected by its area (Ricco's law; Blackwell, J. Opt. Soc. Am. 36, 1946);
+- (1 / d)^2: the detection of a small target depends on its area (Ricco's law; Blackwell, J. Opt. Soc. Am. 36, 1946);
 - exp(-tau): contrast falls off exponentially with the air's extinction (Koschmieder 1924); the meteorological optical
   range M leaves 5 % of it, so the extinction is ln(20) / M (WMO Guide to Instruments, no. 8, chapter 9);
 - sqrt(E): below daylight the threshold contrast rises with the root of the light (Rose, J. Opt. Soc. Am. 38, 1948, and

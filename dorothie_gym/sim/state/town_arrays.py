@@ -66,9 +66,9 @@ class TownArrays(NamedTuple):
     Attributes:
         points: (p, 6) x, y, station, heading, height, width of all points of centre lines, the network's own table.
         lanes: lanes by their ids.
-        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights pedestrians heed.
+        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights pedestrians obey.
         relations: uint8 rows of `codes.Relation` of each connector to those of its junction.
-        siblings: lanes with a common beginning.
+        siblings: lanes with a common start.
         programmes: light programmes.
         phase_ends: ends of the phases within the cycle [s].
         colours: uint8 `codes.Colour` by programme, phase and light.
@@ -77,14 +77,14 @@ class TownArrays(NamedTuple):
         entries: lanes in the lists of the cells.
         walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column is the
             distance to the kerb across, 0 where the road is not crossed [m].
-        walks: footways: the pavements with the town's own ids, the ways between their ends, the ways beside
+        walks: footways: the pavements with the town's own ids, the paths between their ends, the paths beside
             the rightmost lanes.
         mouths: mouths of crosswalks, those of a pavement in the order of their stations.
         crossings: crosswalks.
         passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
         junctions: (j, 3) centre [m] of each junction's connectors, and the radius in which they lie [m].
         lines: ends of lanes with a light or stop sign, in the order of the lanes.
-        ways: ways on from each lane, by the lanes' ids.
+        ways: continuations of each lane, by the lanes' ids.
         exits: exits from the ends of lanes.
         lane_lists: int32 lists of lanes, see `ways`.
         flat: whether all lanes are so level that heights do not matter.
@@ -305,7 +305,7 @@ def _exit(town: Town, connector: int) -> int:
 
 
 def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[SiblingRecord]:
-    """Lanes that begin on one lane: up to where each is in the way on the others."""
+    """Lanes with a common start: the stretch on which each obstructs the others."""
     found: list[tuple[float, int]] = []
     for lane in town.lanes:
         beside = sorted(

@@ -64,7 +64,7 @@ LONG_AGO = -(1 << 40)
 """A frame before all others."""
 
 BREACHES = MAX_SUBSTEPS + 2
-"""Most breaches in one call of `step`: a line each frame, and the road and the direction left once."""
+"""Maximum number of infractions in one call of `step`: a line each frame, and the road and the direction left once."""
 
 
 @by_reference
@@ -97,9 +97,9 @@ class WorldArrays(NamedTuple):
         poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
         events: its events in that call.
         localizer: (1,) its pose estimate.
-        watch: (1,) numbers of its breaches of the rules.
-        marks: its stands at the lines of the town.
-        breaches: its breaches in the last call of `step`, collisions left out.
+        watch: (1,) numbers of its infractions.
+        marks: stops of the ego at the lines of the town.
+        breaches: infractions of the ego in the last call of `step`, without collisions.
     """
 
     vehicles: RecordArray[VehicleRecord]

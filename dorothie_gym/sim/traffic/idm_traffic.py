@@ -121,7 +121,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 @compiled
 def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> float:
-    """Returns the acceleration that stops a vehicle before the ego's U-turn [m/s^2]; inf where the way is clear."""
+    """Returns the acceleration that stops a vehicle before the ego's U-turn [m/s^2]; inf if the lane is clear."""
     car, other = world.car[0], world.vehicles[0]
     if not car.sweeping:
         return math.inf
@@ -138,7 +138,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleR
                 gap = min(gap, start + station - vehicle.station)
         start += lane.length
     gap -= 0.5 * (vehicle.length + other.length)
-    # a vehicle that is in its way already drives on
+    # a vehicle that already obstructs it drives on
     return brake_to(vehicle.speed, gap) if -1.0 < gap < math.inf else math.inf
 
 
@@ -204,13 +204,13 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
         if vehicle.approach >= 0:
             forget(vehicle)
         return math.inf
-    # the front may be over the line when the next lane begins to be followed
+    # the front may be past the line when the next lane begins to be followed
     before = vehicle.plan[k - 1] if k > 0 else vehicle.approach_lane
     announce(vehicle, before, vehicle.plan[k], line, world.clock[0].time)
     if line > stopping:
         return math.inf
     if front >= 0 and gap < line + 0.5 * vehicle.length and not _is_let_in(world, front):
-        return math.inf  # a vehicle in front waits, too, and asks first
+        return math.inf  # a vehicle in front also waits, and requests admission first
     wait = request(town, world, i, k)
     if wait == Wait.NOT:
         return math.inf
@@ -240,7 +240,7 @@ def _is_let_in(world: WorldArrays, front: int) -> bool:
 def _give_way_to_walkers(
     town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, lane: LaneRecord, begin: float
 ) -> float:
-    """Returns the acceleration that stops a vehicle before crosswalks of a lane with pedestrians in its way [m/s^2]."""
+    """Returns the acceleration that stops a vehicle before crosswalks with pedestrians in its path [m/s^2]."""
     found = math.inf
     for p in range(lane.passage, lane.passage + lane.passages):
         passage = town.passages[p]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 PASSING = 0.5 * CAR_WIDTH + 0.2
-"""Distance to the centre of a lane within which a body is in the way of cars there [m]."""
+"""Distance to the centre of a lane within which a body obstructs cars on the lane [m]."""
 
 
 @inlined

@@ -21,7 +21,7 @@ CLOSING = 2.0 * math.sqrt(-IDMVehicle.COMFORT_ACC_MAX * IDMVehicle.COMFORT_ACC_M
 """Twice the root of the product of desired acceleration and deceleration [m/s^2]."""
 
 STANDING_GAP = float(IDMVehicle.DISTANCE_WANTED - IDMVehicle.LENGTH)
-"""Room between two vehicles that stand [m]; highway-env counts it from centre to centre of vehicles of 5 m."""
+"""Gap between two stationary vehicles [m]; highway-env counts it from centre to centre of vehicles of 5 m."""
 
 TIME_WANTED = float(IDMVehicle.TIME_WANTED)
 """Desired time gap [s]."""
@@ -86,7 +86,7 @@ MAX_SUBSTEPS = 15
 """Most substeps within a call of a world with a driven ego, whose path is lengthened in between."""
 
 STOPPED = 0.05
-"""Speed below which a braking vehicle comes to a stand [m/s]."""
+"""Speed below which a braking vehicle comes to a standstill [m/s]."""
 
 CHANGE_TIME = 3.0
 """Duration of a lane change [s]; none begins where the lane ends sooner."""
@@ -120,13 +120,13 @@ TOW_CRASHED = 3.0
 """Time after which a crashed vehicle is respawned [s]."""
 
 TOW_BLOCKED = 15.0
-"""Time after which a vehicle that stands before a prop is respawned [s]."""
+"""Time after which a vehicle that waits before a prop is respawned [s]."""
 
 TOW_FACING = 6.0
-"""Time after which a vehicle is respawned that stands before the ego while the ego stands in a U-turn [s]."""
+"""Time after which a vehicle is respawned that waits before the ego while the ego stands in a U-turn [s]."""
 
 TOW_STUCK = 60.0
-"""Time after which any vehicle that stands, not for a red light, is respawned, which resolves gridlocks [s]."""
+"""Time after which any vehicle that stands for another reason than a red light is respawned, against gridlocks [s]."""
 
 GOES_HOME = 45.0
 """Time without progress after which a pedestrian is respawned [s]; longer than the wait at a crosswalk."""
@@ -162,13 +162,13 @@ GIVING_WAY_PATIENCE = 30.0
 """Longest time an actor yields before it competes by arrival order [s]."""
 
 SNEAKING = 2.0
-"""Time of giving way at a green light after which a vehicle may use the yellow [s] (HCM's sneakers)."""
+"""Time of yielding at a green light after which a vehicle may use the yellow phase [s] (HCM's sneakers)."""
 
 START = 0.3
-"""Time to start for a vehicle that uses the yellow, the way to the line not included [s]."""
+"""Time to start for a vehicle that uses the yellow phase, without the distance to the line [s]."""
 
 AT_LINE = 3.5
-"""Distance of the front to the line within which a vehicle stands at it [m]."""
+"""Distance of the front to the line within which a vehicle counts as standing at it [m]."""
 
 OVER_LINE = 0.5
 """Distance past the line at which a vehicle no longer stops for its light [m]."""
@@ -210,10 +210,10 @@ ROOM_EACH = 10.0
 """Lane that a vehicle takes up in a queue: its length and the distance that highway-env's IDM keeps [m]."""
 
 SLOW = 4.0
-"""Speed below which a vehicle beyond a junction may be in the way [m/s]; in a U-turn the ego does 3.5 m/s."""
+"""Speed below which a vehicle beyond a junction may obstruct it [m/s]; in a U-turn the ego drives at 3.5 m/s."""
 
 CROSSING_SIGHT = 40.0
-"""Distance within which traffic gives way to a U-turn of the ego [m]."""
+"""Distance within which traffic yields to a U-turn of the ego [m]."""
 
 CROSSING_MARGIN = 0.5
 """Room left beside that U-turn [m]."""

@@ -255,7 +255,7 @@ GIVING_UP = 1.0
 
 @inlined
 def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
-    """Thinks of changing lanes, once in `LANE_CHANGE_DELAY`, or gives up a change that is under way."""
+    """Considers a lane change, once in `LANE_CHANGE_DELAY`, or gives up a change that is in progress."""
     vehicle = world.vehicles[i]
     if vehicle.lane != vehicle.plan[0]:
         lane = town.lanes[vehicle.lane]

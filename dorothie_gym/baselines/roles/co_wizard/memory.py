@@ -34,7 +34,7 @@ from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
-"""Turn that was asked for: none, a direction, or only a street."""
+"""Requested turn: none, a direction, or only a street."""
 
 SPEEDS: Final = tuple(range(10, 65, 5))
 """Cruise speeds that can be aimed at [km/h]."""
@@ -48,7 +48,7 @@ VARIABLES: Final[Mapping[str, int]] = MappingProxyType(
 )  # fmt: skip
 """Variables of the memory with the number of their values.
 
-`manoeuvre` is none, a U-turn, or a lane switch to the left or right that was asked for; `onto_street`: the turn leads
+`manoeuvre` is none, a U-turn, or a lane switch to the left or right that was requested; `onto_street`: the turn leads
 into the street that was named; `skip`: junctions to pass before it; `nudging`: the car goes a little further, to stop
 again; `resting`: it stops for good before a hazard; `lights`: nothing was said, on, off; `proposed`: a way that was
 proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower` likewise.
@@ -58,7 +58,7 @@ CONFIG: Final = CoWizardConfig()
 """Thresholds of the judgements."""
 
 U_TURN: Final = 1
-"""Value of `manoeuvre` for a U-turn that was asked for."""
+"""Value of `manoeuvre` for a requested U-turn."""
 
 FRESH: Final = ("order", "nudging", "creeping")
 """Variables that can be set again to the same value, for each of which there is a binary output."""
@@ -118,8 +118,8 @@ class WorkingMemory:
         goal_mark: its row among the landmarks; -1 if it is not on the map.
         goal_at: time of its last change [s].
         former: the goal before.
-        street: street of the turn that was asked for.
-        junction: the junction that the turn that was asked for is counted from; -1 for none.
+        street: street of the requested turn.
+        junction: the junction from which the requested turn is counted; -1 for none.
         target: place at which a nudge or a slow approach ends.
         navigator: route to the goal.
         ruled_out: places of houses and people that were visited or not meant.
@@ -135,7 +135,7 @@ class WorkingMemory:
         said_at: time of its last remark by predicate or, without content, by move [s].
         spoke_at: time of its last remark [s].
         asked_at: time of its last question [s].
-        asked_lane: lane before the junction whose way was asked for; -1 for none.
+        asked_lane: lane before the junction at which the Co-Wizard last asked for the way; -1 for none.
         heard_at: time of the last utterance of the participant [s].
         last: its last remark that can be repeated; None at first.
         clock: time between decisions.
