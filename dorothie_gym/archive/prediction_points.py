@@ -330,7 +330,7 @@ def _why_no_point(event: Event, action: ActionRecord | None) -> str:
 
 
 def at_tenths(session: Session) -> Session:
-    """Returns a session as recorded at 10 Hz: events move to the beginning of their tenth, frames between are dropped.
+    """Returns a session as if recorded at 10 Hz: events move to the start of their interval, other frames are dropped.
 
     Points and views of the result do not depend on the layout that the session was read from.
     """

@@ -38,7 +38,7 @@ VALIDATION: Final = "val"
 TEST: Final = "test"
 
 Objects: TypeAlias = Literal["record", "boxes", "detections"]
-"""Source of the objects around the ego: all near ones in the record, those of them that the camera on the car shows, or
+"""Source of the objects around the ego: all nearby ones in the record, only those that the camera on the car shows, or
 those that a trained detector finds in its pictures."""
 
 

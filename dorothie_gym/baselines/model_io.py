@@ -179,7 +179,7 @@ TAKES_SIDE: Final = tuple(action.argument is ArgumentKind.SIDE for action in NAV
 
 
 def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
-    """Returns the likeliest values that the ontology allows (see `allowed_angle`).
+    """Returns the most likely values that the ontology allows (see `allowed_angle`).
 
     Args:
         outputs: outputs of a model.

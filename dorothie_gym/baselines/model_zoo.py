@@ -77,7 +77,7 @@ def _only(*channels: Channel) -> Change:
 
 
 _EPISODIC: Final = (Channel.ACTIONS, Channel.MOVES, Channel.TRANSCRIPT, Channel.VISION)
-"""Inputs that the paper gives to the Episodic Transformer (Pashevich et al., 2021): actions, text, and the window, here
+"""Inputs of the Episodic Transformer in the paper (Pashevich et al., 2021): actions, text, and the window, here
 with the objects around the ego instead of images."""
 
 ROWS: Final[tuple[ModelEntry, ...]] = (
@@ -216,7 +216,7 @@ def find_row(name: str) -> ModelEntry:
 
 
 def stored_row(command: str) -> ModelEntry:
-    """Returns the model of a file by its command, also that of a former version; raises `ValueError` as `find_row`."""
+    """Returns the model of a file by its command, also of an earlier version; raises `ValueError` like `find_row`."""
     return find_row(FORMER_COMMANDS.get(command, command))
 
 

@@ -116,7 +116,7 @@ def read_header(path: Path, limit: int = MAX_WEIGHTS) -> TensorHeader:
         limit: largest size of the file [bytes].
 
     Raises:
-        InputFileError: it is not a regular file, too large, cut off, or its header is damaged; the message names the
+        InputFileError: it is not a regular file, too large, truncated, or its header is damaged; the message names the
             tensor.
         OSError: it is missing or cannot be read.
     """

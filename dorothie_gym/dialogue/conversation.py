@@ -55,7 +55,7 @@ class Span:
     Attributes:
         text: words of the span; never blank.
         act: the dialogue act (move and slot values).
-        meaning: propositions that the speaker states, asks or asks for; empty if they are not known.
+        meaning: propositions that the speaker states, asks or requests; empty if they are unknown.
     """
 
     text: str
@@ -178,7 +178,7 @@ class Conversation:
         return current is None or len(current.spans) < self.max_spans
 
     def deliver(self, now: float) -> list[Utterance]:
-        """Removes and returns the utterances that are over at `now`.
+        """Removes and returns the utterances that have ended at `now`.
 
         Args:
             now: time [s].

@@ -47,7 +47,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     """Many sessions of `DuoWizardEnv` in one batch, by agent as in PettingZoo and stacked as in Gymnasium.
 
-    Worlds, observations and masks of all sessions lie in arrays, which compiled code steps on threads; the dialogue is
+    Worlds, observations and masks of all sessions are in arrays, which compiled code steps on threads; the dialogue is
     computed in Python. A session depends on its seed and its actions, and neither on the others, nor on its place among
     them, nor
     on the number of threads: it is that of a `DuoWizardEnv`.
@@ -92,7 +92,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
 
         Args:
             num_envs: number of environments.
-            town: a town as in `DuoWizardEnv`, or several that the environments play in turn.
+            town: a town as in `DuoWizardEnv`, or several over which the environments cycle.
             storyboard: as in `DuoWizardEnv`.
             config: as in `DuoWizardEnv`, with symbolic perception. Pictures of a camera are drawn on the threads.
             render_mode: None or "rgb_array".
@@ -207,7 +207,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         Raises:
             ValueError: an action is missing or malformed; the message names environment, agent and field. Nothing was
                 played.
-            gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
+            gymnasium.error.ResetNeeded: an environment was never reset, or has ended and is not reset automatically.
         """
         begun = np.array([engine.has_begun for engine in self.engines])
         mode, again = self.autoreset_mode, self._over.copy()

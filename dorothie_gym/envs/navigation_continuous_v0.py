@@ -110,7 +110,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
     - `decision_frequency` [Hz], which divides 30.
     - `control`: "pedals" or "acceleration", with which random actions explore more: a car whose throttle and brake
-      are drawn apart hardly moves.
+      are drawn independently hardly moves.
 
     ## Version History
     - v0: first version.
@@ -161,7 +161,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
         Raises:
             ValueError: the action does not consist of as many finite numbers as the action space.
-            gymnasium.error.ResetNeeded: no session is in progress, or it is over.
+            gymnasium.error.ResetNeeded: no session has begun, or it has ended.
         """
         values = controls_of("action", action, self.control)
         self._check_begun()

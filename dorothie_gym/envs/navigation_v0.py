@@ -131,7 +131,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
 
         Raises:
             ValueError: the action is not a `NavigationAction`.
-            gymnasium.error.ResetNeeded: no session is in progress, or it is over.
+            gymnasium.error.ResetNeeded: no session has begun, or it has ended.
         """
         self._check_begun()
         return self._play(whole_number("action", action, 0, len(ACTIONS) - 1))

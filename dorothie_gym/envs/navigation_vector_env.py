@@ -44,7 +44,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
 
     ## Arguments
     - `num_envs`: how many environments.
-    - `town`: a town as in `NavigationEnv`, or a sequence of them, which the environments play in turn.
+    - `town`: a town as in `NavigationEnv`, or a sequence of towns over which the environments cycle.
     - `threads`: how many step the environments at most, by default one per processor.
     - `autoreset_mode`: Gymnasium's. `options["reset_mask"]` of `reset` resets some environments only.
     - `render_mode`: None or `"rgb_array"`; `render()` draws the first environment, `render_one(number)` any.

@@ -159,10 +159,10 @@ class _Library(CachedViews):
     """Sessions of a split, read on demand.
 
     Args:
-        corpus: as in `TeacherForcedEnv`; `split` likewise.
+        corpus: as in `TeacherForcedEnv`.
         split: see there.
         task: task of the points.
-        limits: largest numbers of landmarks and streets.
+        limits: maximum numbers of landmarks and streets.
         strict: as in `TeacherForcedEnv`.
     """
 

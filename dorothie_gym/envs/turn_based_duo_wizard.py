@@ -34,7 +34,7 @@ class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | 
         self.env.restore_state(state)
 
     def turn_values(self) -> dict[str, object]:
-        """Returns what changes beside the session: whose turn it is, the actions of the others, results to be seen."""
+        """Returns the state outside the session: whose turn it is, actions of the others, results not yet returned."""
         return {name: value for name, value in vars(self).items() if name not in self._constant}
 
     def apply_turn_values(self, values: dict[str, object]) -> None:

@@ -31,7 +31,7 @@ class History:
     """Observations, utterances and actions of a Co-Wizard; every change returns a new object.
 
     Attributes:
-        encoded: the part of them that a benchmark model can still be shown, as columns.
+        encoded: the part of them that inputs of a benchmark model may still contain, as columns.
         events: number of dialogue moves and physical actions so far.
         utterances: number of utterances so far.
         landmark: label of the landmark that was named last, by either speaker.
@@ -71,7 +71,7 @@ class History:
         return replace(self, encoded=self.encoded.observed(observed_frame(view, town)))
 
     def said(self, speaker: Role, spans: Sequence[Span], frame: int) -> Self:
-        """Returns the history with an utterance that was over at a frame."""
+        """Returns the history with an utterance that ended at a frame."""
         text = " ".join(span.text for span in spans)
         record = UtteranceRecord(
             number=self.utterances, speaker=speaker, text=text, start=frame / FRAME_RATE, end=frame / FRAME_RATE,
@@ -118,7 +118,7 @@ class History:
 
 
 def _last_landmark(utterances: Sequence[UtteranceRecord]) -> str | None:
-    """Returns the label of the landmark that was named last in utterances, None if there is none."""
+    """Returns the label of the landmark that was last named in utterances, None if there is none."""
     moves = (move for utterance in reversed(utterances) for move in reversed(utterance.moves))
     named = (move.act.slot_labels().get(Slot.LANDMARK.label) for move in moves)
     return next((labels[-1] for labels in named if labels), None)
@@ -154,7 +154,7 @@ class HistoryTracker:
         Args:
             speech: the utterance, with its words.
             physical: the physical action.
-            view: observation that the decision was taken on.
+            view: observation on which the decision was based.
             most_spans: maximum number of acts in an utterance; further ones are refused.
         """
         air, began = self.air, self.began
@@ -169,7 +169,7 @@ class HistoryTracker:
         Args:
             view: the observation.
             town: the map.
-            heard: spans of the participant's utterance that is over, empty if there is none.
+            heard: spans of the participant's utterance that has ended, empty if there is none.
         """
         history = self.history
         if self.tried is not None and self.before is not None and carried_out(self.tried, self.before, view):
@@ -189,7 +189,7 @@ def carried_out(tried: Physical, before: CoWizardView, after: CoWizardView) -> b
 
     Args:
         tried: the action.
-        before: observation that the action was chosen on.
+        before: observation for which the action was chosen.
         after: observation one decision later.
     """
     action = tried.action
@@ -216,7 +216,7 @@ def _start(spans: tuple[Span, ...], end: float, period: float) -> float:
 
     Args:
         spans: spans of the utterance.
-        end: time at which it is over [s].
+        end: time at which it ends [s].
         period: time between decisions [s].
     """
     seconds = sum(speech_seconds(span.text) for span in spans)

@@ -31,7 +31,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.support.input_files import MAX_WEIGHTS, check_file, raising
 
 _TOWNS: Final = 4
-"""Maximum number of towns that a model is kept ready for."""
+"""Maximum number of towns for which prepared models are kept."""
 
 _TEXTS: Final = 1 << 16
 

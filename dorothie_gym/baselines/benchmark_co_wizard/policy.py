@@ -121,7 +121,7 @@ def _last_move(voice: SpeechState) -> DialogueMove | None:
 
 
 def _way_to_place(history: History, view: CoWizardView, town: Town) -> float | None:
-    """Returns the distance along the way to the last-named place [m]; None if it is not near, or not on the map."""
+    """Returns the driving distance to the last-named place [m]; None if it is not near, or not on the map."""
     name = history.landmark
     named = next((landmark for landmark in view.landmarks if landmark.name.label == name), None)
     return None if named is None else default_lane_distance(town, view.here, named.place, IN_VIEW)
@@ -174,7 +174,7 @@ def _act(predicted: Predicted) -> DialogueAct:
 _CLAUSE_END: Final = re.compile(r"(?<=[,.?!]) ")
 
 _MAX_CLAUSES: Final = 8
-"""Maximum number of clauses; the last one gets the rest of a longer utterance."""
+"""Maximum number of clauses; the last one contains the rest of a longer utterance."""
 
 
 def spans_of(text: str, acts: Sequence[DialogueAct] | None, after: DialogueMove | None = None) -> tuple[Span, ...]:

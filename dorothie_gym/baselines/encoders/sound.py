@@ -28,7 +28,7 @@ BANDS: Final = 32
 """Number of mel bands."""
 
 MEL_FRAMES: Final = 256
-"""Number of frames of a spectrum, 5.1 s; later sound is cut off."""
+"""Number of frames of a spectrum, 5.1 s; later sound is truncated."""
 
 _LOWEST, _HIGHEST = 60.0, 7600.0
 _FLOOR: Final = 1e-7

@@ -130,7 +130,7 @@ class ExitTable:
 
     Attributes:
         angle: (L, X) angle of the turn to each exit [degrees, positive left].
-        lane: (L, X) lane that the car is on after the junction, -1 for none.
+        lane: (L, X) lane of the car after the junction, -1 for none.
         place: (L, X, 2) end of that lane [m].
         there: (L, X) whether the exit exists.
         distance: (L,) from the end of the lane to the junction along the lanes between [m].

@@ -149,7 +149,7 @@ def clone(
     """Maximises the likelihood of decisions; keeps the pass with the highest held-out likelihood.
 
     Args:
-        model: PPO, MaskablePPO or A2C; its actor learns, its critic does not.
+        model: PPO, MaskablePPO or A2C; only its actor is trained, not its critic.
         training: training decisions.
         held_out: decisions of other sessions, for early stopping.
         seed: seed of the order.

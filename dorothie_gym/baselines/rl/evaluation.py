@@ -80,7 +80,7 @@ class Episodes:
 
     @classmethod
     def joined(cls, parts: Sequence[Episodes]) -> Episodes:
-        """Returns the episodes of several parts."""
+        """Returns the episodes of several evaluations, concatenated."""
         return cls(
             np.concatenate([part.successes for part in parts]),
             np.concatenate([part.rewards for part in parts]),
@@ -102,7 +102,7 @@ class Episodes:
 
 
 def evaluate_settings(settings: TrainingSettings, act: Act, episodes: int, seed: int = FIRST_SEED) -> EpisodeStatistics:
-    """Plays episodes of the environment of a training, with consecutive seeds; of several towns, so many in each.
+    """Plays episodes of the environment of a training, with consecutive seeds; with several towns, this many in each.
 
     Args:
         settings: settings of the training.

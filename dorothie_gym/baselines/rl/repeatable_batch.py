@@ -18,9 +18,9 @@ Episode: TypeAlias = tuple[Page, NDArray[Any]]
 
 
 class RepeatableVecEnv(NativeVecEnv):
-    """Batch that records how each current episode began and its actions; see `RepeatableEpisodes` for one environment.
+    """Batch that records the start and actions of each current episode; see `RepeatableEpisodes` for one environment.
 
-    The beginning is the seed of a reset; for a reset without a seed, the state of the environment's random generator
+    The start is the seed of a reset; for a reset without a seed, the state of the environment's random generator
     before it, which is its state after the reset before.
     """
 

@@ -20,7 +20,7 @@ def sb3_vec_env(env: VectorEnv[Any, Any, Any]) -> VecEnv:
     """Returns a vector environment as a `VecEnv`, which steps all of its environments in one call.
 
     An info is empty except at the end of an episode, where it contains the last observation, whether the episode was
-    cut off by the time limit, and the environment's own information on the end, such as `is_success`. `env_method` and
+    truncated by the time limit, and the environment's information on the end, such as `is_success`. `env_method` and
     `get_attr` access the methods and attributes of the vector environment, such as `action_masks` for `MaskablePPO`.
 
     Args:
@@ -83,7 +83,7 @@ class NativeVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Plays a decision in all environments."""
+        """Steps all environments by one decision."""
         observations, rewards, terminated, truncated, all_infos = self.env.step(self._actions)
         over = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

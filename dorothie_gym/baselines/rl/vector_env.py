@@ -100,7 +100,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return self._answers(range(len(self._shares)))
 
     def _ask_some(self, indices: VecEnvIndices, name: str, *arguments: object, **keywords: object) -> list[Answer]:
-        """Returns the answers of the environments with these indices, in their order; no other environment is asked."""
+        """Returns the answers of the environments with these indices, in their order; only these are called."""
         numbers = [range(self.num_envs)[k] for k in self._get_indices(indices)]
         parts = [[k for k in numbers if k in share] for share in self._shares]
         asked = []
@@ -114,7 +114,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return [by_number[k] for k in numbers]
 
     def _answers(self, workers: Iterable[int]) -> list[Answer]:
-        """Returns the answers of workers; waits for all of them before raising an error of any."""
+        """Returns the answers of workers; waits for all workers before raising the error of one."""
         received = [self._receive(worker) for worker in workers]
         for succeeded, answer in received:
             if not succeeded:

@@ -1,6 +1,6 @@
 """Objects that a trained detector finds in the pictures of a recorded session, as rows of `ACTOR_DTYPE`.
 
-Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers start again in
+No data of the recorded actors are used: place, heading and size are those of the box in space, numbers restart in
 each picture, and no speed is known, because objects are not tracked from picture to picture.
 """
 
@@ -60,7 +60,7 @@ _ACTORS: Final = {
 class DetectedBoxes:
     """Objects that a trained detector finds, which reads the classes and depths that its SegFormer predicts.
 
-    Detections count from the score on that had the best F1 in the validation pictures. The detections in a session are
+    Detections count above the score that had the best F1 in the validation pictures. The detections in a session are
     stored in a folder next to the weights.
 
     Attributes:
@@ -136,7 +136,7 @@ class DetectedBoxes:
         """Returns the detections in pictures at those of the session's records of actors that are examined.
 
         That is the last record before each event, which models read at their points, and every fourth of the others,
-        for the window before a point. Records outside the frames of the car get no objects.
+        for the window before a point. Records outside the frames of the car have no objects.
 
         Raises:
             SessionError: the session has no frames of the car, or no surroundings.
@@ -241,7 +241,7 @@ def before_events(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDAr
 
 
 def looked_at(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the places (n,) of the records that are looked at, rising; arguments as in `before_events`."""
+    """Returns the ascending indices (n,) of the records that are examined; arguments as in `before_events`."""
     return np.union1d(before_events(records, events), np.arange(0, len(records), _SPACING)).astype(np.int64)
 
 
@@ -255,7 +255,7 @@ def objects_in(boxes: NDArray[np.floating], scores: NDArray[np.floating], thresh
     Args:
         boxes: (q, 4) centre x and y, width and height.
         scores: (q, k) sureness of the kinds.
-        threshold: least score of an object.
+        threshold: minimum score of an object.
     """
     sure = np.flatnonzero(scores.max(axis=1) >= threshold)
     return sure[distinct_queries(boxes[sure], scores[sure])] if len(sure) else sure

@@ -23,7 +23,7 @@ from dorothie_gym.baselines.vision.solids import SOLID, solid_loss, solids_from
 from dorothie_gym.ontology.slots import ObjectClass
 
 KINDS: Final = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
-"""Kinds of objects that are detected; the last stands for all props."""
+"""Kinds of objects that are detected; the last one covers all props."""
 
 _CHANNELS: Final = 4  # RGB and depth; the class is looked up
 _PRIOR: Final = 0.01  # sureness at first (Lin et al., 2017)
@@ -118,7 +118,7 @@ class DetectorConfig:
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Objects that have to be found in a picture.
+    """Objects that should be detected in a picture.
 
     Attributes:
         boxes: (n, 4) as in `Detections`.

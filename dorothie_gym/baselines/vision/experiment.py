@@ -84,7 +84,7 @@ class VisionExperiment:
 
     @property
     def reads_predictions(self) -> bool:
-        """Whether a SegFormer has to be trained before."""
+        """Whether a SegFormer must be trained first."""
         return self.model == "detr" and self.inputs == "predicted"
 
     @property
@@ -94,7 +94,7 @@ class VisionExperiment:
 
 
 def check_experiment(job: VisionExperiment) -> None:
-    """Raises `ValueError` if a setting is unknown, or the device is not here; `CheckpointError` as in the run."""
+    """Raises `ValueError` if a setting is unknown, or the device is missing; `CheckpointError` as in the run."""
     config_of(job.model, job.size)
     if job.inputs not in ("predicted", "true"):
         raise ValueError(f"there are no inputs {job.inputs!r}; choose from predicted, true")

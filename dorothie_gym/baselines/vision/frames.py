@@ -1,6 +1,6 @@
 """Labelled pictures of the recorded sessions of a corpus, drawn once and kept in the user's cache.
 
-An entry of the cache is a folder of memory-mapped `.npy` files for one session. Its name is a hash of everything that
+An entry of the cache is a folder of memory-mapped `.npy` files for one session. Its name is a hash of all that
 determines its content: the session, its town, the sampling, and the source of the renderer. Entries are sealed; damaged
 ones are drawn again. The least recently used entries are removed beyond `MOST_BYTES`.
 """
@@ -65,7 +65,7 @@ BOX_DTYPE: Final = np.dtype(
     [(name, np.int32) for name in ("picture", "kind", "left", "top", "right", "bottom", "pixels")]
     + [(name, np.float32) for name in SPACE_COLUMNS]
 )
-"""Number of the picture in its session, `ObjectClass`, limits after the last pixel, visible pixels, box in space."""
+"""Number of the picture in its session, `ObjectClass`, limits one past the last pixel, visible pixels, box in space."""
 
 CAMERA_FAULTS: Final = tuple(sensor for sensor in Sensor if CLARITY[sensor] < 1.0)
 """Faults that show in pictures."""
@@ -362,7 +362,7 @@ def _draw(task: _Task) -> _Drawn:
 def _write(
     target: Path, pictures: RecordedPictures, frames: NDArray[np.int64], sampling: FrameSampling, keys: Path
 ) -> None:
-    """Draws pictures into a new folder, which gets its name, and a seal by the key in `keys`, when it is whole."""
+    """Draws pictures into a new folder, which is renamed and sealed with the key in `keys` when it is complete."""
     size = len(frames), sampling.height, sampling.width
     part = Path(tempfile.mkdtemp(prefix=f"{target.name[:16]}.", suffix=PART, dir=target.parent))
     try:

@@ -1,6 +1,6 @@
 """Metrics of the vision models: intersection over union, errors of depth, and COCO's average precision.
 
-Classes present are those with at least one true pixel in the pictures that are tested; the means over classes are over
+Classes present are those with at least one true pixel in the tested pictures; the means over classes are over
 these. Objects are tested class by class as in COCO: a detection is correct if its box overlaps one of the picture's
 true boxes of its class by at least a share of their union, and no detection with a higher score has matched this box.
 Precision is read at 101 values of recall. True boxes with few visible pixels are ignored: they need not be found, and
@@ -72,7 +72,7 @@ class PixelScores:
         }
 
     def figures(self) -> dict[str, float]:
-        """Returns mIoU, mAcc (mean recall of the classes present), aAcc (share of right pixels) and depth error."""
+        """Returns mIoU, mAcc (mean recall of the classes present), aAcc (share of correct pixels) and depth error."""
         right, true = np.diag(self.confusion), self.confusion.sum(1)
         present = true > 0
         if not present.any():
@@ -189,7 +189,7 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
 
 
 def best_threshold(pictures: Sequence[PictureBoxes]) -> tuple[float, float]:
-    """Returns the least score of detections with the highest F1 at an overlap of one half, and the F1; or (1, 0).
+    """Returns the score threshold with the highest F1 at an overlap of one half, and that F1; or (1, 0).
 
     Precision and recall are over the boxes of all classes.
     """
@@ -218,7 +218,7 @@ def _kinds_of(pictures: Sequence[PictureBoxes]) -> list[int]:
 
 
 def _of_kind(pictures: Sequence[PictureBoxes], kind: int, least: Sequence[float], closeness: Closeness) -> Array:
-    """Returns the average precision (k,) of a class at each least closeness."""
+    """Returns the average precision (k,) of a class at each closeness threshold."""
     scores, right, counted, wanted = [], [], [], 0
     for picture in (each.of_kind(kind) for each in pictures):
         wanted += int((~picture.ignored).sum())

@@ -69,7 +69,7 @@ class ObjectLearner(Learner):
         return [(others, 1.0), (backbone, self.config.backbone_rate)]
 
     def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
-        """Returns the mean loss of the given training pictures, half of them mirrored, enlarged parts of the whole."""
+        """Returns the mean loss of the given training pictures, half of them mirrored, as enlarged crops."""
         pictures = self._training.take(rows)
         rgb, depth, semantic = inputs(pictures, self.device)
         images, wanted = [], []
@@ -86,7 +86,7 @@ class ObjectLearner(Learner):
         return self.model.loss(colours, depths, classes, wanted)
 
     def validate(self) -> Mapping[str, float]:
-        """Returns figures of the validation pictures, and the best least score of detections; the score is AP50."""
+        """Returns figures of the validation pictures, and the best score threshold of detections; the score is AP50."""
         found = detected_boxes(self.model, self._validation, most=VALIDATED)
         figures = object_figures(found)
         threshold, f1 = best_threshold(found)

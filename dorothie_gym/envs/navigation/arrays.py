@@ -20,7 +20,7 @@ class Stage(enum.IntEnum):
     """Next part of a decision."""
 
     DONE = 0
-    """None: the decision is over."""
+    """None: the decision is complete."""
     ACTING = 1
     """The action is to be carried out."""
     MOVING = 2
@@ -58,8 +58,8 @@ class DriveRecord:
     """Decision of an environment."""
 
     controls: Annotated[NDArray[np.float64], "f8", (3,)]  # throttle, steer (positive right), brake
-    speed: Float  # of the ego at its beginning [m/s]
-    since: Float  # time of its beginning [s]
+    speed: Float  # of the ego at its start [m/s]
+    since: Float  # time of its start [s]
     goal_station: Float  # goal that progress is measured to [m]
     goal_lane: Int32  # -1 for none
     costs: Int32  # row of the costs to it
@@ -72,7 +72,7 @@ class DriveRecord:
     refusal: Int32  # `codes.Refusal` or `CRUISE_LIMIT`
     refused: Int32  # belief updates that were refused before
     left: Int32  # substeps that are still to be made
-    told_lane: Int32  # place of a goal that is not on the map, as far ahead as was said; -1 for none
+    told_lane: Int32  # place of a goal that is not on the map, at the stated distance ahead; -1 for none
     told_station: Int32  # [m]
     halfway: Flag  # whether the action is carried out, and only the physics is to be stepped
     lost: Flag  # whether a new path is to be laid

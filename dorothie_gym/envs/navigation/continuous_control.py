@@ -110,7 +110,7 @@ def instructed_manoeuvre(
 ) -> tuple[int, int]:
     """Returns the manoeuvre of the last instruction: number of a `PhysicalAction`, or 0, and its angle [degrees].
 
-    0 stands for an instruction without a manoeuvre, or one whose manoeuvre is part of the path already, or cannot be.
+    0 for an instruction without a manoeuvre, or whose manoeuvre is already part of the path or infeasible.
     """
     heard, plan = driver.heard[0], world.plan[0]
     order = 0
@@ -138,7 +138,7 @@ def instructed_manoeuvre(
 
 @compiled
 def has_lost_path(world: WorldArrays) -> bool:
-    """Returns whether the ego has left its path, or come to the end of a path that could continue."""
+    """Returns whether the ego has left its path, or reached the end of a path that could continue."""
     plan, car = world.plan[0], world.car[0]
     return bool(abs(car.offset) > LOST or (plan.length - car.s < END and not plan.open_end))
 

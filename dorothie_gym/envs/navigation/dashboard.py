@@ -36,7 +36,7 @@ PLANNED, GOAL_COLOUR = (60, 220, 60), (255, 80, 255)
 """Colours of the manoeuvre that the car prepares, and of the goal."""
 
 SPEED, WANTED, LIMIT = (255, 255, 255), (0, 200, 255), (255, 40, 40)
-"""Colours of the speed, of the speed that is asked for, and of the marks at the limit."""
+"""Colours of the speed, of the requested speed, and of the marks at the limit."""
 
 HAZARD, LIGHTS, STEERING = (255, 40, 40), (60, 120, 255), (255, 140, 0)
 """Colours of the lamps and of the gauge of the steering wheel."""

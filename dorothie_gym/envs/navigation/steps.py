@@ -81,7 +81,7 @@ def act(
     frames: int,
     pedals: bool,
 ) -> None:
-    """Carries out the action of a decision and steps the physics, or lays a new path, as far as Python is not needed.
+    """Carries out the action of a decision and steps the physics, or lays a new path, until Python is needed.
 
     Args:
         town: arrays of the town.
@@ -255,7 +255,7 @@ def finish(
 
 @compiled
 def _cost_to_go(graph: RoutingGraph, common: DrivingTown, state: DriveRecord, lane: int, station: float) -> float:
-    """Returns the cost from a place to the current goal [m], infinite without one."""
+    """Returns the cost from a place to the current goal [m], infinite without a goal."""
     if state.goal_lane < 0:
         return math.inf
     return cost_from(graph.lanes, common.costs[state.costs], int(state.goal_lane), state.goal_station, lane, station)

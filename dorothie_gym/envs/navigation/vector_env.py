@@ -42,7 +42,7 @@ class DrivingVectorEnv(
     """Base class of the vectorised navigation environments.
 
     Each environment has episodes of its own: they depend on its seed and actions, and neither on the other
-    environments, nor on its place among them, nor on the number of threads.
+    environments, nor on its index, nor on the number of threads.
     """
 
     MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = (
@@ -131,7 +131,7 @@ class DrivingVectorEnv(
 
         Raises:
             ValueError: the actions are not in the action space.
-            gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
+            gymnasium.error.ResetNeeded: an environment was never reset, or has ended and is not reset automatically.
         """
         actions = self._checked(actions)
         over = self._terminations | self._truncations
@@ -183,7 +183,7 @@ class DrivingVectorEnv(
         for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])
-                self._note(batch, members)  # the others begin anew in the same step
+                self._note(batch, members)  # the others are reset in the same step
                 for number in members[playing[members]].tolist() if self._views else ():
                     self._views[number].note(*self._places[number])
 
@@ -244,7 +244,7 @@ class DrivingVectorEnv(
         return found
 
     def _begin_at_once(self, over: NDArray[np.bool_]) -> Infos:
-        """Resets environments that are over; returns the infos of the mode `SAME_STEP`."""
+        """Resets environments whose episode has ended; returns the infos of the mode `SAME_STEP`."""
         final = np.full(self.num_envs, None, dtype=object)
         ended, numbers = self._infos(over), np.flatnonzero(over).tolist()
         for number in numbers:

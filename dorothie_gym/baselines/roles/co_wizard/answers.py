@@ -69,7 +69,7 @@ def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizard
 
 
 def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None:
-    """Returns the proposition of a yes/no question; a check that names no more is about the current goal."""
+    """Returns the proposition of a yes/no question; a check without further content is about the current goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
     if utterance.places:
@@ -148,7 +148,7 @@ def is_sayable(
 
 
 def _waits_for_answer(utterance: Utterance, memory: WorkingMemory) -> bool:
-    """Returns whether an utterance asks something that has not been answered yet."""
+    """Returns whether an utterance contains a question that has not been answered yet."""
     return memory.spoke_at < utterance.time and any(act.move in QUESTIONS for act in utterance.heard.acts)
 
 
@@ -160,7 +160,7 @@ def _is_denied(memory: WorkingMemory, view: CoWizardView, said: Proposition) -> 
 
 
 def _is_about(answer: Proposition, utterance: Utterance) -> bool:
-    """Returns whether an answer is about the question of an utterance, as far as that was understood."""
+    """Returns whether an answer is about the question of an utterance, as it was understood."""
     asked = _asked_about(utterance)
     if not asked:
         return True

@@ -50,8 +50,8 @@ VARIABLES: Final[Mapping[str, int]] = MappingProxyType(
 
 `manoeuvre` is none, a U-turn, or a lane switch to the left or right that was requested; `onto_street`: the turn leads
 into the street that was named; `skip`: junctions to pass before it; `nudging`: the car goes a little further, to stop
-again; `resting`: it stops for good before a hazard; `lights`: nothing was said, on, off; `proposed`: a way that was
-proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower` likewise.
+again; `resting`: it stops for good before a hazard; `lights`: not mentioned, on, off; `proposed`: a route that was
+proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower`: similarly.
 """
 
 CONFIG: Final = CoWizardConfig()
@@ -117,10 +117,10 @@ class WorkingMemory:
         goal: name of the goal; None if there is none.
         goal_mark: its row among the landmarks; -1 if it is not on the map.
         goal_at: time of its last change [s].
-        former: the goal before.
+        former: the previous goal.
         street: street of the requested turn.
         junction: the junction from which the requested turn is counted; -1 for none.
-        target: place at which a nudge or a slow approach ends.
+        target: place where a nudge or a slow approach ends.
         navigator: route to the goal.
         ruled_out: places of houses and people that were visited or not meant.
         statuses: status of errands by place.
@@ -128,7 +128,7 @@ class WorkingMemory:
         plan: junctions of the route as sent last.
         standstill: current or last standstill, and the reason for it.
         told_to_stop_at: time at which it halted because of an utterance [s].
-        told_to_turn_round_at: last time at which an utterance told it to turn round [s].
+        told_to_turn_round_at: time of the last instruction to turn round [s].
         physical: its last physical action; None if there is none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
@@ -355,7 +355,7 @@ _INDEX: Final[Mapping[str, int]] = MappingProxyType({name: k for k, name in enum
 
 
 def initial_values(speed: int) -> tuple[int, ...]:
-    """Returns the values at the beginning of a session, with a usual cruise speed [km/h]."""
+    """Returns the values at the start of a session, with the usual cruise speed [km/h]."""
     return tuple(speed_index(speed) if name == "speed" else 0 for name in VARIABLES)
 
 

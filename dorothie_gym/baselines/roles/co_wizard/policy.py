@@ -231,7 +231,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
 
 
 def _wording_context(view: CoWizardView, memory: WorkingMemory) -> WordingContext:
-    """Returns what the words may refer to."""
+    """Returns the possible referents of the words."""
     near = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, memory.town, view.lane)
     return WordingContext(

@@ -1,6 +1,6 @@
 """Remarks of the learned Co-Wizard: those of the corpus without their names, and where it takes the names from.
 
-Forms are explained in `learned_role.remark_forms`. What the rules answer, and what is said again, is taken as a whole.
+Forms are explained in `learned_role.remark_forms`. Answers of the rules and repetitions are taken as a whole.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.view_range import sight, suitable_speed
 
 _WHOLES: Final = ("answer", "again")
-"""Sources of whole remarks: the answer to what was just asked, and the last remark said again."""
+"""Sources of whole remarks: the answer to the last question, and a repetition of the last remark."""
 
 
 def sources(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utterance]) -> dict[str, object]:
@@ -85,7 +85,7 @@ def check_form(form: str) -> None:
 
 
 def _example(source: str) -> object:
-    """Returns what a source can be."""
+    """Returns the possible values of a source."""
     if source in _WHOLES:
         return Remark(act=DialogueAct.of(DialogueMove.REPLY_U))
     if source in ("goal", "former", "near", "place0", "place1"):

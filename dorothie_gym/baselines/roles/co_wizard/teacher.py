@@ -1,4 +1,4 @@
-"""The scripted Co-Wizard as a teacher: run alongside a session, it reports what it would do, remember and say.
+"""The scripted Co-Wizard as a teacher: run alongside a session, it reports its choices of actions, memory and remarks.
 
 The teacher has the player's observations. The player's actions and remarks are copied into its state instead of its own
 (`drove`, `talked`), so that it continues from the player's situation, not from its own.

@@ -108,7 +108,7 @@ class ExampleBatch(ABC, Generic[Example]):
 
         Args:
             paths: files.
-            least: the number of times.
+            least: minimum number of occurrences.
         """
         counts: Counter[str] = Counter()
         for path in paths:

@@ -14,7 +14,7 @@ from dorothie_gym.baselines.roles.learned_role.examples import UNKNOWN
 
 BATCH_SIZE: Final = 256
 RATE, LAST_RATE = 1e-3, 5e-5
-"""Learning rate at the beginning and at the end of a fit."""
+"""Learning rate at the start and at the end of a fit."""
 
 DECAY: Final = 1e-4
 """Weight decay."""

@@ -83,7 +83,7 @@ class RoleLearner(Generic[Network, Batch, Example, Settings]):
     Attributes:
         role: the role.
         settings: settings of the training.
-        begun: processor time at the beginning of the training [s].
+        begun: processor time at the start of the training [s].
     """
 
     role: LearnedRole[Network, Batch, Example, Settings]

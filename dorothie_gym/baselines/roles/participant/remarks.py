@@ -132,7 +132,7 @@ _POINTERS: Final = ((_ORDERS, ("manoeuvre", "turn")), (_ANSWERS, ("said_action",
 def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
     """Returns the form of a remark; None if it has a name, number or text without a source."""
     if any(said.predicate is Predicate.NEAR and said.get("object") is not None for said in remark.meaning):
-        return None  # which sign stands there is not observed
+        return None  # the sign at the place is not observed
     texts = {value: name for name, value in available.items() if name.startswith(TEXT_MARK)}
     plain = {name: value for name, value in available.items() if not name.startswith(TEXT_MARK)}
     try:
@@ -264,7 +264,7 @@ STOP_FORM: Final = "stop"
 
 
 def is_stop(remark: Remark, memory: SessionMemory, view: ParticipantView) -> bool:
-    """Returns whether a remark stops the car at the target: an instruction, or the statement that this is the place."""
+    """Returns whether a remark stops the car at the target: an instruction, or the statement "this is the place"."""
     if not is_last_stretch(memory.records, view) or view.standing:
         return False
     stops = remark.act.move is DialogueMove.INSTRUCT and remark.act.slots == {ActionValue.STOP}
