@@ -177,7 +177,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         return self.engine.observations.of(), rewards, terminations, truncations, infos
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the whole session. Returns an array: (800, 1280, 3); with a windscreen (720, 1280, 3); in human mode None."""
+        """Draws the session into an array: (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
         return self._view.render(self.session)
 
     def close(self) -> None:

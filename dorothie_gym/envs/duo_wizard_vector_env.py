@@ -195,7 +195,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     ) -> tuple[
         dict[str, Stacked], dict[str, NDArray[np.float64]], dict[str, Flags], dict[str, Flags], dict[str, Infos]
     ]:
-        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
+        """Steps every environment by one decision; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: by agent the fields of its action, each an array (num_envs, ...) or a sequence of `num_envs`

@@ -160,7 +160,7 @@ class _Library(CachedViews):
 
     Args:
         corpus: as in `TeacherForcedEnv`.
-        split: see there.
+        split: as in `TeacherForcedEnv`.
         task: task of the points.
         limits: maximum numbers of landmarks and streets.
         strict: as in `TeacherForcedEnv`.

@@ -122,7 +122,7 @@ class PerceptionModel(enum.StrEnum):
     """All bodies around the car that are near enough for the weather."""
 
     CAMERA = "camera"
-    """Those that the picture of the camera on the car shows: in front of it, and not hidden."""
+    """Objects visible in the picture of the camera on the car: in front of it, and not hidden."""
 
 
 class ChannelKind(enum.StrEnum):
@@ -228,7 +228,7 @@ class RenderView(enum.StrEnum):
 
 
 def checked_view(name: str) -> RenderView:
-    """Returns the view of a name.
+    """Returns the view with a name.
 
     Raises:
         ValueError: there is no such view; lists them.

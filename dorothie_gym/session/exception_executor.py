@@ -33,7 +33,7 @@ FROM_SITE = 25.0
 """Minimum distance of a prop from a waypoint along the lane [m]; the ego must be able to stop at the waypoint."""
 
 FROM_CAR = 25.0
-"""Minimum distance of anything new from the ego, beyond its stopping distance [m]; it leaves room for a U-turn."""
+"""Minimum distance of new bodies from the ego, beyond its stopping distance [m]; it leaves room for a U-turn."""
 
 FROM_VEHICLE = 6.0
 """Minimum distance of a new prop from the centre of a vehicle [m]."""
@@ -203,7 +203,7 @@ class ExceptionExecutor:
         return self._world.weather.braking_distance(float(self._world.car.speed), PLANNED_BRAKING)
 
     def _unsafe(self, action: AdWizardAction, kind: PropKind, *, without: Prop | None) -> str | None:
-        """Returns the reason why a prop must not stand at a place, or None.
+        """Returns the reason why a prop must not be placed somewhere, or None.
 
         The checks cover every site of the town, not only those of the live subgoals: a refusal must not reveal hidden
         landmarks. Every reachable site stays reachable.

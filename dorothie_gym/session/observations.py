@@ -150,7 +150,7 @@ class DeliveredMessages:
 
 
 class ObservationBuilder(CachedViews):
-    """Builds the observations of a session, for the roles that are asked for.
+    """Builds the observations of a session for the requested roles.
 
     Compiled code writes values that change at every decision (`view_steps`). Constant values are written once, and
     rarely changing ones when they change.
@@ -255,7 +255,7 @@ class ObservationBuilder(CachedViews):
             table[name.value] = (1.0, *guess.mean, xx, yy, xy)
 
     def _write_props(self) -> None:
-        """Writes the props, if there are or were any."""
+        """Writes the props, if there are any or have been."""
         if not (self._props or self._world.actors.has_props):
             return
         props, table = self._world.actors.props, self._tables[Role.AD_WIZARD]["props"]
@@ -339,11 +339,11 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
 class SessionObserver:
     """Observations, masks and pictures of a session at the current decision.
 
-    Rows and masks are made when they are first used: not all sessions are observed by dicts, or asked for masks.
+    Rows and masks are made when they are first used: not all sessions are observed by dicts or need masks.
 
     Attributes:
         delivered: speech and messages of the last decision; the session replaces it.
-        camera_perception: what the picture shows, if the roles see by the camera.
+        camera_perception: content of the picture, if the roles perceive by the camera.
     """
 
     def __init__(
@@ -384,7 +384,7 @@ class SessionObserver:
         self.write()
 
     def write(self) -> None:
-        """Writes all of the observations and masks that the compiled code does not, and what it reads."""
+        """Writes the parts of observations and masks that the compiled code leaves out, and its inputs."""
         self._world.write_weather()
         self._builder.write(self.delivered)
         self.masks.write()
@@ -450,7 +450,7 @@ class LazyObservations(Mapping[str, Observation]):
         return len(_AGENTS)
 
     def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Returns the observations of the given roles by agent; those that are missing are built together."""
+        """Returns the observations of the given roles by agent; missing ones are built together."""
         missing = [role for role in roles if role not in self._built] if self._built else roles
         if not missing:
             return {_NAMES[role]: self._built[role] for role in roles}

@@ -41,7 +41,7 @@ class Pictures(Protocol):
     """Pictures of the camera on the car of a session (`camera.session_pictures`)."""
 
     def frame(self, decision: int) -> CameraFrame:
-        """Returns the picture at the current decision, of this number."""
+        """Returns the picture at the current decision with this number."""
 
     def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
         """Adds the pictures of the current decision to the observations of the roles that see them."""
@@ -59,7 +59,7 @@ class VisiblePerception(Protocol):
         """Indices of the landmarks that have been recognised so far, in the order of the first time."""
 
     def look(self) -> None:
-        """Looks at the current decision."""
+        """Updates to the current decision."""
 
     def pixels(self, key: int) -> int:
         """Returns the number of visible pixels of a body, by its key."""

@@ -1,4 +1,4 @@
-"""All rewards: what each environment rewards, the names of the terms, and their weights.
+"""All rewards: the rewards of each environment, the names of the terms, and their weights.
 
 | environment | terms | weights |
 |---|---|---|
@@ -9,7 +9,7 @@
 
 The reward of a decision is the sum of its terms (the mean for predictions); `info["reward_terms"]` has each of them.
 `Town-v0` is an environment of highway-env without roles: its two terms are in `TownEnv._rewards`, where highway-env
-asks for them.
+requests them.
 """
 
 from __future__ import annotations

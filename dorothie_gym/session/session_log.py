@@ -53,7 +53,7 @@ class SessionCounts(TypedDict):
 
 
 class SessionSummary(SessionCounts):
-    """State of a session; `reason` is there when it is over ("arrived", "out of time" and the like).
+    """State of a session; `reason` is set when it has ended ("arrived", "out of time" and the like).
 
     `usage` is there for played sessions in which policies have cost something (calls, tokens), by role.
     """

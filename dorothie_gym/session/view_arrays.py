@@ -163,7 +163,7 @@ class RoleArrays(CachedViews):
         return observed
 
     def clear(self, row: int) -> None:
-        """Forgets a session: its observations are zeros and empty texts."""
+        """Clears a session: its observations become zeros and empty texts."""
         for role, buffer in self.observations.items():
             buffer.clear(row)
             for texts in self.texts[role].values():

@@ -1,4 +1,4 @@
-"""Observations and action masks of many sessions at once (compiled), as far as they change at every decision."""
+"""Parts of observations and action masks that change at every decision, for many sessions at once (compiled)."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class RepeatableVecEnv(NativeVecEnv):
         return observations
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Plays a decision in all environments."""
+        """Steps all environments by one decision."""
         actions = np.array(self._actions)  # a copy: the caller may use the array again
         observations, rewards, dones, infos = super().step_wait()
         for number in range(self.num_envs):

@@ -320,8 +320,8 @@ class TOTO(Model):
 def gather_tokens(channels: list[Tokens]) -> tuple[Tensor, Tensor, Tensor]:
     """Returns the tokens of all channels (B, T, d), their times (B, T) and their mask (B, T).
 
-    Valid tokens come first, and T is the largest number of tokens of a point: missing tokens cost nothing, and results do
-    not depend on the padding. Attention does not depend on the order of tokens.
+    Valid tokens come first, and T is the largest number of tokens of a point: missing tokens cost nothing, and
+    results do not depend on the padding. Attention does not depend on the order of tokens.
     """
     tokens = torch.cat([part for part, _, _ in channels], dim=1)
     mask = torch.cat([part for _, part, _ in channels], dim=1)

@@ -121,7 +121,7 @@ class DrivingVectorEnv(
     def step(
         self, actions: NDArray[np.generic]
     ) -> tuple[DriverObservation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
-        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
+        """Steps every environment by one decision; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: (num_envs, ...) one for each.
@@ -179,7 +179,7 @@ class DrivingVectorEnv(
         """Returns actions as an array; raises `ValueError` if they are not in the action space."""
 
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in the environments of a mask, and records its outcome."""
+        """Steps the environments of a mask by one decision, and records the outcome."""
         for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])

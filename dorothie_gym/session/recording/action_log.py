@@ -85,7 +85,7 @@ def read_decisions(folder: Path) -> tuple[tuple[Decision, ...] | None, bool]:
 
 
 def check_order(decisions: Sequence[Decision], where: str) -> None:
-    """Raises `SessionError`, beginning with `where`, if the frames of decisions do not rise."""
+    """Raises `SessionError`, prefixed with `where`, if the frames of decisions do not rise."""
     for number, (before, after) in enumerate(itertools.pairwise(decisions), start=2):
         if after.frame <= before.frame:
             raise SessionError(f"{where}, line {number}: frame {after.frame} after {before.frame}; frames must rise")

@@ -198,7 +198,7 @@ def read_object(path: Path) -> Fields:
 
 
 def decode_text(content: bytes, where: str) -> str:
-    """Returns the text of bytes in UTF-8; raises `SessionError`, beginning with `where`, for other bytes."""
+    """Returns the text of bytes in UTF-8; raises `SessionError`, prefixed with `where`, for other bytes."""
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def faults_of(session: Session) -> tuple[str, ...]:
-    """Returns one sentence for each fault, beginning with its place."""
+    """Returns one sentence for each fault, starting with its place."""
     return (*_header(session), *_events(session), *_actions(session), *_utterances(session), *_frames(session))
 
 

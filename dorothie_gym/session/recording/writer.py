@@ -104,7 +104,7 @@ class SessionWriter:
     def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, object]]) -> None:
         """Appends the actions of the roles at a frame, see `Decision`; nothing is written without an action.
 
-        From the first call on, the session counts as one with recorded decisions.
+        After the first call, the session counts as one with recorded decisions.
 
         Raises:
             SessionError: an action cannot be written, or the frame is not above that of the decision before.
@@ -170,7 +170,7 @@ class SessionWriter:
         """Writes the outcome, which completes the session, and closes it.
 
         The journal is converted into `frames.parquet` and removed; last, `session.json` is replaced atomically. A
-        finished session is on the disk: a power failure cannot take parts of it.
+        finished session is on the disk: a power failure cannot destroy parts of it.
 
         Raises:
             SessionError: the outcome holds other types than JSON's, or the session is closed.
@@ -192,7 +192,7 @@ class SessionWriter:
 
     def close(self) -> None:
         """Closes the files; an unfinished session stays incomplete. May be called again."""
-        with contextlib.ExitStack() as closing:  # all of them, also on a disk that fails
+        with contextlib.ExitStack() as closing:  # all of them, even on a failing disk
             for file in (self._events, self._journal, self._decisions):
                 if file is not None:
                     closing.callback(file.close)

@@ -49,7 +49,7 @@ MESSAGE_KINDS = tuple(field.name for field in fields(TaskMessages))
 """Kinds of changes of a task that a storyboard gives messages for: "trigger", "delete", "change"."""
 
 MAX_UTTERANCE = 4 * (UTTERANCE_LENGTH + 1)
-"""Greatest length of an utterance of several spans [characters]."""
+"""Largest length of an utterance of several spans [characters]."""
 
 
 class ObjectColumn(Column):

@@ -432,13 +432,13 @@ def _replace(
         station: start of the path on the first of them [m].
         speed: speed of the ego [m/s], which the length of lane switches depends on.
         first: first point of the current path that is kept, see `lay_head`.
-        end: the one after the last.
+        end: the point after the last one.
         oncoming: lane on which a U-turn ends, or -1.
         start: distance along the ego's lane at which the U-turn begins [m].
         action: manoeuvre of the new plan: number of a `PhysicalAction`, or 0.
         angle: angle of the manoeuvre [degrees].
-        connector: connector and lane of a turn, or -1.
-        way_out: see there.
+        connector: connector of a turn, or -1.
+        way_out: lane after that connector, or -1.
         fresh: whether the ego is at the start of the new path instead of on the current one.
         offset: distance of the ego from the new path then, positive right [m].
 

@@ -395,11 +395,11 @@ def closest_lane(
         town: arrays of the town.
         x: position [m].
         y: position [m].
-        heading: [rad], `cos` and `sin` its cosine and sine.
-        cos: see there.
-        sin: see there.
-        height: [m], NaN for any.
-        previous: lane that was closest before, looked at first; any lane does.
+        heading: [rad].
+        cos: cosine of the heading.
+        sin: sine of the heading.
+        height: [m], NaN for any height.
+        previous: lane to try first, usually the previous result; any lane is valid.
 
     Returns:
         The lane, and station [m], lateral distance [m] and closest segment on it.

@@ -105,8 +105,8 @@ def walk_towards(
         p: the pedestrian.
         x: place [m].
         y: place [m].
-        cos: direction of its footway.
-        sin: see there.
+        cos: cosine of the direction of its footway.
+        sin: its sine.
         lateral: offset to the right of the centre of that footway [m].
         half: half the width of that footway [m].
         time: until the next decision [s].

@@ -77,15 +77,15 @@ class WorldArrays(NamedTuple):
         props: props.
         nodes: nodes of the lanes' lists: two for each vehicle and four for each prop, in the lists of the lanes.
         heads: int32 first node of each lane, or -1.
-        order: int32 bodies (vehicles, pedestrians, props) as `collisions` sorts them, by `keys` [m].
-        keys: see there.
+        order: int32 bodies (vehicles, pedestrians, props) as `collisions` sorts them, by `keys`.
+        keys: their sort keys [m].
         lamps: one for each light programme.
         busy: int32 number of pedestrians on each crosswalk.
-        stack: int32 scratch of searches along lanes, with `starts` [m].
-        starts: see there.
+        stack: int32 scratch of searches along lanes.
+        starts: the starts of these lanes [m].
         clock: (1,) time and counters.
         car: (1,) control of the ego, if vehicle 0 is of the kind `Kind.DRIVEN`.
-        sweeps: directions and sweeps at the points of its path around its place, `EgoRecord.first` the first.
+        sweeps: directions and sweeps at the points of its path around its place, starting with `EgoRecord.first`.
         plan: (1,) its plan.
         course: points of its whole path.
         steps: lanes of the plan that is being made.
