@@ -56,7 +56,7 @@ def recognise(connection: HTTPConnection) -> None:
 
 
 class _Flow(FlowControl):
-    """Flow of a connection that tells when a handler wants to read on."""
+    """Flow of a connection that reports when a handler wants to continue reading."""
 
     def __init__(self, transport: asyncio.Transport, resumed: Callable[[], None]) -> None:
         super().__init__(transport)
@@ -98,7 +98,7 @@ class GuardedHttp(H11Protocol):
         self.app_state = {**self.app_state, _GUARD: guard}
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forgets the connection."""
+        """Removes the connection."""
         self._guard.visitors.leave(self.visitor)
         self._unread.clear()
         super().connection_lost(exc)
@@ -192,7 +192,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         self._refused = False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forgets the connection."""
+        """Removes the connection."""
         self._guard.visitors.leave(self.visitor)
         self._unread.clear()
         super().connection_lost(exc)

@@ -119,12 +119,12 @@ class BehaviourClaim:
 
 @dataclass(frozen=True, kw_only=True)
 class BehaviourVerdict:
-    """Evidence of a corpus for a claim.
+    """Result of testing a claim on a corpus.
 
     Attributes:
         claim: the claim.
-        difference: its figure over all sessions; None if it is undefined.
-        low, high: ends of its interval; None likewise.
+        difference: difference of the claim over all sessions; None if undefined.
+        low, high: limits of its interval; None if undefined.
     """
 
     claim: BehaviourClaim

@@ -286,7 +286,7 @@ class CorpusStats:
         anchors: shares of the most frequent labels.
         profiles: moves and slots per transaction and exchange.
         texts: utterances of the training and the test folds.
-        incomplete: names of interrupted sessions, which count as far as they were recorded.
+        incomplete: names of interrupted sessions, whose recorded part counts.
     """
 
     counts: Counts = field(default_factory=Counts)

@@ -298,7 +298,7 @@ class _Happened:
 
         Args:
             exchange: the exchange.
-            meant: whether the session has meanings; a question about an obstacle then has to be about the way.
+            meant: whether the session has meanings; a question about an obstacle must then be about the route.
         """
         first = exchange.moves[0].act
         if meant and self.kind.is_plan_level:

@@ -49,7 +49,7 @@ class SegmentationAgreement:
     """Agreement of two annotators on borders.
 
     Attributes:
-        kappa: Cohen's kappa of the sites; None if all of them are borders for both, or none is.
+        kappa: Cohen's kappa of the sites; None if both agree that all of them are borders, or none.
         similarity: boundary similarity; None without borders.
         sites: number of sites that both have judged.
         borders: number of borders of each annotator.

@@ -61,7 +61,7 @@ class Units:
         """Derives the units.
 
         Args:
-            session: any.
+            session: a session of any layout.
         """
         self.session = session
         self.utterances: tuple[UtteranceRecord, ...] = tuple(

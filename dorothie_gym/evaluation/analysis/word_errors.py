@@ -137,7 +137,7 @@ class WordErrorCounts:
                 self.noises[loudness_at(session, last)] += errors
 
     def to_json(self) -> dict[str, object]:
-        """Returns the errors in JSON types: all of them, and by speaker, noise and class of word."""
+        """Returns the errors as JSON types: in total, and by speaker, noise and class of word."""
         return {
             **self.total.to_json(),
             "by_speaker": {role.value: errors.to_json() for role, errors in _sorted(self.speakers)},

@@ -305,7 +305,7 @@ class MetricInterval:
     """Metric over sessions with its 95 % interval.
 
     The interval is Wilson's for a share of sessions (success), and for shares that are 0, or 1, in all sessions, where
-    the sessions count as trials. It is the percentile bootstrap over sessions for everything else.
+    the sessions count as trials. For all others, it is the percentile bootstrap over sessions.
 
     Attributes:
         mean: value over all sessions; None if undefined.

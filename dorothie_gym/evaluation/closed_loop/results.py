@@ -203,7 +203,7 @@ class _TrainingPage(TypedDict, total=False):
 
 
 class _SettingsPage(TypedDict):
-    """Output of `RolloutSettings.to_json`, as far as it is read."""
+    """Fields of the output of `RolloutSettings.to_json` that are read."""
 
     participant: str
     co_wizard: str
@@ -216,7 +216,7 @@ class _SettingsPage(TypedDict):
 
 
 class _ResultPage(TypedDict):
-    """Output of `RolloutResult.to_json`, as far as it is read; the tables follow from the rows."""
+    """Fields of the output of `RolloutResult.to_json` that are read; the tables follow from the rows."""
 
     version: str
     settings: _SettingsPage

@@ -48,9 +48,9 @@ class SessionTask:
     """Session to be checked.
 
     Attributes:
-        plan: session that the protocol plans.
-        row: its row in the result; None without one.
-        simulated: whether it is played again.
+        plan: session of the protocol.
+        row: its row in the result; None if it has none.
+        simulated: whether the session is simulated again.
     """
 
     plan: RolloutPlan
@@ -223,7 +223,7 @@ class SessionChecker:
         """Yields differences between the row and the measures of the session."""
         try:
             wanted = measure(session, self._engine(plan.town).town).to_json()
-        except Exception as error:  # a session that was not played again may hold anything
+        except Exception as error:  # a session that was not simulated again may contain anything
             raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
         given: Mapping[str, object] = record.to_json()
         for name, value in wanted.items():

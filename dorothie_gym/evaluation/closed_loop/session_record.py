@@ -366,7 +366,7 @@ def measure(session: Session, town: Town) -> SessionRecord:
 def count_infractions(session: Session) -> dict[str, int]:
     """Returns the number of infractions of each kind; kinds without infractions are left out.
 
-    Collisions are classified by the counterpart: pedestrian, vehicle, or anything else ("static"). Collisions that
+    Collisions are classified by the counterpart: pedestrian, vehicle, or other ("static"). Collisions that
     others caused (`own_fault` is false: the car stood or was hit from behind) count as "hit_by_others".
     """
     counts: Counter[str] = Counter()

@@ -62,7 +62,7 @@ class LeaderboardProtocol:
 
     Attributes:
         folds: folds whose towns a rollout may be played in; it covers one of them as a whole, in the usual order.
-        sessions: number of sessions; with more of them, a submitter could stop at the best moment.
+        sessions: number of sessions; if more were allowed, a submitter could stop at the best moment.
         seed: seed of the rollout.
         config: settings of the engine.
     """
@@ -143,7 +143,7 @@ def check_submission(
 
     Args:
         folder: folder of the rollout, with its sessions.
-        sample: number of sessions to play again; None for all of them. The other ones are drawn, read and measured.
+        sample: number of sessions to simulate again; None for all. The others are drawn, read and measured.
         seed: seed of the sample, which also depends on the content of all sessions; None draws one, so that the sample
             cannot be known beforehand.
         protocol: the protocol.

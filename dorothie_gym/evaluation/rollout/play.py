@@ -71,7 +71,7 @@ def play_session(
     Raises:
         ValueError: a role has no policy.
         SessionError: the folder holds a session already.
-        OutputFolderError: the folder was deleted meanwhile.
+        OutputFolderError: the folder was deleted during the session.
         OSError: the folder cannot be written.
     """
     missing = [role for role in AGENT_ROLES if role not in policies]
@@ -131,7 +131,7 @@ def personas_of(
 
 
 def pitches_of(personas: object) -> dict[Role, float]:
-    """Returns the pitch of the speakers' voices by role, from personas as a header records them; none without any."""
+    """Returns the pitch of the speakers' voices by role, from the personas in a header; empty without personas."""
     known = personas if isinstance(personas, Mapping) else {}
     found = {role: known[str(role)].get(PITCH) for role in AGENT_ROLES if isinstance(known.get(str(role)), Mapping)}
     return {role: float(pitch) for role, pitch in found.items() if isinstance(pitch, float | int)}

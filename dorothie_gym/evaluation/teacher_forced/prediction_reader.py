@@ -305,7 +305,7 @@ def _together(pieces: Sequence[Predictions]) -> Predictions:
 
 
 def _refuse(source: str, wrong: Sequence[str]) -> None:
-    """Raises `PredictionError` with the faults of a file, if any."""
+    """Raises `PredictionError` if a file has faults; the message lists them."""
     if wrong:
         more = [f"... and {len(wrong) - SHOWN} more rows"] if len(wrong) > SHOWN else []
         raise PredictionError(f"{source}: {'; '.join([*wrong[:SHOWN], *more])}")

@@ -83,7 +83,7 @@ Predictions: TypeAlias = ActPredictions | ActionPredictions
 
 
 def act_labels(points: Sequence[InferencePoint] | ActPredictions) -> ActPredictions:
-    """Returns the labels of the points, in the form of a prediction; what is in that form already stays as it is."""
+    """Returns the labels of the points, in the form of a prediction; labels in that form are returned unchanged."""
     if isinstance(points, ActPredictions):
         return points
     return ActPredictions(

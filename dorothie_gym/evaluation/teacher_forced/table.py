@@ -141,7 +141,7 @@ class ResultsTable:
         return tuple(found)
 
     def to_json(self) -> dict[str, object]:
-        """Returns everything as JSON types; None where a figure is undefined.
+        """Returns the whole table as JSON types; None where a figure is undefined.
 
         `models.<name>.<part>.<metric>` = {mean, half_width, seeds, values}; docs/predictions.md describes the rest.
         """
@@ -242,7 +242,7 @@ def evaluate_predictions(
 
     Raises:
         SessionError: the corpus cannot be read.
-        PredictionError: the predictions do not fit the corpus; see `score_runs`.
+        PredictionError: the predictions do not match the corpus; see `score_runs`.
     """
     labels = corpus if isinstance(corpus, CorpusLabels) else labels_of(corpus, split)
     return ResultsTable(

@@ -56,7 +56,7 @@ def read_elan(path: Path, text: SourceText) -> Annotation:
     """Returns the annotation of an ELAN file for the session with a text.
 
     Raises:
-        AnnotationError: the file is not XML, lacks a tier, or does not fit the session; the message names file and
+        AnnotationError: the file is not XML, lacks a tier, or does not match the session; the message names file and
             annotation.
         SessionError: the file is missing or too large.
     """

@@ -46,7 +46,7 @@ def seats_of(root: Path, people: Sequence[tuple[str, SeatKind]], *, renew: bool 
     Args:
         root: folder of the session or corpus.
         people: name and kind of each seat.
-        renew: whether all get new links.
+        renew: whether all links are replaced.
 
     Returns:
         Seats without a token for links that were given before: only their hashes are known.

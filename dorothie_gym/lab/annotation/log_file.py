@@ -94,4 +94,4 @@ def _cut(path: Path, size: int) -> None:
 
 
 _UNLINKED: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-"""A link or a pipe that is put there in the meantime is neither followed nor waited for."""
+"""A link or pipe that replaces the file in the meantime is neither followed nor waited for."""

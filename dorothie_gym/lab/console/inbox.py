@@ -47,8 +47,8 @@ class TakenActions:
 
     Attributes:
         action: the action of the role.
-        spoken: typed span that begins with it; None if there is none.
-        done: largest number of the commands that it carries out; 0 for none.
+        spoken: typed span whose speech begins in this decision; None if there is none.
+        done: highest number of the executed commands; 0 for none.
     """
 
     action: RoleAction
@@ -95,7 +95,7 @@ class SeatInbox:
         self._handlers = self._table()[role]
 
     def clear(self) -> None:
-        """Forgets the commands that wait."""
+        """Drops the waiting commands."""
         for queue in self._queues():
             queue.clear()
         self._spans.in_utterance = 0
@@ -111,7 +111,7 @@ class SeatInbox:
             queue.extend(waiting)
 
     def start_turn(self) -> None:
-        """Makes the first span wait until the utterance that the role is speaking is over: a policy began it."""
+        """Delays the first span until the end of an utterance that a policy has begun in the role."""
         self._spans.in_utterance = self._limits.spans
 
     def put(self, command: Command, after: DialogueMove | None = None) -> None:

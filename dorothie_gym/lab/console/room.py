@@ -137,7 +137,7 @@ class Room:
 
     @property
     def wants_pictures(self) -> bool:
-        """Whether a browser has asked for pictures through the windscreen."""
+        """Whether a browser has requested pictures through the windscreen."""
         return any(connection.rate for seat in self._all() for connection in seat.connections)
 
     @property

@@ -159,7 +159,7 @@ class SeatFrames:
     # --- pictures ---------------------------------------------------------------------------------------------------
 
     def pictures(self, *, advanced: bool) -> list[Outgoing]:
-        """Returns the picture through the windscreen for each browser that is due to get one.
+        """Returns the picture through the windscreen for each browser whose next picture is due.
 
         Args:
             advanced: whether a decision was played at this tick.

@@ -92,7 +92,7 @@ class Console:
         self._run(room)
 
     def close(self, room: Room) -> None:
-        """Closes a room whose session is over, and the connections of its seats."""
+        """Closes a room whose session has ended, and the connections of its seats."""
         self.rooms.remove(room)
         self._tasks.pop(room).cancel()
         for seat in room.seats.values():
@@ -142,7 +142,7 @@ class Console:
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Plays the sessions as long as the block lasts."""
-        load_grammar()  # otherwise the first thing that a script says keeps its session waiting
+        load_grammar()  # otherwise the first utterance of a script keeps its session waiting
         with (
             ThreadPoolExecutor(THREADS, thread_name_prefix="tick") as threads,
             ThreadPoolExecutor(1, thread_name_prefix="scene") as builders,
@@ -202,7 +202,7 @@ async def _join(console: Console, socket: WebSocket) -> tuple[Room, Seat] | None
 
 
 async def _first_text(console: Console, socket: WebSocket) -> str | None:
-    """Returns the first text, or closes the websocket if it does not come in time, or gives way to newer ones."""
+    """Returns the first text, or closes the websocket if it does not come in time, or must give way to newer ones."""
     loop = asyncio.get_running_loop()
     while len(console.joining) >= MOST_JOINING:
         oldest = next(iter(console.joining))

@@ -48,10 +48,10 @@ class TalkLog:
             self.entries.append({"t": time, "who": Role.AD_WIZARD.value, "text": message})
 
     def read_own(self, said: Sequence[Utterance], time: float) -> None:
-        """Appends the role's own utterances that are over, and all for spectators.
+        """Appends the role's own utterances that have ended, and all for spectators.
 
         Args:
-            said: all utterances of the session that are over.
+            said: all utterances of the session that have ended.
             time: current time [s].
         """
         for number in range(self._read, len(said)):

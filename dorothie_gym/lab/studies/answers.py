@@ -38,7 +38,7 @@ def set_secret(to: Response, request: Request, name: str, secret: str, seconds: 
         name: name of the cookie, without the port.
         secret: its value.
         seconds: how long browsers keep it [s]; None: until they are closed.
-        path: beginning of the paths to which it is sent.
+        path: prefix of the paths to which it is sent.
     """
     secure = request.url.scheme == "https" or request.headers.get("origin", "").startswith("https:")
     to.set_cookie(

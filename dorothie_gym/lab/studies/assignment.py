@@ -29,7 +29,7 @@ class Candidate:
     Attributes:
         name: id of the participant.
         role: role.
-        certainty: share of people like this one who come to a session.
+        certainty: share of people in the same position who come to a session.
         movable: whether the role can still be changed.
     """
 

@@ -83,13 +83,13 @@ class Database:
             yield
             self.run("COMMIT")
         except BaseException:
-            if self._connection.in_transaction:  # after some errors, SQLite has gone back by itself
+            if self._connection.in_transaction:  # after some errors, SQLite has already rolled back
                 self.run("ROLLBACK")
             raise
 
     @contextlib.contextmanager
     def snapshot(self) -> Iterator[None]:
-        """Reads everything in a block from one moment; changes wait meanwhile, so that it should be short."""
+        """Reads a consistent snapshot in a block; changes wait for its end, so it should be short."""
         self._connection.execute("BEGIN")
         try:
             yield

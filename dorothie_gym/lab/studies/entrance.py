@@ -40,11 +40,11 @@ class Entrance:
 
         Args:
             parameters: parameters of the link; unknown names and placeholders are left out.
-            token: token of an invitation, or of a link for readmission; None if there is none.
+            token: token of an invitation, or of a link for readmission; None for neither.
             visit: random text of the browser's tab. If an answer is lost in transit, the same tab gets the same place.
 
         Raises:
-            RefusedError: the person takes part already, or the link lacks what the study needs.
+            RefusedError: the person already takes part, or the link lacks a parameter that the study needs.
         """
         records, kept, contact = self._records, self._kept(parameters), self._study.contact
         with records.transaction():

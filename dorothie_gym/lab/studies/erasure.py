@@ -33,7 +33,7 @@ _CHUNK: Final = 1 << 20
 
 
 def erase(records: StudyRecords, *names: str) -> tuple[list[str], list[str]]:
-    """Deletes everything of participants.
+    """Deletes all data of participants.
 
     Sessions of the participants must not be in progress.
 

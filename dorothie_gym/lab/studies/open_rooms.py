@@ -34,7 +34,7 @@ LEAST_PATIENCE: Final = 15.0
 """Shortest time for the people of a new session to sit down [s]: pages have to load."""
 
 STOP_SECONDS: Final = 10.0
-"""Longest time for a session to end after it was asked to; then its room is closed as it is [s]."""
+"""Longest time for a session to end on request; after that, its room is closed in any state [s]."""
 
 
 @dataclass(eq=False)
@@ -61,7 +61,7 @@ class OpenRoom:
 
     @property
     def is_over(self) -> bool:
-        """Whether the session is over."""
+        """Whether the session has ended."""
         return self.room is not None and self.room.state is RoomState.OVER
 
 
@@ -138,7 +138,7 @@ class OpenRooms:
                     room = await asyncio.to_thread(self._builder.tutorial, role)
                 else:
                     room = await asyncio.to_thread(self._builder.session, row, place.people)
-        except Exception:  # such as a full disk; the others go on
+        except Exception:  # such as a full disk; the others continue
             logger.exception("%s cannot be opened", "a tutorial" if row is None else f"session {row.id}")
             self._rooms.remove(place)
             if row is not None:
@@ -164,7 +164,7 @@ class OpenRooms:
     # --- progress ---------------------------------------------------------------------------------------------------
 
     def finished(self) -> list[OpenRoom]:
-        """Returns the sessions that are over."""
+        """Returns the sessions that have ended."""
         return [each for each in self._rooms if each.is_over and each.session is not None]
 
     def mind(self, now: float) -> list[OpenRoom]:

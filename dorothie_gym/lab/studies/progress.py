@@ -75,7 +75,7 @@ class Progress:
             self._advance(person)
 
     def proceed(self, person: Participant, stage: Stage) -> None:
-        """Ends a stage at the wish of its participant."""
+        """Ends a stage at the request of its participant."""
         check_stage(person.stage, stage)
         if stage is Stage.SESSION:
             self._leave_session(person)
@@ -102,7 +102,7 @@ class Progress:
         return group is not None and person.position < self.study.sessions_each and not self.records.is_broken(group.id)
 
     def _leave_session(self, person: Participant) -> None:
-        """Moves a participant whose session is over to the next stage."""
+        """Moves a participant whose session has ended to the next stage."""
         row = self.session_of(person)
         if row is None or row.reason is None:
             raise RefusedError("The session is still in progress.")
@@ -200,7 +200,7 @@ class Progress:
                 self.records.set_outcome(name, Outcome.LEFT)
 
     def dissolve(self, place: OpenRoom) -> None:
-        """Sends the people of a session that did not begin, as not all of them came, back to the waiting room."""
+        """Returns the people of a session that did not begin, because some did not come, to the waiting room."""
         row = place.session
         assert row is not None
         logger.info("session %s did not begin: not everybody came", row.id)
@@ -221,7 +221,7 @@ class Progress:
             self._forget(names)
 
     def _forget(self, names: Sequence[str]) -> None:
-        """Deletes people who have not agreed to anything; their invitations can be used again."""
+        """Deletes people who have given no consent; their invitations can be used again."""
         with self.records.transaction():
             for name in names:
                 self.records.free_invitation(name)
@@ -231,7 +231,7 @@ class Progress:
     # --- withdrawal -------------------------------------------------------------------------------------------------
 
     async def withdraw(self, person: Participant) -> bool:
-        """Deletes everything of a person; a session in progress ends for all its people.
+        """Deletes all data of a person; a session in progress ends for all its people.
 
         Returns:
             Whether nothing is left; otherwise the server tries again.

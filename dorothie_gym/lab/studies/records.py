@@ -116,7 +116,7 @@ class StudyRecords:
         return [_participant(row) for row in self.data.rows("SELECT * FROM participants ORDER BY id")]
 
     def stage_counts(self) -> dict[Stage, int]:
-        """Returns the number of participants at each stage that has any."""
+        """Returns the number of participants at each stage with participants."""
         rows = self.data.rows("SELECT stage, count(*) AS number FROM participants GROUP BY stage")
         return {Stage(row["stage"]): row["number"] for row in rows}
 
@@ -227,7 +227,7 @@ class StudyRecords:
         return self.data.row(query, digest(token)) is not None
 
     def free_invitation(self, name: str) -> None:
-        """Makes the invitation of a participant valid again, who has not agreed to anything."""
+        """Makes the invitation of a participant who has given no consent valid again."""
         query = "SELECT invitation FROM visits WHERE participant = ?"
         self.data.run(f"UPDATE invitations SET used = 0 WHERE token = ({query})", name)
 
@@ -355,7 +355,7 @@ class StudyRecords:
     # --- erasure ----------------------------------------------------------------------------------------------------
 
     def erase_later(self, sessions: Sequence[str]) -> None:
-        """Records sessions whose recordings have to be removed, also after a crash."""
+        """Records sessions whose recordings must be removed, also after a crash."""
         for session in sessions:
             self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", session)
 

@@ -52,7 +52,7 @@ class WaitingRoom:
         return [(person, now - self._waiting_since[person.id]) for person in self._waiting()]
 
     def forget(self, name: str) -> None:
-        """Forgets since when a participant has waited."""
+        """Clears the start of a participant's wait."""
         self._waiting_since.pop(name, None)
 
     def has_waited_in_vain(self, name: str) -> bool:

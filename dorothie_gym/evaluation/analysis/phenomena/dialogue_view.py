@@ -33,7 +33,7 @@ ANSWER_WINDOW = 15.0
 """Time after a turn within which its answer begins [s]: patience of an exchange, and duration of the answer."""
 
 _MAX_UTTERANCE_SECONDS = 60.0
-"""Longest utterance [s]: turns that began earlier are over."""
+"""Longest utterance [s]: turns that began earlier have ended."""
 
 _UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
 _QUERIED = (ActionValue.QUERIED, StreetName.QUERIED, LandmarkName.QUERIED, GoalStatus.QUERIED, ObjectClass.QUERIED)
@@ -106,7 +106,7 @@ class DialogueView:
         """Gathers the turns of a session.
 
         Args:
-            session: any.
+            session: a session of any layout.
             units: units of the session, if already known.
         """
         self.session = session

@@ -26,7 +26,7 @@ SAME_PLACE: Final = 40.0
 """Distance between equal orders at one place [m]."""
 
 SAME_HEADING: Final = 45.0
-"""Difference between the headings of the car at one place [degrees]: it comes from the same side."""
+"""Largest difference between headings of the car at one place that count as the same direction [degrees]."""
 
 BACK_AND_FORTH: Final = 400.0
 """Distance between U-turns of one loop [m]: back and forth on a street."""

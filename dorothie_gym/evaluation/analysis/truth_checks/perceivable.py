@@ -44,9 +44,9 @@ CROWD: Final = 3
 CROWD_DISTANCE: Final = 50.0
 """Distance within which a crowd is perceived [m]."""
 
-_FOG: Final = 25.0  # minimum density of fog in which its distance and falloff show [%]
+_FOG: Final = 25.0  # minimum density of fog in which its distance and falloff are visible [%]
 _STEP: Final = 1.0  # time between looks into the record [s]
-_BEFORE: Final = 0.5  # time before a change at which its parameter has the former value [s]
+_BEFORE: Final = 0.5  # time before a change at which its parameter still has the previous value [s]
 
 
 def perceived_at(world: SessionWorld, event: Event) -> float | None:

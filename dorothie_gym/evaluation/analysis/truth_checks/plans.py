@@ -23,8 +23,8 @@ CARRIED_OUT_WITHIN: Final = 60.0
 """Time within which an announced action is carried out [s]."""
 
 _JUST_DONE: Final = 6.0  # time before the words within which the action may already have been taken [s]
-_STRAIGHT: Final = 30.0  # largest angle of a way that counts as straight [degrees]
-_SHORTER: Final = 30.0  # difference of two ways that is not noticed [m]
+_STRAIGHT: Final = 30.0  # largest angle of a route that counts as straight [degrees]
+_SHORTER: Final = 30.0  # largest unnoticed difference between two routes [m]
 
 _COMMANDS: Final[Mapping[ActionValue, tuple[PhysicalAction, ...]]] = MappingProxyType(
     {
@@ -117,7 +117,7 @@ def is_nearer(world: SessionWorld, said: Proposition, time: float, speaker: Role
 
 
 def has_purpose(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether story, tasks or messages name the person and the thing that an errand is said to be about."""
+    """Returns whether story, tasks or messages name the person and the item that an errand is said to be about."""
     header = world.session.header
     texts = [header.story, *(str(row["description"]) for row in header.subgoals)]
     texts += [str(row["change"] or "") for row in header.subgoals]

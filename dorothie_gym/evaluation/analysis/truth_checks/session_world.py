@@ -30,7 +30,7 @@ from dorothie_gym.support.portable_math import wrap_degrees
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})
 STANDING_SPEED: Final = 0.5  # [m/s]
-_CLOSE: Final = 25.0  # distance from a landmark to a car that stands there, or just short of it [m]
+_CLOSE: Final = 25.0  # distance from a landmark within which a car is at it or just before it [m]
 _SOON: Final = 3.0  # time from the standstill at a place to the end of the errand [s]
 _LATELY: Final = 30.0  # time for which a car has arrived after that [s]
 _LIGHT_SIGHT: Final = 60.0  # distance of the light that a standing car waits for [m]
@@ -67,11 +67,11 @@ class SessionWorld:
         return float(row["x"]), float(row["y"])
 
     def speed(self, time: float) -> float:
-        """Returns the speed of the car at a time [s], in m/s."""
+        """Returns the speed of the car [m/s] at a time [s]."""
         return float(self.row(time)["speed"])
 
     def stands(self, time: float) -> bool:
-        """Returns whether the car stands at a time [s]."""
+        """Returns whether the car is stationary at a time [s]."""
         return self.speed(time) < STANDING_SPEED
 
     def place(self, time: float) -> Place:
@@ -80,7 +80,7 @@ class SessionWorld:
         return lane, float(self.town.lanes[lane].project(np.array(self.position(time)))[0])
 
     def street(self, time: float) -> str | None:
-        """Returns the label of the name of the street that the car is on; None if it has none."""
+        """Returns the label of the name of the car's street; None if the street has none."""
         return self.street_name(self.town.lanes[int(self.row(time)["lane"])].street)
 
     def street_name(self, street: int) -> str | None:
@@ -218,7 +218,7 @@ class SessionWorld:
     # --- tasks --------------------------------------------------------------------------------------------------------
 
     def landmarks(self, name: LandmarkName) -> list[LandmarkRow]:
-        """Returns the landmarks of a name."""
+        """Returns the landmarks with a name."""
         return [row for row in self.session.header.landmarks if row["name"] == name.label]
 
     @functools.cached_property
@@ -227,7 +227,7 @@ class SessionWorld:
         return self.session.of_type(EventType.SUBGOAL)
 
     def statuses(self, time: float, name: LandmarkName) -> tuple[GoalStatus, ...]:
-        """Returns the statuses of the tasks at places of a name that have come up by a time [s]."""
+        """Returns the statuses of the tasks at places with a name that have been introduced by a time [s]."""
         found: list[GoalStatus] = []
         for number, subgoal in enumerate(self.session.header.subgoals):
             place = str(self.session.header.landmarks[subgoal["landmark"]]["name"])
@@ -240,7 +240,7 @@ class SessionWorld:
         return tuple(found)
 
     def arrival(self, time: float, name: LandmarkName) -> float | None:
-        """Returns the time of the next arrival, if it is at a landmark of a name and no task changes before [s]."""
+        """Returns the time of the next arrival [s], if it is at a landmark with the name and before any task change."""
         following = next((event for event in self.changes if event.time > time), None)
         if following is None or following.data.get("landmark") != name.label:
             return None
@@ -248,9 +248,9 @@ class SessionWorld:
         return following.time if arrived and following.data.get("status") == GoalStatus.COMPLETE.label else None
 
     def arrived_at(self, time: float, name: LandmarkName) -> bool | None:
-        """Returns whether the car has arrived at a landmark of a name: in the last half minute, or in a moment.
+        """Returns whether the car arrives at a landmark with a name: in the last half minute, or very soon.
 
-        None if it stands close to it, but its errand there is not done: it may be called there, or just short of it.
+        None if the car stands close to it and the errand there is not done: both "there" and "just before it" are true.
         """
         done = any(
             event.data.get("landmark") == name.label

@@ -1,7 +1,7 @@
 """Columns of all sessions of a corpus, kept in the user's cache.
 
 An entry of the cache is a folder of memory-mapped `.npy` files, and `columns.json` with all other values and a checksum
-of each file. Its name is a hash of everything that determines its content. A damaged entry is built again and replaced.
+of each file. Its name is a hash of all that determines its content. A damaged entry is rebuilt and replaced.
 """
 
 from __future__ import annotations
@@ -319,7 +319,7 @@ def _check_signature(entry: Path, keys: Path) -> None:
 
 
 def keep(columns: Columns) -> None:
-    """Caches columns under their key, in one step: other processes see the whole entry or none."""
+    """Caches columns under their key atomically: other processes see the whole entry or none."""
     folder = features_folder()
     if folder is None:
         return
@@ -459,5 +459,5 @@ def _prune(folder: Path) -> None:
     """Removes the least recently used entries beyond `MOST_ENTRIES`."""
     entries = sorted(folder.iterdir(), key=lambda entry: (entry.lstat().st_mtime_ns, entry.name))
     for entry in entries[:-MOST_ENTRIES]:
-        with contextlib.suppress(OSError):  # another process removes entries, too
+        with contextlib.suppress(OSError):  # another process may also remove entries
             remove(entry)

@@ -78,7 +78,7 @@ class FrameWindow:
         town: the map.
         tenths: length of the window that a batch shows [0.1 s]; older frames are dropped.
         frames: observed frames, oldest first.
-        switches: frames at which the headlights were switched, and whether on, as far as looks depend on them.
+        switches: frames at which the headlights were switched, and whether on; only those on which perceptions depend.
     """
 
     town: Town
@@ -156,7 +156,7 @@ class IncrementalColumns:
         return replace(self, window=self.window.observed(frame))
 
     def said(self, utterance: UtteranceRecord) -> Self:
-        """Returns the columns with an utterance, which was over no earlier than the last one."""
+        """Returns the columns with an utterance, which ended no earlier than the last one."""
         return replace(self, utterances=self._visible_utterances((*self.utterances, utterance)))
 
     def corrected(self, utterance: UtteranceRecord) -> Self:

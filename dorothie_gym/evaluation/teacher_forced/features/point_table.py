@@ -80,7 +80,7 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
     Args:
         columns: the corpus.
         task: the task.
-        fold: sessions of this fold only, or of several ("val", "test", "seen", "unseen"); None takes all.
+        fold: sessions of this fold only, or of several folds ("val", "test", "seen", "unseen"); None for all.
 
     Raises:
         SessionError: the fold is unknown.

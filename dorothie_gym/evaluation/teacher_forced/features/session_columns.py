@@ -70,7 +70,7 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
     pose = poses(rows)
     looks = tuple(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
     arrays = {
-        **place_columns(session.header, texts),  # first: numbers of texts then do not depend on what is said later
+        **place_columns(session.header, texts),  # first: numbers of texts then do not depend on later utterances
         **utterance_columns(SessionHistory(session).utterances, texts, handled),
         **action_columns(session.physical_actions, handled),
         **frame_columns(rows, pose, _speeds(rows), looks, known=town is not None),
@@ -113,8 +113,8 @@ def utterance_columns(
     """Returns the columns of moves and utterances.
 
     Args:
-        spoken: utterances of participant and Co-Wizard, by the frame at which they were over.
-        texts: numbers of texts; gets those of the utterances.
+        spoken: utterances of participant and Co-Wizard, by the frame at which they ended.
+        texts: numbers of texts, extended by those of the utterances.
         handled: value of the columns `handling` by number of the event.
     """
     over = [utterance.frame // FRAMES_PER_TENTH for utterance in spoken]
