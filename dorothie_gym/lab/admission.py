@@ -1,9 +1,9 @@
 """Connections of a web server under floods: which are kept when there are too many, and in which order they are read.
 
-Whoever holds a seat or another valid secret is known and keeps its connection. All others are strangers: they share
+A connection with a seat or another valid secret is known and is kept. All others are strangers: they share
 a limited number of places, and have a limited time. When the places are taken, a new connection is still admitted.
-Those that give way are of the address that has most strangers: first those that ask too often, then the oldest. So a browser
-that asks at once is served, also if the flood comes from its address.
+Those of the address with most strangers give way: first those with too many requests, then the oldest. A browser that
+sends its request at once is thus served, even if the flood comes from its address.
 
 Connections are read in turns, so that a flood of requests cannot occupy the event loop.
 """
@@ -19,10 +19,10 @@ from itertools import chain, islice
 from typing import Final, Protocol
 
 MOST_STRANGERS: Final = 2000
-"""Most connections without a valid secret: 300 browsers that load the page at once."""
+"""Maximum number of connections without a valid secret: 300 browsers that load the page at once."""
 
 MOST_KNOWN: Final = 1500
-"""Most connections with a valid secret; further ones count as strangers."""
+"""Maximum number of connections with a valid secret; further ones count as strangers."""
 
 GIVING_WAY: Final = 16
 """Number of connections that give way together, so that they are chosen less often, which costs less."""

@@ -24,7 +24,7 @@ MAX_BODY: Final = 256 * 1024
 """Largest body of a request [bytes]: 50 long texts of a questionnaire take as much, marks of an utterance 1 kB."""
 
 MOST_CALLERS: Final = 10_000
-"""Most callers whose requests a gate counts."""
+"""Maximum number of callers whose requests a gate counts."""
 
 RETRY_SECONDS: Final = 2
 """Time after which a page that was refused for too many requests retries [s]."""

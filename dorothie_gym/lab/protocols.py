@@ -24,7 +24,7 @@ PART: Final = 16 * 1024
 """Bytes of a connection that are read in one turn; parts of a body may be as small as a byte, and cost as much."""
 
 FIRST_BYTES: Final = 32 * 1024
-"""Most bytes of a websocket that has not joined: joining takes 60."""
+"""Maximum number of bytes of a websocket that has not joined: joining takes 60."""
 
 SLICE: Final = 4 * 1024
 """Bytes of such a websocket that are read in one turn: they may be 700 pings."""

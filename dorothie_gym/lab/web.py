@@ -223,7 +223,7 @@ class SecurityHeaders:
 
 
 def connections_allowed(wanted: int) -> int:
-    """Returns how many connections the limit of open files allows, up to a requested number, after raising the limit."""
+    """Returns how many connections, up to a requested number, the raised limit of open files allows."""
     try:
         import resource
     except ImportError:  # Windows, which has no such limit

@@ -42,7 +42,7 @@ MAX_OPENDRIVE: Final = 64 * MIB
 """Largest OpenDRIVE file [bytes]; CARLA's towns have up to 20 MB."""
 
 MAX_XML_ELEMENTS: Final = 2_000_000
-"""Most elements of an OpenDRIVE file; each takes some 200 bytes of memory."""
+"""Maximum number of elements of an OpenDRIVE file; each takes some 200 bytes of memory."""
 
 MAX_SESSION_TEXT: Final = 64 * MIB
 """Largest JSON or CSV file of a session or corpus [bytes]; a session of 15 minutes takes 2 MB."""
@@ -60,10 +60,10 @@ MAX_DEPTH: Final = 40
 """Deepest nesting of JSON."""
 
 MAX_DIGITS: Final = 40
-"""Most digits of a whole number in JSON; a seed of 128 bits has 39."""
+"""Maximum number of digits of a whole number in JSON; a seed of 128 bits has 39."""
 
 MAX_VALUES: Final = 5_000_000
-"""Most values of a JSON file; each takes up to some 100 bytes of memory."""
+"""Maximum number of values of a JSON file; each takes up to some 100 bytes of memory."""
 
 
 @contextmanager
@@ -319,7 +319,7 @@ class ParquetLimits:
 
     Attributes:
         file: largest size of the file [bytes].
-        rows: most rows.
+        rows: maximum number of rows.
         values: most values of one column, counting those in lists.
         content: largest size of all values without compression, and of all texts without a dictionary [bytes].
     """

@@ -26,7 +26,7 @@ from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.session.recording.files import read_bytes
 
 MAX_ELEMENTS: Final = 500_000
-"""Most elements of a file; each takes some 200 bytes of memory."""
+"""Maximum number of elements of a file; each takes some 200 bytes of memory."""
 
 _NUMBER: Final = re.compile(r"\d{1,8}", re.ASCII)
 _TIME: Final = re.compile(r"\d{1,12}", re.ASCII)

@@ -13,7 +13,7 @@ from dorothie_gym.errors import AnnotationError
 from dorothie_gym.support.input_files import MAX_SESSION_TEXT, MAX_VALUES, MIB
 
 MAX_LINES: Final = 50_000
-"""Most lines of a log; a long session takes some 3,000 edits."""
+"""Maximum number of lines of a log; a long session takes some 3,000 edits."""
 
 
 @dataclass(frozen=True, kw_only=True)

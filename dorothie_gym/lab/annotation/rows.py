@@ -17,7 +17,7 @@ from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.ontology.spellings import parse_act, parse_landmark, parse_move
 
 MAX_SPANS: Final = 400
-"""Most spans of an utterance: one for each word of the longest one."""
+"""Maximum number of spans of an utterance: one for each word of the longest one."""
 
 Label: TypeAlias = Annotated[str, Meta(max_length=40)]
 """Label of a vocabulary."""

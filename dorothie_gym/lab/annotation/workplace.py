@@ -33,7 +33,7 @@ from dorothie_gym.lab.annotation.session_page import SessionPage
 from dorothie_gym.lab.annotation.source_text import SourceText, UtteranceId
 
 MOST_OPEN: Final = 4
-"""Most sessions that are kept in memory."""
+"""Maximum number of sessions that are kept in memory."""
 
 
 class SeatKind(enum.StrEnum):

@@ -38,7 +38,7 @@ from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH, SpaceLimits, plai
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 MOST_WAITING: Final = 24
-"""Most commands of one kind that wait; more are refused."""
+"""Maximum number of commands of one kind that wait; more are refused."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,10 +43,10 @@ JOIN_SECONDS: Final = 10.0
 """Time for the first message of a connection [s]."""
 
 MOST_JOINING: Final = 400
-"""Most websockets that have not joined yet; when there are more, the one that has waited longest is closed."""
+"""Maximum number of websockets that have not joined yet; when there are more, the one that has waited longest is closed."""
 
 MOST_WATCHING: Final = 500
-"""Most websockets at seats that watch; a seat of a role has one at most, and always has room."""
+"""Maximum number of websockets at seats that watch; a seat of a role has one at most, and always has room."""
 
 THREADS: Final = 4
 """Threads for the ticks of all rooms; they share one core, as Python code holds a lock."""

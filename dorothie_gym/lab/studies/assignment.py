@@ -123,7 +123,7 @@ class Assigner:
 
 
 MOST_SLOTS: Final = 100_000
-"""Most slots of a study."""
+"""Maximum number of slots of a study."""
 
 
 def match(

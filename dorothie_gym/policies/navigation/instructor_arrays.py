@@ -21,13 +21,13 @@ from dorothie_gym.support.compilation.records import (
 )
 
 CLOSED_PLACES = 64
-"""Most places closed by roadblocks that an instructor remembers; every roadblock closes two."""
+"""Maximum number of places closed by roadblocks that an instructor remembers; every roadblock closes two."""
 
 LEGS_AHEAD = 6
 """Number of legs on which roadblocks are looked for."""
 
 LEGS = 96
-"""Most legs of a route that an instructor keeps; of a longer one, the first. Routes through the towns have some 30."""
+"""Maximum number of legs of a route that an instructor keeps; of a longer one, the first. Routes through the towns have some 30."""
 
 LEGS_LEFT = 12
 """Number of legs after which the rest of a longer route is planned separately."""

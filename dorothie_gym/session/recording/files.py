@@ -56,16 +56,16 @@ ANNOTATIONS_FOLDER: Final = "annotations"
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, SEATS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000
-"""Most events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
+"""Maximum number of events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
 
 MAX_MOVES: Final = 10_000
 """Most dialogue moves of a session; 15 minutes have some 300."""
 
 MAX_EXCEPTIONS: Final = 500
-"""Most exceptions of a session; most sessions have up to 4."""
+"""Maximum number of exceptions of a session; most sessions have up to 4."""
 
 MAX_FRAMES: Final = 1_000_000
-"""Most frames of a session: 9 hours at 30 Hz."""
+"""Maximum number of frames of a session: 9 hours at 30 Hz."""
 
 MAX_FRAME: Final = 2**31
 """Bound of frame numbers."""

@@ -96,7 +96,7 @@ def _frames(session: Session) -> Iterator[str]:
 # --- Report of a reader ----------------------------------------------------------------------------------------------
 
 MAX_REPORTED_NAMES: Final = 100
-"""Most names of one kind that a report counts separately."""
+"""Maximum number of names of one kind that a report counts separately."""
 
 OTHERS: Final = "(others)"
 

@@ -49,7 +49,7 @@ from dorothie_gym.support.compilation.records import (
 )
 
 PROPS = 16
-"""Most props in a world."""
+"""Maximum number of props in a world."""
 
 CAR_KEY = 0
 """Key of the ego."""

@@ -65,25 +65,25 @@ AFTER_END = CAR_LENGTH / 2
 # --- Sizes of arrays, lanes -------------------------------------------------------------------------------------------
 
 PLANNED = 24
-"""Most lanes that a vehicle plans ahead, its own one included."""
+"""Maximum number of lanes that a vehicle plans ahead, its own one included."""
 
 GOALS = 16
-"""Most goals on the ego's path."""
+"""Maximum number of goals on the ego's path."""
 
 CLOSED = 4
-"""Most junctions that one U-turn reaches into."""
+"""Maximum number of junctions that one U-turn reaches into."""
 
 POINTS = 208
-"""Most points of the ego's path in the arrays: 1 m apart, half a metre in U-turns."""
+"""Maximum number of points of the ego's path in the arrays: 1 m apart, half a metre in U-turns."""
 
 COURSE, STEPS = 320, 128
 """Points of the ego's whole path and lanes of a plan for which there is room at first."""
 
 EVENTS = 32
-"""Most events of the ego within a call."""
+"""Maximum number of events of the ego within a call."""
 
 MAX_SUBSTEPS = 15
-"""Most substeps within a call of a world with a driven ego, whose path is lengthened in between."""
+"""Maximum number of substeps within a call of a world with a driven ego, whose path is lengthened in between."""
 
 STOPPED = 0.05
 """Speed below which a braking vehicle comes to a standstill [m/s]."""
