@@ -27,7 +27,7 @@ ANGLE_TOLERANCE: Final = 15.0
 """Largest error of a navigation action's angle that counts as right [degrees] (paper, section 5, Evaluation)."""
 
 WAY_LENGTH: Final = 25
-"""Maximum number of states of the car in a view: 100 frames of 10 Hz, every fourth (working memory, paper, section 6)."""
+"""Maximum number of states of the car in a view: every fourth of 100 at 10 Hz (working memory, paper, section 6)."""
 
 WAY_STEP: Final = 12
 """Frames (30 Hz) between two states of the car in a view."""

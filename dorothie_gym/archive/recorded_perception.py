@@ -52,7 +52,7 @@ in metres ahead and to the left, heading relative to the car's [degrees, positiv
 [m]; for a light, distance, bearing and position are those of its stop line, and the rest is 0."""
 
 MAX_OBJECTS: Final = 64
-"""Maximum number of objects of a look, the nearest ones: more than any batch takes."""
+"""Maximum number of objects of a perception, the nearest ones: more than any batch uses."""
 
 MAX_LIGHT_ANGLE: Final = 90.0
 """Largest angle between the car's heading and the lane of a visible light [degrees]."""

@@ -190,7 +190,7 @@ def _features(lane: Lane) -> tuple[float, ...]:
 
 
 def _edges(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Returns the edges (m, 2) and their types (m,); of several edges between two lanes the first type counts."""
+    """Returns the edges (m, 2) and their types (m,); of several edges between two lanes, only the first is kept."""
     sides = {
         LinkType.LANE_CHANGE_LEFT: EdgeType.LEFT_LANE_CHANGE,
         LinkType.LANE_CHANGE_RIGHT: EdgeType.RIGHT_LANE_CHANGE,

@@ -279,7 +279,7 @@ def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
 
 
 def _calm(lanes: list[Lane]) -> list[Lane]:
-    """Returns the lanes slow enough to stop on, or all lanes if most of the map is fast."""
+    """Returns the lanes that are slow enough for stops, or all lanes if most of the map is fast."""
     calm = [lane for lane in lanes if lane.speed_limit <= FASTEST_STOP]
     return calm if 2 * len(calm) >= len(lanes) else lanes
 

@@ -61,7 +61,7 @@ class RightOfWay:
         for group in connectors.values():
             for one, other, touch in _meetings(group):
                 follows = one in sources[other] or other in sources[one] or sources[one] & sources[other]
-                if not follows:  # who comes from the same lane drives one behind the other anyway
+                if not follows:  # vehicles from the same lane drive one behind the other anyway
                     foes[one][other] = foes[other][one] = touch
         self._foes = {connector: tuple(sorted(others)) for connector, others in foes.items()}
         turns = _turns(town)

@@ -45,7 +45,7 @@ def find_departures(
 
     Args:
         graph: the routing graph.
-        search: gets the edges.
+        search: receives the edges.
         lane: lane of the start.
         station: station of the start [m].
         goal_lane: lane of the goal, for edges that connect both directly; -1 for none.
@@ -154,7 +154,7 @@ def _add_arrivals(
 ) -> int:
     """Adds the edges to a goal: along its cell, and lane changes and U-turns that end before it in its cell.
 
-    Each node gets its cheapest one. Returns the new number of edges.
+    Each node keeps its cheapest one. Returns the new number of edges.
     """
     extra, nodes, row = search.extra, search.nodes, graph.lanes[lane]
     cell, goal = cell_at(graph, lane, station), len(graph.rows) - 2
@@ -190,7 +190,7 @@ def find_route(
 
     Args:
         graph: the routing graph.
-        search: gets the route.
+        search: receives the route.
         lane: lane of the start.
         station: station of the start [m].
         goal_lane: lane of the goal; one slightly behind the start on the same lane needs a detour.
@@ -253,8 +253,8 @@ def find_costs(
         station: station of the goal [m].
         blocked: impassable places.
         count: number of impassable places.
-        costs: (cells + lanes,) gets the costs from the starts of the cells; from the ends of the lanes, the costs from
-            the starts of the lanes behind, without the turn.
+        costs: (cells + lanes,) receives the costs from the starts of the cells and, for the ends of the lanes, those
+            from the starts of the next lanes, without the turn.
     """
     _prepare(graph, search, blocked, count, True)
     search.result[0].extra = _add_arrivals(graph, search, 0, lane, station, 0.0)

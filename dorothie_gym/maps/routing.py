@@ -219,7 +219,7 @@ class Router:
 
         Args:
             start: where the car is.
-            goal: goal; one slightly behind the start on the same lane needs a detour.
+            goal: the goal; a goal slightly behind the start on the same lane needs a detour.
             blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in
                 the cell of the start only those ahead count.
             manoeuvre_cost: extra cost of each lane change and U-turn [m].
@@ -269,12 +269,12 @@ class Router:
         """Returns which nodes of the graph a car can reach by driving on from a place, despite roadblocks (nodes,).
 
         Nodes are the starts of the cells in order, then the tails of the lanes. The cell of the start counts if the car
-        can return to its beginning.
+        can return to its start.
 
         Args:
             start: where the car is.
             blocked: impassable places, see `route`.
-            stands: stopping places before the roadblocks, at the beginnings of the blocked sections.
+            stands: stopping places before the roadblocks, at the starts of the blocked sections.
             held: stopping place of the car before the next roadblock, if that is near.
         """
         extra = [self._departures(start, blocked), *map(self._stand, stands)]
@@ -361,9 +361,9 @@ def router(town: Town) -> Router:
 # --- Roadblocks -------------------------------------------------------------------------------------------------------
 # Check that a town remains passable with roadblocks in it.
 #
-# The cells of the router are closed that a car cannot drive or turn round in because of a prop. What is left has to
-# hold for good, not only from where the car is now: wherever it may still come to, and wherever it may have to stop
-# before a prop, it must be able to reach every place that it could reach before.
+# Cells of the router in which a prop prevents a car from driving or turning round are closed. The remaining cells must
+# suffice not only for the current place of the car: from wherever it may drive, or stop before a prop, it must be able
+# to reach every place that it could reach before.
 
 STANDS_BEFORE = 17.0
 """Distance of a car that stops for a prop to the prop, between their centres [m]."""
@@ -402,7 +402,7 @@ def crowds(town: Town, place: Place, others: Iterable[Place]) -> bool:
 
 
 def cuts_off(town: Town, car: Place, standing: Sequence[Place], added: Place) -> bool:
-    """Returns whether one more prop would cut a way that the car needs, now or later.
+    """Returns whether one more prop would cut a route that the car needs, now or later.
 
     Args:
         town: the map.
@@ -412,7 +412,7 @@ def cuts_off(town: Town, car: Place, standing: Sequence[Place], added: Place) ->
 
     Returns:
         Whether there is a site that can be reached from the car's place now, and then could not any more: from there,
-        from a place that the car can come to, or from where it would stand before one of the props.
+        from a place that the car can reach, or from its stopping place before one of the props.
     """
     search = router(town)
     props = [*standing, added]

@@ -67,7 +67,7 @@ LATE_CHANGE = 0.01
 """Extra cost of a lane change for each metre along its lane: of equal ones the first is preferred."""
 
 SHARED = 2.0 / 3.0
-"""Share of a lane change during which obstacles matter: from its beginning for the lane that it leaves, before
+"""Share of a lane change during which obstacles matter: from its start for the lane that it leaves, before
 its end for the other lane (lateral offset 1.7 m by then)."""
 
 MAX_ASIDE = 6.0
@@ -104,7 +104,7 @@ class RoutingLane:
     length: Float  # [m]
     cell_size: Float  # length of its cells [m]
     weight: Float  # cost of a metre
-    offset: Float  # beginning of the lane where all lanes lie in one row with gaps of one metre [m]
+    offset: Float  # start of the lane when all lanes are placed in one row with gaps of one metre [m]
     first: Int32  # first cell, and number of cells
     cells: Int32
     left: Int32  # lanes that one may change to
@@ -140,7 +140,7 @@ class RoutingGraph(NamedTuple):
         offsets: (lanes + 1,) first point of each lane, and p.
         ends: (lanes, 4) directions of their ends, see `polyline.LaneTable`.
         near: lanes that may be oncoming somewhere along a lane, lane by lane.
-        near_rows: (lanes + 1,) their beginning for each lane.
+        near_rows: (lanes + 1,) their start for each lane.
         edges: cheapest edge between each pair of cells and tails, sorted by source and target.
         rows: (nodes + 1,) first edge of each source, and the number of edges.
         incoming: edges sorted by target.
@@ -231,7 +231,7 @@ def routing_graph(town: Town) -> RoutingGraph:
 def _following(town: Town, graph: RoutingGraph, cells: int) -> RecordArray[RoutingEdge]:
     """Returns the edges between successive cells of each lane, and from the end of a lane to its successors.
 
-    The latter begin in the last cell and in the tail of the lane, and end in the first cells of the successors.
+    These begin in the last cell and in the tail of the lane, and end in the first cells of the successors.
     """
     lanes = graph.lanes
     owner = np.repeat(np.arange(len(lanes)), lanes["cells"])
@@ -390,7 +390,7 @@ def _add_change(
     edges: RecordArray[RoutingEdge],
     count: int,
 ) -> int:
-    """Adds a lane change of length `road` [m] if the lanes lie side by side there."""
+    """Adds a lane change of length `road` [m] if the lanes are adjacent there."""
     leave, end = begin + CHANGE_LEAD, begin + road
     x, y = _position(graph, lane, leave)
     landing, first_gap = _project(graph, beside, x, y)

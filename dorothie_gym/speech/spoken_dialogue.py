@@ -38,7 +38,7 @@ CROSSTALK: Final = -15.0
 """Level of the other speaker's voice at a speaker's microphone, where both talk [dB]; set by hand."""
 
 MARGIN: Final = 0.2
-"""Time before and behind a span in which the recogniser hears noise only [s]."""
+"""Time before and after a span in which the recogniser hears only noise [s]."""
 
 
 @shared
@@ -101,7 +101,7 @@ class SpokenDialogue:
             self._voices[Role.CO_WIZARD] = Voice(pitch=round(moved, 2))
 
     def speak(self, role: Role, text: str, pace: float) -> Samples:
-        """Returns a text spoken by a role, at 16 kHz, with silence behind it up to `SHORTEST_SPAN`.
+        """Returns a text spoken by a role, at 16 kHz, padded with silence to `SHORTEST_SPAN`.
 
         Args:
             role: the speaker.

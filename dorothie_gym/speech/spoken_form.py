@@ -72,7 +72,7 @@ def _number_words(token: str) -> list[str]:
 
 
 def written_form(tokens: Sequence[str]) -> str:
-    """Returns spoken tokens as a text: names as they are written, "I" as a capital, marks behind their words."""
+    """Returns spoken tokens as a text: names in their written form, "I" as a capital, marks after their words."""
     forms, longest = _written_names()
     parts: list[str] = []
     place = 0

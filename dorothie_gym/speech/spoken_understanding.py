@@ -68,7 +68,7 @@ def audible(recognition: Recognition) -> str:
 
     They may if the best hypotheses name different values, if most words are doubtful, or if the speech is short. Short
     speech without a command is inaudible, however sure, if another hypothesis is a stop ("great", "brake"), which must
-    not be missed; of 110 short spans other than a stop, none was mistaken for one. Systems of spoken dialogue likewise
+    not be missed; of 110 short spans other than a stop, none was mistaken for one. Spoken dialogue systems also
     reject uncertain input, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     short = len(recognition.words) <= SHORT

@@ -64,7 +64,7 @@ class CachedViews:
 class State:
     """Changing values of an environment, an engine or a world at one moment: an opaque, immutable value.
 
-    It refers to the things that do not change, such as the town.
+    It refers to immutable objects, such as the town.
 
     Attributes:
         nbytes: memory of the values, without shared objects [bytes].

@@ -247,7 +247,7 @@ def checked(value: object, kind: type[_T], where: object) -> _T:
 
     Args:
         value: the value.
-        kind: the type; fields of dataclasses that the value lacks get their defaults.
+        kind: the type; missing fields of dataclasses take their defaults.
         where: file (and place) that messages begin with.
 
     Raises:
@@ -333,8 +333,8 @@ class ParquetLimits:
 def read_parquet(path: Path, limits: ParquetLimits, columns: Sequence[str] | None = None) -> pa.Table:
     """Returns the table of a Parquet file; texts that the file holds are dictionary-encoded.
 
-    The limits are checked in the footer before anything else is read. Texts are read with their dictionary, so that a
-    small file cannot stand for texts of many gigabytes.
+    The limits are checked in the footer before any other part is read. Texts are read with their dictionary, so that a
+    small file cannot expand to texts of many gigabytes.
 
     Args:
         path: the file.

@@ -34,7 +34,7 @@ def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> Sequence[in
 
 
 def mask_of(mask: object, count: int) -> NDArray[np.bool_]:
-    """Returns the option `reset_mask` of a reset, (count,); None stands for all environments.
+    """Returns the option `reset_mask` of a reset, (count,); None for all environments.
 
     Raises:
         ValueError: it is of another shape or type.

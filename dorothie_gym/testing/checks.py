@@ -45,7 +45,7 @@ def check_policy(
         policy: policy of any role.
         town: name, file or `Town` to play in.
         seed: seed of the session; the second session has the next seed.
-        decisions: decisions played at most.
+        decisions: maximum number of decisions.
         config: config of the environment.
 
     Raises:
@@ -133,7 +133,7 @@ def check_session(
 
     Args:
         session: a session, or its folder.
-        town: the town that it was played in, where that is not shipped with the package.
+        town: the town of the session if it is not shipped with the package.
         storyboard: its storyboard's template, where that is not shipped.
         replay: whether to play it again; sessions whose actions were not recorded cannot be.
 
@@ -169,7 +169,7 @@ def check_town(town: str | Path | Town, *, sessions: int = 3, decisions: int = 4
     Raises:
         AssertionError: the linter found faults (ten are listed), or the lane graph does not match the lanes.
         TownError: the file cannot be read.
-        StoryboardError: no storyboard fits, for example for want of sites.
+        StoryboardError: no storyboard can be bound, for example for lack of sites.
     """
     if not isinstance(town, Town):
         town = load_town(town)

@@ -71,7 +71,7 @@ class Compared(NamedTuple):
     """Numbers of decisions of a pair of sessions.
 
     Attributes:
-        decisions: played.
+        decisions: number of decisions.
         in_view: decisions at which a hidden landmark was in view in either session.
         pictures: decisions at which pictures, if there are any, were compared.
     """
@@ -102,7 +102,7 @@ def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decision
     views = list(map(bool.__or__, in_view, in_view_again))
     for k, (decision, (observations, infos)) in enumerate(zip(played, again, strict=False)):
         if by_camera and any(views[: k + 1]):
-            break  # what the Co-Wizard has seen may change where the car stops
+            break  # the Co-Wizard's knowledge may affect where the car stops
         if not views[k]:
             _check_pictures(where, k, decision.observations, observations)
         one, other = (_without_pictures(part) for part in (decision.observations, observations))

@@ -43,7 +43,7 @@ JOIN_SECONDS: Final = 10.0
 """Time for the first message of a connection [s]."""
 
 MOST_JOINING: Final = 400
-"""Maximum number of websockets that have not joined yet; when there are more, the one that has waited longest is closed."""
+"""Maximum number of websockets that have not joined yet; beyond it, the one that has waited longest is closed."""
 
 MOST_WATCHING: Final = 500
 """Maximum number of websockets at seats that watch; a seat of a role has one at most, and always has room."""

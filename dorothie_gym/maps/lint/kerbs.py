@@ -99,7 +99,7 @@ class Corner:
         rounded = (from_middle @ start.along > 0.0) & (from_middle @ end.along < 0.0)
         depth = self.beyond(places)
         depth = np.where(rounded, np.minimum(depth, (self._radius - distance) / scale), depth)
-        # The kerb ends at the mouths: another street begins behind them.
+        # The kerb ends at the mouths: another street begins there.
         between = ((places - kerb) @ start.along > 0.0) & ((places - kerb_behind) @ end.along < 0.0)
         result: Array = np.where(between, np.maximum(depth, 0.0), 0.0)
         return result

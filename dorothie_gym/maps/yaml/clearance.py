@@ -91,7 +91,7 @@ def check_clearance(
     """Checks all roads and all paths through crossings against each other.
 
     Raises:
-        TownError: two of them touch at one level without meeting there.
+        TownError: two roads touch at one level without meeting there.
     """
     samples = _samples(crossings, segments, centrelines, ways)
     # samples farther apart than the width of the widest road cannot touch

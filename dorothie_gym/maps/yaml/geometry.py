@@ -200,7 +200,7 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
 def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
     """Returns the distances of the centres of the bends along the `rounded` polyline [m]."""
     stations, here = list[float](), 0.0
-    shortened = 0.0  # what the bend before takes of the leg
+    shortened = 0.0  # the share of the leg that the previous bend uses
     for k, radius in enumerate(radii, start=1):
         turn = abs(turn_at(points[k - 1], points[k], points[k + 1]))
         tangent = radius * pm.tan(turn / 2.0)

@@ -1,7 +1,7 @@
 """Schema of the YAML town language: reads a file into a validated plan.
 
 docs/towns.md describes the language. The checks here need no geometry: keys, types, ranges, names, and references
-between elements. The layout checks whether everything fits geometrically.
+between elements. The layout checks the geometry.
 
 A village::
 

@@ -27,7 +27,7 @@ LEGS_AHEAD = 6
 """Number of legs on which roadblocks are looked for."""
 
 LEGS = 96
-"""Maximum number of legs of a route that an instructor keeps; of a longer one, the first. Routes through the towns have some 30."""
+"""Maximum number of legs that an instructor keeps of a route, the first. Routes through the towns have about 30."""
 
 LEGS_LEFT = 12
 """Number of legs after which the rest of a longer route is planned separately."""

@@ -59,7 +59,7 @@ MAX_EVENTS: Final = 200_000
 """Maximum number of events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
 
 MAX_MOVES: Final = 10_000
-"""Most dialogue moves of a session; 15 minutes have some 300."""
+"""Maximum number of dialogue moves of a session; 15 minutes have about 300."""
 
 MAX_EXCEPTIONS: Final = 500
 """Maximum number of exceptions of a session; most sessions have up to 4."""

@@ -38,7 +38,7 @@ WAITING_ROOM = 4.5
 """Distance between the end of a lane switch and a lane's end at which the ego may have to wait [m]."""
 
 MOST_CHANGES = 3
-"""Most lane changes before a turn."""
+"""Maximum number of lane changes before a turn."""
 
 ALMOST = 1e-3
 """Shortest piece of path [m]."""

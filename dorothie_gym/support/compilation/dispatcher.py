@@ -65,8 +65,8 @@ if TYPE_CHECKING:
     from numba.core.typing.templates import Signature
 
 
-# --- Shorter ways through the compiler --------------------------------------------------------------------------------
-# Shorter ways through numba's compiler for functions that count no references: the same code in less time.
+# --- Shortcuts through the compiler -----------------------------------------------------------------------------------
+# Shortcuts through numba's compiler for functions that count no references: the same code in less time.
 #
 # numba looks for the type of every operator among all its overloads, which fails dozens of times before it succeeds;
 # after each pass it computes where variables are used for the last time, to clear them there, so that nothing is
