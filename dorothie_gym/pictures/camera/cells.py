@@ -1,4 +1,4 @@
-"""Square cells of a mesh, drawn from the near to the far ones as far as they are in view and not hidden."""
+"""Square cells of a mesh, drawn from near to far if they are in view and not hidden."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def _sort_cells(view: View, cells: CellTable, scratch: CellOrder) -> None:
 
 @compiled
 def is_in_view(view: View, low: Array, high: Array) -> bool:
-    """Returns whether a box (3,), (3,) [m] touches the pyramid of the picture; for some boxes beside it as well."""
+    """Returns whether a box (3,), (3,) [m] touches the view frustum; also True for some boxes beside it."""
     wide, tall = 0.5 * view.width / view.focal, 0.5 * view.height / view.focal
     for side in range(5):
         across = 0 if side < 2 else 1

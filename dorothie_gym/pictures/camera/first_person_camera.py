@@ -122,7 +122,7 @@ class Boxes:
 
     Attributes:
         keys: (n,) int32 key of each body.
-        limits: (n, 4) int32 left, top, right and bottom, after the last pixel [pixels].
+        limits: (n, 4) int32 left, top, right and bottom, the latter two one past the last pixel [pixels].
         pixels: (n,) int32 number of visible pixels.
     """
 
@@ -256,7 +256,7 @@ class FirstPersonCamera:
         placed: int,
         casts_shadows: bool = False,
     ) -> int:
-        """Draws all triangles, and shadows if they are wanted; returns the number of triangles of bodies.
+        """Draws all triangles, and shadows if requested; returns the number of triangles of bodies.
 
         These are copied first if `placed`, which is their number otherwise, is negative.
         """

@@ -26,7 +26,7 @@ _AHEAD = 50.0  # [m] from the camera to the centre of the map
 _FADING, _FARTHEST = 60.0, 90.0  # [m] from the camera over which beams fade
 _REACH = 26.0  # [m] from the front of a vehicle
 _NARROW, _SPREAD = 1.1, 0.34  # [m] half the width of a beam at the front, and its growth per metre
-_MARGIN = 1.5  # [m] around beams in which the height of the road is noted, too
+_MARGIN = 1.5  # [m] around beams in which the height of the road is also stored
 _SOFT = 4.0  # [m] over which a beam meets the road
 _SQUARED = 180.0  # [m2] distance at which it is half as bright, squared
 _BRIGHTEST = 1.2  # factor of the light
@@ -60,7 +60,7 @@ def new_head_lights() -> HeadLights:
 def draw_head_lights(
     lights: HeadLights, x: float, y: float, heading: float, bodies: RecordArray[PlacementRecord]
 ) -> None:
-    """Draws the beams of all vehicles before a camera whose lights are on.
+    """Draws the beams of all vehicles in front of a camera that have their lights on.
 
     Args:
         lights: receives the beams.

@@ -54,7 +54,7 @@ _GLOW = (0.8, 0.69, 0.5)  # factors of the light of lit windows
 def light_samples(
     optics: Optics, lamps: LampMap, beams: HeadLights, shadows: ShadowMaps, samples: Samples, count: int
 ) -> None:
-    """Changes the colours of surfaces to those that the camera sees of them, 0..255.
+    """Converts the colours of surfaces to those in the picture, 0..255.
 
     Args:
         optics: numbers of the picture.

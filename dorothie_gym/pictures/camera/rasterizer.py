@@ -37,13 +37,13 @@ _BX, _BY = 2 * _STRETCH, 3 * _STRETCH
 _CX, _CY = 4 * _STRETCH, 5 * _STRETCH
 _OFFSET, _CHOICE = 6 * _STRETCH, 7 * _STRETCH
 _QUANTITIES = 8
-_NONE, _WHOLE, _CUT = 0.0, 1.0, 2.0  # what is drawn of a triangle: nothing, all, or what the near plane leaves
+_NONE, _WHOLE, _CUT = 0.0, 1.0, 2.0  # drawn part of a triangle: none, all, or the part beyond the near plane
 
 _ROWS = 4  # whose ends are computed at once
 
 _MARGIN = 0.5 + 1e-6  # [samples] from the left side of a sample to its centre, and a little more
 
-# what sifting with half the digits may be wrong by, and more: float32 has 24 bits
+# upper bounds of the errors of sifting with half the digits: float32 has 24 bits
 _SLACK = 1e-3  # [m]
 _SHARE = 1e-6  # of the coordinates of the camera
 _SOME = 0.51  # [samples] as `_MARGIN`
@@ -139,8 +139,8 @@ def collect_triangles(
 def _sift(view: View, mesh: Mesh, first: int, sifted: NDArray[np.int32], count: int) -> None:
     """Finds the triangles of a batch that may cover a sample: all that do, and few others.
 
-    Nine of ten triangles do not, seen from behind, out of the picture, or between samples. Half the digits suffice for
-    most of them, and twice as many triangles fit into a vector register.
+    Nine of ten triangles do not: they are seen from behind, out of the picture, or between samples. Half the digits
+    suffice for most of these, and twice as many triangles fit into a vector register.
     """
     origin, axes = view.origin, view.axes
     far = max(max(abs(origin[0]), abs(origin[1])), abs(origin[2]))

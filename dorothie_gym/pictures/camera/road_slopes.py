@@ -31,7 +31,7 @@ class RoadSlopes(NamedTuple):
         shape: (2,) columns and rows of cells.
         firsts: (cells + 1,) int32 first sample of each cell.
         places: (n, 3) positions [m].
-        ways: (n, 3) direction along x and y, and rise per metre in it.
+        ways: (n, 3) direction along x and y, and rise per metre in that direction.
     """
 
     origin: Array
@@ -67,8 +67,7 @@ def road_slopes(town: Town) -> RoadSlopes:
 def rise_at(slopes: RoadSlopes, x: float, y: float, z: float, cos: float, sin: float) -> float:
     """Returns the rise per metre of the road at a position [m] in a direction, 0 beside the roads.
 
-    The slope is that of the plane that fits the surrounding lanes best, so that it changes continuously as a vehicle
-    drives on.
+    The slope is that of the best-fitting plane of the surrounding lanes, so that it changes continuously along a drive.
     """
     if slopes.shape[0] == 0:
         return 0.0

@@ -66,7 +66,7 @@ class Bodies(Protocol):
 
     @property
     def props(self) -> RecordArray[PropRecord]:
-        """Things on the road; rows that are not present are free."""
+        """Bodies on the road; rows that are not present are free."""
         ...
 
 

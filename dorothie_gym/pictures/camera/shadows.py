@@ -42,7 +42,7 @@ _TILES = 8  # tiles along each side of the map; a power of two
 _SIDE = _TILE * _TILES
 _WRAP = _SIDE - 1
 _BODIES = 512  # width of the map of bodies [squares]
-_PARTS = 64  # parts of the map of bodies that are emptied one by one; with more of them, all of it is
+_PARTS = 64  # used parts of the map of bodies that are cleared singly; if there are more, the whole map is cleared
 _NOTHING = -32768
 _LINE_BELOW = 10.0  # [1/50 m] by which the line of a narrow triangle lies below it: it lights the triangle itself
 _BESIDE = 3.0 * TEXEL  # [m] around a shadow that squares of the map and their mixture darken at most
@@ -57,7 +57,7 @@ class ShadowMaps(NamedTuple):
         town: (n, n) int16 heights [1/50 m], tiles side by side, each at its place modulo their number.
         held: (t, t, 2) int32 place of the tile that is held.
         bodies: (m, m) int16 heights.
-        drawn: (k, 4) int64 parts of the map of bodies that were drawn to: columns and rows, first and after the last.
+        drawn: (k, 4) int64 used parts of the map of bodies: columns and rows, first and one past the last.
         parts: (1,) int64 number of those parts.
         slope: (2,) shift towards the sun per metre of height [1].
         window: (4,) int64: first square in x and y of the map of the town, and of that of bodies.
@@ -197,7 +197,7 @@ def _draw_tile(maps: ShadowMaps, tile: NDArray[np.int16], mesh: Mesh, cells: Cel
     for cell in range(len(cells.ranges)):
         if _shades(maps, cells.low[cell], cells.high[cell], column, row):
             for k in range(cells.ranges[cell, 0], cells.ranges[cell, 1]):
-                if mesh.instances[k] == TOWN:  # the shadow of a landmark would tell of one that is out of view
+                if mesh.instances[k] == TOWN:  # the shadow of a landmark would reveal one that is out of view
                     _cast(maps, tile, mesh, k, column * _TILE, row * _TILE, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -241,7 +241,7 @@ def _draw_bodies(
 
 @inlined
 def _empty_bodies(maps: ShadowMaps) -> None:
-    """Empties the map of bodies: most of it is empty anyway."""
+    """Clears the used parts of the map of bodies, most of which is empty."""
     if maps.parts[0] > _PARTS:
         for y in range(_BODIES):
             _empty(maps.bodies[y])

@@ -220,7 +220,7 @@ def _measures(town: Town, street_names: Sequence[str], width: int) -> tuple[floa
 
 
 def _unit(width: float) -> float:
-    """Returns the unit of everything around the map [px]: about the height of small type."""
+    """Returns the unit of lengths around the map [px]: about the height of small type."""
     return max(9.0, width / 110.0)
 
 

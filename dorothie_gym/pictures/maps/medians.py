@@ -110,7 +110,7 @@ BACK_TO_BACK = 9.0
 
 _TAPER = 8.0  # [m] over which the centre line crosses to the other side of the turn lane
 _SHARE = 0.3  # largest share of the turn lane for this
-_WIDE_OPENING = 2.0  # [m] width at its beginning: a lane that widens from zero needs no taper
+_WIDE_OPENING = 2.0  # [m] width at its start: a lane that widens from zero needs no taper
 _OPENING_BACK = 3.0  # [m] of asphalt before the opening
 _ISLAND_RIM = 0.7  # [m] of asphalt on both sides
 _OVERLAP = 0.2  # [m] of the lines of two adjoining islands
@@ -184,7 +184,7 @@ def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) ->
 
     Args:
         town: town to paint.
-        found: beginnings of turn lanes.
+        found: starts of turn lanes.
         pen: width of the thinnest line [m].
         fine: whether there is room for bars.
     """

@@ -131,7 +131,7 @@ def _spread(known: NDArray[np.bool_], against: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _is_second(kerbs: _Lines, number: int, length: float, facing: NDArray[np.int64]) -> bool:
-    """Returns whether the roadway is also found from the other kerb, which is longer or comes first."""
+    """Returns whether the roadway is also found from the other kerb, which takes precedence: it is longer or first."""
     other = int(np.bincount(kerbs.owner[facing]).argmax())
     longest = float(kerbs.length[kerbs.owner == other][0])
     return (longest, -other) > (length, -number)

@@ -281,14 +281,14 @@ def streets(
     turn_lanes: Sequence[Pocket],
     left_out: Sequence[LevelStretch] = (),
 ) -> Iterator[Shape]:
-    """Yields everything on the ground, from the pavements to the medians; surfaces in tunnels come first.
+    """Yields all surfaces on the ground, from the pavements to the medians; surfaces in tunnels come first.
 
     Args:
         town: town of the streets.
         samples: samples of its lanes.
         lines: borders of its lanes.
         parts: bridges and tunnels.
-        turn_lanes: beginnings of turn lanes.
+        turn_lanes: starts of turn lanes.
         left_out: bridges that are left out, as if seen from below; their place looks like the floor of a tunnel.
     """
     mouths = [part for part in parts if part.level < 0]

@@ -25,7 +25,7 @@ from dorothie_gym.session.live_session import LiveSession
 
 
 def utterances_of(session: LiveSession) -> list[SpokenLine]:
-    """Returns the utterances that are over and the messages of the Ad-Wizard, by the time at which they were heard."""
+    """Returns the finished utterances and the messages of the Ad-Wizard, by the time at which they were heard."""
     lines = [_line(utterance, session) for utterance in session.dialogue.said]
     lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in session.messages]
     return sorted(lines, key=lambda line: line.time)

@@ -31,8 +31,8 @@ _WIDEST_VERGE = 7.0  # [m] from a road to the centre of its pavement
 _OWN_ROAD = 1.5  # [m] of height between a pavement and the road beside it, at most
 _NEAREST = 24  # samples of lanes that are considered at a point
 _AROUND = 12  # samples of the land that are considered at a point
-_THIN = 4  # one of so many samples gives the height of the land
-_AHEAD = 6.0  # [m] along a lane over which a sample's slope is followed
+_THIN = 4  # every such sample gives the height of the land
+_AHEAD = 6.0  # [m] along a lane over which a sample's slope is extrapolated
 
 
 class Zone(enum.IntEnum):

@@ -1,4 +1,4 @@
-"""People who walk or stand, in several clothings, and a coarse version of each for the distance."""
+"""Walking and standing people in several clothings, each also in a coarse version for the distance."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ class Building:
 
 
 def plan_buildings(layers: MapLayers, clearance: Clearance) -> list[Building]:
-    """Returns buildings along all streets, clear of everything that the map draws and of the lots of landmarks."""
+    """Returns buildings along all streets, clear of all that the map draws and of the lots of landmarks."""
     rng = np.random.default_rng(zlib.crc32(b"buildings of " + layers.town.name.encode()))
     placed = _Placed()
     quarters = _Quarters(layers.town, clearance)

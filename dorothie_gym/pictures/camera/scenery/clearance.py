@@ -1,4 +1,4 @@
-"""Room for scenery: everything that the map draws is kept free, and a lot is reserved for the landmark of each site."""
+"""Room for scenery: all that the map draws is kept free, and a lot is reserved for the landmark of each site."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Clearance:
 
     @cached_property
     def reserved(self) -> shapely.STRtree:
-        """Lots, the ground between them and their streets, and the lines of sight of cars that come near."""
+        """Lots, the ground between them and their streets, and the lines of sight of approaching cars."""
         town = self._layers.town
         sights = [sight for lot, site in zip(self.lots, town.sites, strict=True) for sight in _sights(town, site, lot)]
         return shapely.STRtree([*(_with_view(lot) for lot in self.lots), *sights])
@@ -142,7 +142,7 @@ def _sights(town: Town, site: Site, lot: Lot) -> list[shapely.Polygon]:
 
 
 def _before(town: Town, site: Site, distance: float) -> tuple[float, float]:
-    """Returns the position (x, y) [m] at a distance before the stop at a site, as far as there is a lane."""
+    """Returns the position (x, y) [m] at a distance before the stop at a site, limited by the start of the lane."""
     lane, station = town.lanes[site.lane], site.station
     seen = {lane.id}
     while station < distance and (before := [k for k in town.predecessors(lane.id) if k not in seen]):
