@@ -231,7 +231,7 @@ def short_repr(value: object) -> str:
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """Returns "did you mean 'NAME'? " for the known name that is most like a given one; "" if none is alike."""
+    """Returns "did you mean 'NAME'? " for the known name that is most similar to a given one; "" if none is similar."""
     names = {name.casefold(): name for name in known}
     found = get_close_matches(str(given)[:MAX_SHOWN].casefold(), names, n=1, cutoff=0.6)
     return f"did you mean {names[found[0]]!r}? " if found else ""

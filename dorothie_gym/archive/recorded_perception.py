@@ -61,12 +61,12 @@ MAX_LIGHT_ANGLE: Final = 90.0
 def perceived(
     scene: Surroundings, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
 ) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
-    """Yields for each look the frame (int), kinds (k,) and values (k, 8) of the perceived objects, the nearest first.
+    """Yields for each perception the frame (int), kinds (k,) and values (k, 8) of the objects, the nearest first.
 
     Args:
         scene: recorded surroundings of the car.
         pose: (n, 3) x, y [m] and heading [degrees, clockwise] of the car.
-        frames: (n,) frames of the poses, rising, including those of the scene.
+        frames: (n,) frames of the poses, ascending, including those of the scene.
         switches: switches of the headlights, which are off at first.
         town: the town, if known, for the positions of the traffic lights.
     """

@@ -41,7 +41,7 @@ _TIME_BITS: Final = 32
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Session and time of n rows, in rising order.
+    """Session and time of n rows, in ascending order.
 
     Attributes:
         session: (n,) index of the session.
@@ -141,7 +141,7 @@ def earlier_spans(utterance_of_move: NDArray[np.integer], moves: ArrayLike) -> R
     """Returns the rows of the moves that precede each given move within its own utterance.
 
     Args:
-        utterance_of_move: utterance of each move of a record, rising.
+        utterance_of_move: utterance of each move of a record, ascending.
         moves: (n,) rows of moves.
     """
     rows = np.asarray(moves, dtype=np.int32).reshape(-1)

@@ -78,7 +78,7 @@ class Predicate(enum.StrEnum):
     DOES = "does"
     """The car is carrying out an action."""
     WILL = "will"
-    """The car is going to carry out an action, by its current plan."""
+    """The car will carry out an action according to its current plan."""
     ARRIVES_IN = "arrives_in"
     """The car will stop at a landmark after a time."""
     DISTANCE = "distance"

@@ -1,4 +1,4 @@
-"""Measured profile of recognition errors: how their rate depends on speaker, noise in the car and class of word."""
+"""Measured profile of recognition errors: dependence of their rate on speaker, noise in the car and class of word."""
 
 from __future__ import annotations
 

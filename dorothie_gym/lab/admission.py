@@ -194,7 +194,7 @@ class Visitors:
             self._end(visitor)
 
     def close(self) -> None:
-        """Ends the connections of all strangers, and admits no more: the server stops."""
+        """Ends the connections of all strangers, and admits no others: the server stops."""
         self._closed = True
         for visitor in list(self._strangers):
             self._end(visitor)

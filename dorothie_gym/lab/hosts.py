@@ -70,7 +70,7 @@ class ForeignHosts:
 
 
 def host_name(host: str) -> str:
-    """Returns the name or address of a header `Host`, without its port, in small letters."""
+    """Returns the name or address of a header `Host`, without its port, in lower case."""
     host = host.strip().lower()
     if host.startswith("["):
         return host[1:].partition("]")[0]

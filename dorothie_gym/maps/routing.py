@@ -406,12 +406,12 @@ def cuts_off(town: Town, car: Place, standing: Sequence[Place], added: Place) ->
 
     Args:
         town: the map.
-        car: where the car is.
-        standing: places of the props that are there.
+        car: place of the car.
+        standing: places of the existing props.
         added: place of the new one.
 
     Returns:
-        Whether there is a site that can be reached from the car's place now, and then could not any more: from there,
+        Whether there is a site that can be reached from the car's place now, and then no longer: from there,
         from a place that the car can reach, or from its stopping place before one of the props.
     """
     search = router(town)

@@ -390,7 +390,7 @@ def suits_roadblock(
 
 
 def _weather(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
-    """Brings fog, heavy rain, night, wind, puddles, ... for a while; fog changes further while it is there."""
+    """Brings fog, heavy rain, night, wind, puddles, ... for a while; further changes follow while there is fog."""
     density = weather(observation, WeatherParameter.FOG_DENSITY) / WeatherParameter.FOG_DENSITY.high
     options = FOGS if density > FOGS_FROM else WEATHERS
     weights = np.array([weight for weight, _ in options.values()])

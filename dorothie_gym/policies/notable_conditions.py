@@ -177,7 +177,7 @@ def notice(
 
 
 def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tuple[W, bool]]:
-    """Yields the parameters that have become conspicuous (True), or are so no more (False), since they were noted."""
+    """Yields the parameters that have become conspicuous (True), or are no longer (False), since they were noted."""
     now = {parameter: weather(observation, parameter) for parameter in W}
     for parameter, measure in CONSPICUOUS.items():
         value = measure(now)

@@ -19,7 +19,7 @@ _Style = TypeVar("_Style", bound=enum.StrEnum)
 
 
 class Directions(enum.StrEnum):
-    """How a participant gives directions."""
+    """Style in which a participant gives directions."""
 
     TURNS = "turns"
     """By turns, with ordinals and the names of streets."""
@@ -30,7 +30,7 @@ class Directions(enum.StrEnum):
 
 
 class Driving(enum.StrEnum):
-    """How a Co-Wizard drives."""
+    """Driving style of a Co-Wizard."""
 
     GENTLE = "gentle"
     """Slowly, and slower before turns and places."""
@@ -109,7 +109,7 @@ class Persona:
         """Draws a persona.
 
         Args:
-            rng: source of randomness; the same numbers are drawn whatever is given.
+            rng: source of randomness; the same numbers are drawn regardless of the arguments.
             given: values or ranges of the traits that are given.
         """
         drawn = {name: float(rng.random()) for name in SHARES}

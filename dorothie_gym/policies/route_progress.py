@@ -100,7 +100,7 @@ def stopping_distance(speed: float) -> float:
 
 
 def direction_of(way: Exit) -> Direction:
-    """Returns the direction of an exit as it is said."""
+    """Returns the direction of an exit in spoken form."""
     return _DIRECTIONS[way.type]
 
 

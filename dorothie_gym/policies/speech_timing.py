@@ -21,7 +21,7 @@ SPREAD = 0.7
 
 @dataclass(frozen=True, kw_only=True)
 class Delivery:
-    """How a speaker times its speech. Without arguments: at once, always alike.
+    """Timing of a speaker's speech. Without arguments: immediate and constant.
 
     Attributes:
         pace: speaking rate relative to `WORDS_PER_SECOND`.

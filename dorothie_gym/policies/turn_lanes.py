@@ -65,7 +65,7 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
         if crossing is not None and leg.lane == crossing.lane and following.lane == crossing.exit.connector:
             return replace(crossing, distance=max(distance + leg.end - begin, crossing.distance))
         if following.entry in (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT):
-            distance += max(following.start - begin, 0.0)  # the stations of lanes side by side are much the same
+            distance += max(following.start - begin, 0.0)  # the stations of adjacent lanes are almost equal
             continue
         distance += max(leg.end - begin, 0.0)
         if following.entry is LaneEntry.FOLLOW and leg.lane in turn_lanes(town):

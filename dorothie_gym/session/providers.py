@@ -103,7 +103,7 @@ def draw_pictures(world: World, scenario: Scenario, config: CameraConfig) -> Pic
 
 
 def see_by_camera(world: World, scenario: Scenario) -> VisiblePerception:
-    """Returns the perception by the pictures of a session, after the first look."""
+    """Returns the perception by the pictures of a session, initialised with the first picture."""
     perception: VisiblePerception = _make(PERCEPTION, world, scenario)
     return perception
 

@@ -55,7 +55,7 @@ class SessionCounts(TypedDict):
 class SessionSummary(SessionCounts):
     """State of a session; `reason` is set when it has ended ("arrived", "out of time" and the like).
 
-    `usage` is there for played sessions in which policies have cost something (calls, tokens), by role.
+    `usage` is set for sessions with policies that have a cost (calls, tokens), by role.
     """
 
     success: bool

@@ -433,7 +433,7 @@ def _fill_footways(
         world: arrays of the world.
         walks: (n,) footways that are tried.
         shares: (n + room,) in [0, 1): of the footway's length; after each free place, of the range of the speeds.
-        room: how many at most.
+        room: maximum number of pedestrians.
         place: (1,) scratch.
         pool: see `randomness.seed_of`.
     """

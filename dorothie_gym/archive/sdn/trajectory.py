@@ -184,7 +184,7 @@ class CarPoses:
     """Poses of the car.
 
     Attributes:
-        frames: (n,) int64, 10 Hz, rising.
+        frames: (n,) int64, 10 Hz, ascending.
         x: (n,) [m].
         y: (n,) [m].
         heading: (n,) [rad, clockwise].

@@ -51,7 +51,7 @@ class History:
         Args:
             observation: first observation of the session: it has the streets and landmarks.
             town: the map.
-            sizes: how much of the history the model is shown.
+            sizes: extent of the history in the inputs of the model.
         """
         return cls(encoded=IncrementalColumns.begin(header_of(observation, town), town, sizes))
 

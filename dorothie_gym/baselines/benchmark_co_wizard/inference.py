@@ -110,7 +110,7 @@ class TownModel:
             return model.predict(inputs, labels.task)
 
     def decisions(self, history: History, allowed: Sequence[bool]) -> Iterator[Predicted]:
-        """Yields the navigation decisions at the last NfD point of a history, the likeliest first (B = 1 each).
+        """Yields the navigation decisions at the last NfD point of a history, the most likely first (B = 1 each).
 
         Args:
             history: the history, which contains the point.

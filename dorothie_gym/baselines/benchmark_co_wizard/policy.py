@@ -145,7 +145,7 @@ def _answer(model: TownModel, history: History, voice: SpeechState, deed: Feasib
 
 
 def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> FeasibleAction:
-    """Returns the likeliest feasible action.
+    """Returns the most likely feasible action.
 
     Args:
         model: the model.

@@ -41,7 +41,7 @@ class BytePairs:
 
         Args:
             texts: texts of the training sessions only.
-            vocabulary: how many ids there are at most, padding and bytes included.
+            vocabulary: maximum number of ids, including padding and bytes.
 
         Raises:
             ValueError: the vocabulary is too small for the bytes.
@@ -104,7 +104,7 @@ class BytePairs:
 
 
 def words(text: str) -> list[str]:
-    """Returns the words and signs of a text in small letters."""
+    """Returns the words and signs of a text in lower case."""
     return _WORD.findall(text.lower())
 
 

@@ -28,7 +28,7 @@ _WAYS: Final = ({"left"}, {"right"}, {"straight", "ahead", "across", "forward"})
 
 
 def label_words(label: str) -> tuple[str, ...]:
-    """Returns the words of a label in small letters: "BurgerKing" is "burger", "king"."""
+    """Returns the words of a label in lower case: "BurgerKing" is "burger", "king"."""
     return tuple(part.lower() for part in _PARTS.findall(label))
 
 

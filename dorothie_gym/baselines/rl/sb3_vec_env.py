@@ -111,7 +111,7 @@ class NativeVecEnv(VecEnv):
         """Sets an attribute of the vector environment, which all environments share.
 
         Raises:
-            ValueError: it is to be set for a part of the environments only.
+            ValueError: it would be set in a part of the environments only.
         """
         if indices is not None and len(list(self._get_indices(indices))) != self.num_envs:
             raise ValueError(f"{attr_name} is one attribute of all {self.num_envs} environments; set it for all")

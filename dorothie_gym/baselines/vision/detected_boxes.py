@@ -177,7 +177,7 @@ class DetectedBoxes:
     def _look(
         self, session: Session, town: Town, queried: NDArray[np.int64]
     ) -> tuple[NDArray[np.void], NDArray[np.float16]]:
-        """Returns the detections in a session, and the queries at some of its records, in rising order."""
+        """Returns the detections in a session, and the queries at some of its records, in ascending order."""
         config = self._models[1].config
         camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
         pictures = RecordedPictures(session, town, camera)
@@ -186,7 +186,7 @@ class DetectedBoxes:
         inside = looks[(frames[looks] >= pictures.first_frame) & (frames[looks] <= pictures.last_frame)]
         found, queries = [np.empty(0, _KEPT_DTYPE)], np.zeros((len(queried), *self.query_shape), np.float16)
         threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # equal weights find equal objects, whatever the number of processors
+        torch.set_num_threads(1)  # equal weights find equal objects, regardless of the number of processors
         try:
             for records in np.array_split(inside, max(math.ceil(len(inside) / _AT_ONCE), 1)):
                 if len(records):
@@ -230,10 +230,10 @@ class DetectedBoxes:
 
 
 def before_events(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the places (n,) of the last records before the tenths of a second of events, rising.
+    """Returns the places (n,) of the last records before the tenths of a second of events, ascending.
 
     Args:
-        records: (k,) frames of the records, rising.
+        records: (k,) frames of the records, ascending.
         events: frames of the session's events.
     """
     last = np.searchsorted(records // FRAMES_PER_TENTH, events // FRAMES_PER_TENTH) - 1
@@ -250,7 +250,7 @@ def _event_frames(session: Session) -> NDArray[np.int64]:
 
 
 def objects_in(boxes: NDArray[np.floating], scores: NDArray[np.floating], threshold: float) -> NDArray[np.int64]:
-    """Returns the queries (n,) that are objects in a picture, the surest first, each object once.
+    """Returns the queries (n,) that are objects in a picture, in order of confidence, each object once.
 
     Args:
         boxes: (q, 4) centre x and y, width and height.

@@ -122,7 +122,7 @@ def run_vision_experiment(
         OSError: a folder cannot be written.
     """
     threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # equal seeds give equal weights, whatever the number of processors
+    torch.set_num_threads(1)  # equal seeds give equal weights, regardless of the number of processors
     try:
         return _run(job, workers, on_stage)
     finally:

@@ -122,7 +122,7 @@ class FrameSampling:
         return CameraConfig(width=self.width, height=self.height, outputs=_OUTPUTS)
 
     def candidates(self, session: Session) -> NDArray[np.int64]:
-        """Returns the frames (n,) of a session at places that are apart, rising."""
+        """Returns the frames (n,) of a session at places that are apart, ascending."""
         rows = session.trajectory
         faults = _camera_faults(session)
         chosen: list[int] = []
@@ -151,7 +151,7 @@ class FrameSampling:
 
 
 def _thinned(frames: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """Returns at most so many frames, evenly chosen."""
+    """Returns at most a given number of frames, evenly chosen."""
     count = min(len(frames), most)
     return frames[np.arange(count) * len(frames) // max(count, 1)]
 

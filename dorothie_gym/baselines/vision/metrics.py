@@ -129,7 +129,7 @@ class PictureBoxes:
 
 
 Closeness: TypeAlias = Callable[[PictureBoxes], Array]
-"""Returns how close each detected box is to each true one (m, n)."""
+"""Returns the closeness of each detected box to each true one (m, n)."""
 
 
 def _overlap(picture: PictureBoxes) -> Array:
@@ -213,7 +213,7 @@ def best_threshold(pictures: Sequence[PictureBoxes]) -> tuple[float, float]:
 
 
 def _kinds_of(pictures: Sequence[PictureBoxes]) -> list[int]:
-    """Returns the classes that have a true box, rising."""
+    """Returns the classes that have a true box, ascending."""
     return sorted({int(kind) for picture in pictures for kind in picture.kinds[~picture.ignored]})
 
 
@@ -232,7 +232,7 @@ def _of_kind(pictures: Sequence[PictureBoxes], kind: int, least: Sequence[float]
 
 
 def _matched(shares: Array, ignored: NDArray[np.bool_], least: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns whether each detection (k, m), the surest first, is right at each closeness, and whether it counts."""
+    """Returns whether each detection (k, m), in order of confidence, is correct at each closeness, and counts."""
     partners = np.array([_partners(shares, ignored, each) for each in least.tolist()]).reshape(len(least), len(shares))
     return partners >= 0, partners > _OF_IGNORED
 
@@ -242,7 +242,7 @@ _OF_IGNORED: Final = -2
 
 
 def _partners(shares: Array, ignored: NDArray[np.bool_], least: float) -> NDArray[np.int64]:
-    """Returns the true box of each detection (m,), the surest first; or `_NOBODY`, or `_OF_IGNORED`."""
+    """Returns the true box of each detection (m,), in order of confidence; or `_NOBODY`, or `_OF_IGNORED`."""
     partners = np.full(len(shares), _NOBODY, dtype=np.int64)
     free = np.ones(len(ignored), dtype=np.bool_)
     for number in np.flatnonzero((shares >= least).any(axis=1)).tolist():

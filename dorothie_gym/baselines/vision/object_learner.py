@@ -32,7 +32,7 @@ OVERLAP: Final = 0.5
 """Overlap above which boxes in a picture count as one object."""
 
 TURNED: Final = (0, 1)
-"""Rows of `KINDS` whose headings mean something: props look alike from several sides."""
+"""Rows of `KINDS` with meaningful headings: props look alike from several sides."""
 
 VALIDATED: Final = 150
 """Maximum number of validation pictures after an epoch, evenly chosen."""
@@ -170,7 +170,7 @@ def _mirrored(true: Targets) -> Targets:
 
 
 def detected_boxes(model: Detector, pictures: FrameSet, *, most: int | None = None) -> list[PictureBoxes]:
-    """Returns the true and the detected boxes of pictures, or of at most so many, evenly chosen."""
+    """Returns the true and the detected boxes of pictures, or of at most a given number, evenly chosen."""
     model.eval()
     where = next(model.parameters()).device
     count = min(len(pictures), most or len(pictures))

@@ -82,7 +82,7 @@ def predict_pixels(model: SegFormer, rgb: NDArray[np.uint8]) -> tuple[NDArray[np
 
 
 def pixel_scores(model: SegFormer, pictures: FrameSet, *, most: int | None = None) -> PixelScores:
-    """Returns the confusion and the errors of a model on pictures, or on at most so many, evenly chosen."""
+    """Returns the confusion and the errors of a model on pictures, or on at most a given number, evenly chosen."""
     model.eval()
     count = min(len(pictures), most or len(pictures))
     rows = (np.arange(count) * len(pictures) // max(count, 1)).tolist()

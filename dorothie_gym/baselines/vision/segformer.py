@@ -176,7 +176,7 @@ class SegFormer(nn.Module):
         return mixed
 
     def classes(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:
-        """Returns the likeliest class of each pixel (B, h, w)."""
+        """Returns the most likely class of each pixel (B, h, w)."""
         return enlarged(outputs.classes, size).max(1).indices  # equal to argmax, but faster on a CPU
 
     def depth(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:

@@ -1,6 +1,6 @@
 """Trigger of the scripted Ad-Wizard in a session in which an agent drives.
 
-Compiled code looks at every decision whether a planned trick finds its moment, by the functions and random numbers of
+Compiled code checks at every decision whether a planned trick can be played, by the functions and random numbers of
 the policy. Only then does the policy observe and act.
 """
 

@@ -20,7 +20,7 @@ WIDTH, HEIGHT = 84, 12
 """Size of the drawing [pixels]."""
 
 SHARE: Final = 7
-"""The dashboard takes one row in so many of a picture."""
+"""The dashboard takes one out of this many rows of a picture."""
 
 FAR, NEAR, GOAL = 112.0, 28.0, 560.0
 """Lengths of the gauges of distance: to an instruction's place, in two units, and to a goal [m]."""
@@ -80,7 +80,7 @@ class Readings:
 
 
 def rows_of_dashboard(height: int) -> int:
-    """Returns how many rows of a picture of a height the dashboard takes."""
+    """Returns the number of rows of the dashboard in a picture with a height."""
     return max(1, round(height / SHARE))
 
 

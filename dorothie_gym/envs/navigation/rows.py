@@ -234,12 +234,12 @@ class DrivingRows(CachedViews):
 
     @property
     def vectors(self) -> Vector:
-        """Vectors at the current decision (environments, n), to be copied."""
+        """Vectors at the current decision (environments, n); callers must copy them."""
         return self._drivers.vector
 
     @property
     def masks(self) -> NDArray[np.int8]:
-        """Feasible actions at the current decision (environments, 18), to be copied."""
+        """Feasible actions at the current decision (environments, 18); callers must copy them."""
         return self._drivers.mask
 
     @cached_property

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NEAR_WAYPOINT: Final = ARRIVAL_DISTANCE + 1e-6
-"""Distance within which Python looks whether the ego has arrived [m]."""
+"""Distance within which Python checks whether the ego has arrived [m]."""
 
 _FASTER = int(NavigationAction.FASTER)
 _INSTRUCT = int(DialogueMove.INSTRUCT.value)
@@ -269,7 +269,7 @@ def act_share(
     turns: NDArray[np.int64], home: int, town: TownArrays, exits: ExitArrays, worlds: WorldArrays,
     drivers: DriverArrays, drives: DriveArrays, frames: int, pedals: bool,
 ) -> None:  # fmt: skip
-    """Calls `act` for the environments whose stage is `ACTING`, `MOVING`, `NO_SPACE` or `LOST`, until all are taken.
+    """Calls `act` for the environments whose stage is `ACTING`, `MOVING`, `NO_SPACE` or `LOST`, until none is left.
 
     Args:
         turns: numbers of the environments, see `threads.take`; events are noted in the column `EVENTS`.
@@ -300,7 +300,7 @@ def guide_share(
     graph: RoutingGraph, searches: RouteSearch, common: DrivingTown, worlds: WorldArrays, drivers: DriverArrays,
     guidances: InstructorArrays, episodes: EpisodeArrays, drives: DriveArrays,
 ) -> None:  # fmt: skip
-    """Guides, judges and observes as the stage of each environment says, until all are taken.
+    """Guides, judges and observes according to the stage of each environment, until none is left.
 
     Args:
         turns: numbers of the environments, see `threads.take`; events are noted in the column `EVENTS`.

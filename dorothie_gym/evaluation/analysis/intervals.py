@@ -1,7 +1,7 @@
 """Confidence intervals: Wilson's for shares, percentile bootstrap over sessions (Efron, 1979), Student's t over seeds.
 
 `scipy.stats.bootstrap` is not used: it draws new samples for each figure instead of one set for all, and a single
-sample with an undefined figure (no exception met, say) makes its interval undefined.
+sample with an undefined figure (such as no exception met) makes its interval undefined.
 """
 
 from __future__ import annotations

@@ -201,7 +201,7 @@ class SessionChecker:
                 )
             except OSError:
                 raise  # of the temporary folder
-            except Exception as error:  # recorded actions are the submitter's: whatever they break is their fault
+            except Exception as error:  # recorded actions are the submitter's, and so are the failures they cause
                 raise SessionError(f"cannot be played again: {type(error).__name__}: {one_line(error)}") from error
             again = Session.load(Path(folder) / "s")
             difference = first_difference(session, again, strict=True)

@@ -134,7 +134,7 @@ def generate_corpus(
 
     Raises:
         ValueError: no sessions or no workers, or a negative seed.
-        SessionError: the folder holds something else, or another process holds its lock.
+        SessionError: the folder contains other files, or another process holds its lock.
         ProcessError: a session failed in another process, or there is no such cluster.
         OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.

@@ -141,7 +141,7 @@ def export_frames(
         on_part: called with the number of parts that are done and of all.
 
     Raises:
-        SessionError: a folder holds something else, or a session has no surroundings or no known town.
+        SessionError: a folder contains other files, or a session has no surroundings or no known town.
         OSError: a file cannot be written.
         ProcessError: a process died.
     """
@@ -253,7 +253,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Annotations of a part."""
+    """Annotations of a part of the pictures."""
 
     job: _Job
     number: int

@@ -58,7 +58,7 @@ class SessionMaker:
         """Plays a session unless its folder is finished; returns the session, its folder, and whether it is new.
 
         Raises:
-            SessionError: the folder holds something else.
+            SessionError: the folder contains other files.
             OSError: the folder cannot be written, or was deleted.
             ValueError: a policy cannot be made, or its action is malformed; policies may raise other errors.
         """
@@ -189,7 +189,7 @@ def run_sessions(
 
     Raises:
         ValueError: there are no workers.
-        SessionError: the folder holds something else, or another process holds its lock.
+        SessionError: the folder contains other files, or another process holds its lock.
         ProcessError: a session failed in another process, a process died, or the cluster cannot be reached.
         OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.

@@ -238,7 +238,7 @@ def evaluate_predictions(
         corpus: the labels (`labels_of`), or the corpus whose split is taken.
         split: see `labels_of`.
         missing: why models could not be run, by name.
-        about: how the predictions were made, by model or file.
+        about: origin of the predictions, by model or file.
 
     Raises:
         SessionError: the corpus cannot be read.

@@ -41,7 +41,7 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class Slot:
-    """Sessions that one group of people is to play.
+    """Sessions planned for one group of people.
 
     Attributes:
         number: number of the slot.

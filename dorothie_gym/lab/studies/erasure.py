@@ -59,7 +59,7 @@ def erase_from_data(records: StudyRecords, *names: str) -> list[str]:
         names: ids of the participants.
 
     Returns:
-        The ids of the sessions whose records are to be removed.
+        The ids of the sessions whose records must be removed.
 
     Raises:
         StorageError: nothing is deleted.
@@ -113,7 +113,7 @@ def is_unfinished(records: StudyRecords) -> bool:
 
 
 def _forgotten(records: StudyRecords) -> list[str]:
-    """Returns the ids with parameters of links that belong to no participant (any more)."""
+    """Returns the ids with parameters of links that belong to no participant, or no longer to one."""
     known = {row["id"] for row in records.data.rows("SELECT id FROM participants")}
     rows = records.recruitment.rows("SELECT DISTINCT participant FROM parameters")
     return [row["participant"] for row in rows if row["participant"] not in known]
@@ -126,7 +126,7 @@ def _forget_platform_ids(records: StudyRecords) -> None:
 
 
 def _note_removal(records: StudyRecords, session: str) -> None:
-    """Records that nothing of a session is left, once this is durable."""
+    """Records that all data of a session are deleted, once the deletion is durable."""
     sync(records.folder / SESSIONS_FOLDER)
     records.erased(session)
 

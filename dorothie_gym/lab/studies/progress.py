@@ -141,7 +141,7 @@ class Progress:
     def reopen(self) -> None:
         """Opens the rooms of sessions that were in progress when the last server stopped.
 
-        Ends that the last server could not note any more are noted.
+        Ends that the last server could no longer record are recorded.
         """
         for row in self.records.sessions():
             summary = None if row.reason is not None else self.rooms.summary_left_behind(row)

@@ -360,7 +360,7 @@ class StudyRecords:
             self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", session)
 
     def pending_erasures(self) -> list[str]:
-        """Returns the ids of the sessions whose records are to be removed."""
+        """Returns the ids of the sessions whose records must be removed."""
         return [row["folder"] for row in self.data.rows("SELECT folder FROM erasures ORDER BY folder")]
 
     def erased(self, session: str) -> None:

@@ -17,7 +17,7 @@ from dorothie_gym.lab.studies.study import Study
 logger = logging.getLogger(__name__)
 
 GONE_SECONDS: Final = 20.0
-"""Time after the last sign of a page after which its person is not counted on any more [s]; a reload takes some."""
+"""Time after the last sign of a page after which its person no longer counts as available [s]; a reload takes time."""
 
 CERTAINTY: Final = {Stage.LOBBY: 1.0, Stage.TUTORIAL: 0.93, Stage.INSTRUCTIONS: 0.85}
 """Share of people at the stages before a session who come to it, if 30 % of all drop out (`benchmarks/arrivals.py`)."""

@@ -48,7 +48,7 @@ def road_slopes(town: Town) -> RoadSlopes:
     for a, b in samples.bounds.tolist():
         if b - a > 1:
             slope[a:b] = np.gradient(samples.centre[a:b, 2], samples.station[a:b])
-    keep = np.full(len(slope), bool((np.abs(slope) > _SMALLEST).any()))  # level ones as well: beside a slope, say
+    keep = np.full(len(slope), bool((np.abs(slope) > _SMALLEST).any()))  # including level ones, such as beside a slope
     places = samples.centre[keep]
     ways = np.column_stack((pn.cos(samples.heading), pn.sin(samples.heading), slope))[keep]
     if not len(places):

@@ -232,7 +232,7 @@ def _place(
                 material = material_at(ground, sheet, body.x, body.y)
                 if ground.outside[sheet] == _NOTHING:  # a bridge, on which there are no kerbs
                     raised &= material == _NOTHING
-                else:  # a tunnel, with kerbs below whatever is above
+                else:  # a tunnel, with kerbs below the structures above it
                     raised |= _RAISED[material] and body.z < _BELOW
             if raised:
                 body.z += KERB_HEIGHT

@@ -68,7 +68,7 @@ class MapPainter:
         Args:
             town: town to paint.
             size: width and height [px].
-            street_names: names by street index; the town's own where absent.
+            street_names: names by street index; the town's own if omitted.
             margin: margin without roads [px], for all sides or as (left, top, right, bottom).
             type_sizes: largest and smallest font size of street names [px].
             label_spacing: smallest distance between two labels with the same name [px].

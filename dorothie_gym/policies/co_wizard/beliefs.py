@@ -84,7 +84,7 @@ class BeliefState:
         return replace(self, goal=self.goal if landmark is None else landmark, exact=False)
 
     def with_guess(self, landmark: LandmarkName, place: Place) -> BeliefState:
-        """Sets the guessed place of a landmark and queues the updates; earlier guesses are not sent any more."""
+        """Sets the guessed place of a landmark and queues the updates; earlier guesses are no longer sent."""
         where = LanePosition(lane=place[0], metres=round(place[1]))
         guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=where)
         others = (update for update in self.updates if update.action is not MentalAction.KNOWLEDGE_UPDATE)

@@ -270,7 +270,7 @@ def end_red_light_rest(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _rest(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops for good for the hazard for which this has been decided."""
+    """Stops for the hazard for which this has been decided."""
     resting = view.time < state.commands.rest_until and view.motion is Motion.HAZARD
     if not resting or state.intentions.halted or view.manoeuvring:
         return None

@@ -46,7 +46,7 @@ HELD_UP = 6.0
 """Standstill before a hazard, other than a red light, that triggers a call [s]."""
 
 ARRIVED = 2.0
-"""Distance to the goal at which a standing car is there [m]."""
+"""Distance to the goal at which a stationary car has arrived [m]."""
 
 ORDER_LIFETIME = 4.0
 """Time for which an action is kept that is not possible yet [s]."""

@@ -39,7 +39,7 @@ class NavigationInstruction:
     Attributes:
         act: move and slots: the action, and the street or landmark where one is named.
         sector: direction, as an index of `junction_exits.SECTORS`; None where the act has no direction.
-        distance: distance to the place where it is to be carried out, as said [m].
+        distance: stated distance to the place of the action [m].
         time: time at which it was given [s].
     """
 

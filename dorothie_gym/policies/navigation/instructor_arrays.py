@@ -104,7 +104,7 @@ class RouteRecord:
 class InstructionRecord:
     """Last instruction, as `NavigationInstruction`; -1 stands for none."""
 
-    distance: Float  # to the place where it is to be carried out, as said [m]
+    distance: Float  # stated distance to the place of the action [m]
     time: Float  # at which it was given [s]
     kind: Int32  # `StepKind`; with `first` and `second` it identifies the step: equal steps are repetitions
     first: Int32

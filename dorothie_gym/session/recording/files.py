@@ -160,7 +160,7 @@ def to_page(value: object) -> str:
 
 
 def same_json(first: object, second: object) -> bool:
-    """Returns whether two values are written alike in JSON, whatever the order of keys; 15 and 15.0 are not."""
+    """Returns whether two values have equal JSON, regardless of the order of keys; 15 and 15.0 differ."""
     return to_line(canonical(first, "value")) == to_line(canonical(second, "value"))
 
 

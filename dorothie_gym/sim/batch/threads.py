@@ -61,7 +61,7 @@ class ThreadPool:
         """Starts threads.
 
         Args:
-            others: how many beside the caller's own.
+            others: number of threads besides the caller's own.
         """
         self._workers = [_Worker() for _ in range(others)]
         for number, worker in enumerate(self._workers):

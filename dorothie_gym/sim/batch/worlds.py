@@ -77,7 +77,7 @@ def step_alone(
 def step_batch_of_one(
     town: TownArrays, batch: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
 ) -> int:
-    """As `step_alone`, of a world that is a batch already (`alone`), which saves 30 us."""
+    """Like `step_alone`, for a world that already is a batch (`alone`), which saves 30 us."""
     answers = np.full(1, NO_SPACE, dtype=np.int64)
     actions = np.array([acceleration], dtype=np.float64), np.array([steering], dtype=np.float64)
     _step_share(turns_of(1, 1), 0, town, batch, int(substeps), float(dt), *actions, answers)

@@ -187,5 +187,5 @@ class Visibility:
 
     @functools.cached_property
     def is_clear(self) -> bool:
-        """Returns whether nothing is lost anywhere within sight of a clear noon."""
+        """Returns whether perception within the sight distance of a clear noon is without loss."""
         return self.gain(CLEAR_SIGHT) >= 1.0

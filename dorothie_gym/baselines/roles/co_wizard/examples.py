@@ -112,7 +112,7 @@ def correcting_example(
     Args:
         percept: the player's perception, with its own memory.
         listening: inputs of the first step.
-        acting: inputs of the second step, from which nothing is learnt.
+        acting: inputs of the second step, for which there is no target.
         led: memory that the teacher has led to.
         lesson: decision of the teacher.
     """

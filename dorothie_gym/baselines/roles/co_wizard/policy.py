@@ -95,7 +95,7 @@ class Turn:
 class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
     """Co-Wizard whose memory, goal, commands and remarks are decided by a network.
 
-    Memory and commands are the likeliest ones; remarks are drawn. Names, numbers and words of a remark are filled in
+    Memory and commands are the most likely ones; remarks are drawn. Names, numbers and words of a remark are filled in
     (see `remarks`); belief updates say how the memory has changed.
     """
 
@@ -131,7 +131,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         Args:
             observation: observation of the Co-Wizard, with its action mask.
             state: state before.
-            silent: whether nothing is to be said.
+            silent: whether the Co-Wizard must stay silent.
         """
         rng = np.random.default_rng((state.seed, state.count))
         voice = state.voice
@@ -168,7 +168,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         )
 
     def _listen(self, percept: CoWizardPercept, inputs: Inputs) -> Update:
-        """Returns the likeliest update of the memory."""
+        """Returns the most likely update of the memory."""
         state, words, places, count = inputs.tensors()
         before = torch.tensor([percept.memory.values])
         heard = self._network.listen(state, words, places, count, before)
@@ -188,7 +188,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
     def _act(
         self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
-        """Returns the index of the likeliest command, and the remarks that are drawn."""
+        """Returns the index of the most likely command, and the remarks that are drawn."""
         scores, first, hidden = self._network.act(*inputs.tensors())
         command = int(scores[0].argmax())
         if silent:

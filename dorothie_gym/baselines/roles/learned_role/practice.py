@@ -75,6 +75,6 @@ def observed(engine: SessionEngine, role: Role) -> ObservationMapping:
 
 
 def new_remarks(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...]:
-    """Returns the remarks that were not there before, whatever their words."""
+    """Returns the remarks that are new, regardless of their words."""
     known = [(one.act, one.meaning) for one in before]
     return tuple(one for one in after if (one.act, one.meaning) not in known)

@@ -165,7 +165,7 @@ def train_in_rounds(
         The fits that were done now.
 
     Raises:
-        SessionError: the corpus cannot be read or replayed, or the folder holds something else.
+        SessionError: the corpus cannot be read or replayed, or the folder contains other files.
         ProcessError: a session failed in another process.
     """
     done: list[FinishedFit] = []

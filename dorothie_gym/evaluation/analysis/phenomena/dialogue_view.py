@@ -242,7 +242,7 @@ def asks_for(act: DialogueAct, *slots: Slot) -> bool:
 
 
 def _falls(times: Sequence[float], since: float, until: float) -> bool:
-    """Returns whether one of the rising times is within a stretch."""
+    """Returns whether one of the ascending times is within an interval."""
     k = bisect.bisect_left(times, since)
     return k < len(times) and times[k] <= until
 

@@ -190,7 +190,7 @@ def _knows(world: SessionWorld, said: Proposition, time: float, speaker: Role) -
 
 
 def _visibility(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether the range of sight, a moment ago or now, is long, or as long as said."""
+    """Whether the range of sight, now or a moment ago, is long, or as long as stated."""
     metres, sights = said.get("metres"), [world.sight(time - shift) for shift in (0.0, 2.0, _NOW)]
     if isinstance(metres, int):
         return any(abs(metres - sight) <= max(_SIGHT_ERROR, 0.3 * sight) for sight in sights)

@@ -127,7 +127,7 @@ class IncrementalColumns:
 
     Attributes:
         header: streets, and the landmarks that the Co-Wizard knows.
-        sizes: how much of the history a batch shows; more is not kept.
+        sizes: extent of the history in a batch; the rest is dropped.
         window: the last observed frames.
         utterances: the last utterances of participant and Co-Wizard.
         actions: the last physical actions.

@@ -161,7 +161,7 @@ def _frontages(layers: MapLayers) -> Iterator[_Frontage]:
 
 
 class _Quarters:
-    """Quarters of a town: a centre, homes round it and suburbs, also wherever the open country begins."""
+    """Quarters of a town: a centre, homes around it, and suburbs, which also border on the open country."""
 
     def __init__(self, town: Town, clearance: Clearance) -> None:
         points = np.concatenate([lane.points[:, :2] for lane in town.lanes])
