@@ -80,8 +80,8 @@ class GoalEvent(enum.IntEnum):
 
 
 CREEP_SHORTFALL, CREEP_LEAST, CREEP_LEAD, CREEP_RENEW, SLOWER_DISTANCE = 12.0, 10.0, 16.0, 6.0, 30.0
-"""Slow approach [m]: shortfall on the stated distance; least distance; lead of a place that is carried along, and distance
-at which that is renewed; distance if none is stated."""
+"""Slow approach [m]: shortfall on the stated distance; least distance; lead of a place that is carried along, and
+distance at which that is renewed; distance if none is stated."""
 
 PLACE_SIGHT: Final = 80.0
 """Distance along the default lanes within which a place is looked for [m]; as that of the scripted Co-Wizard."""
