@@ -5,7 +5,7 @@ for an environment that does not allow the work), so that `except ValueError` ke
 
 ```
 DorothieGymError
-├── InputFileError       a file is no regular file, too large, malformed, or has a field of another type
+├── InputFileError       a file is not a regular file, too large, malformed, or has a field of another type
 ├── OntologyError        a text, number or combination that the closed vocabularies do not contain
 ├── TownError            a map cannot be read or used
 ├── TownArchiveError     a cached town is damaged or of another format

@@ -347,14 +347,14 @@ def at_tenths(session: Session) -> Session:
 
 
 def history_angle(record: ActionRecord) -> float:
-    """Returns the angle of a past action [degrees]: -180 for a U-turn (as in SDN), 0 where it is not known."""
+    """Returns the angle of a past action [degrees]: -180 for a U-turn (as in SDN), 0 if unknown."""
     if record.action is PhysicalAction.U_TURN:
         return U_TURN_ANGLE
     return wrap_degrees(record.angle or 0.0)
 
 
 def label_angle(record: ActionRecord) -> float:
-    """Returns the angle that NfD predicts [degrees]: 0 for actions without one, NaN where it is not known."""
+    """Returns the angle that NfD predicts [degrees]: 0 for actions without one, NaN if unknown."""
     if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
         return 0.0
     return math.nan if record.angle is None else wrap_degrees(record.angle)

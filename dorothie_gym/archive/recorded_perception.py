@@ -1,6 +1,6 @@
 """Perception of the recorded surroundings from the car.
 
-As in the environment, everything within the sight distance is perceived in all directions: 80 m on a clear day, less in
+As in the environment, objects within the sight distance are perceived in all directions: 80 m on a clear day, less in
 fog, rain and darkness (`dorothie_gym.sim.sensing.visibility`; recorded headlights count). The random parts of the
 environment's perception are left out: glimpses beyond the sight distance and position errors. The state of a traffic
 light is perceived within the sight distance when the car drives towards it. Positions are relative to the car's pose at

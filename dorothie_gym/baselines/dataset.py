@@ -196,7 +196,7 @@ class Dataset:
         return self._sight
 
     def _queries(self, fold: str) -> Tensor:
-        """Returns the queries (N, q, d) at the last look of all points of a fold, float16; 0 where there is none."""
+        """Returns the queries (N, q, d) at the last look of all points of a fold, float16; 0 if there is none."""
         columns, detector, tables = self.columns, self.detector, self.tables(fold)
         session = np.concatenate([table.session for table in tables])
         start, stop = (

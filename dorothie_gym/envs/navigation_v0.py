@@ -72,7 +72,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `camera`: `CameraConfig` of the pictures that are observed; None for 84 x 84 pixels.
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `view`: picture of `render()`: `"role"` (what the Co-Wizard observes, and the instructions) or `"session"`
-      (everything).
+      (the whole session).
     - `render_view`: `"map"`, `"camera"` (the windscreen) or `"both"`, side by side.
 
     `reset(seed=...)` plays the scenario of `DuoWizardEnv` for this seed; `reset(options={"scenario": Scenario})`

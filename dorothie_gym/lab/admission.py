@@ -53,7 +53,7 @@ PAUSE: Final = 0.002
 """Shortest pause between two series of turns if connections wait for one [s], for the threads of the sessions."""
 
 REST: Final = 1.0
-"""Length of the pause after a series relative to the time that it took with what it set off: strangers get half of the
+"""Length of the pause after a series relative to the time of the series and its consequences: strangers get half of the
 time of the event loop, however much a turn costs. A new websocket costs 1.5 ms, ten times as much as a page."""
 
 
@@ -112,9 +112,9 @@ class Visitor:
         transport: the connection itself.
         since: clock at which the server began to wait for its request [s].
         known: whether it has shown a valid secret.
-        served: whether the server has something to do for it; otherwise it waits for the client.
+        served: whether the server is working for it; otherwise it waits for the client.
         socket: whether it is a websocket.
-        heavy: whether it asks too often.
+        heavy: whether it sends too many requests.
     """
 
     address: str
@@ -215,7 +215,7 @@ class Visitors:
 
 
 class Reader(Protocol):
-    """Connection with something to be read."""
+    """Connection with unread data."""
 
     transport: asyncio.Transport
     visitor: Visitor

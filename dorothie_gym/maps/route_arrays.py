@@ -94,7 +94,7 @@ _NO_PLACES = argument(empty_records(PlaceRecord, 1))
 
 
 def place_records(places: Sequence[tuple[int, float]]) -> RecordArray[PlaceRecord]:
-    """Returns places as records; a single record of zeros where there are none."""
+    """Returns places as records; a single record of zeros if there are none."""
     if not places:
         return _NO_PLACES
     return argument(filled_records(PlaceRecord, [(station, lane) for lane, station in places]))

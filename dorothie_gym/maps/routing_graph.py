@@ -99,7 +99,7 @@ SPEEDS = (10.0 / 3.6, 60.0 / 3.6)
 
 
 class RoutingLane:
-    """A lane of a town, divided into cells; indices are -1 where there is none."""
+    """A lane of a town, divided into cells; indices are -1 if there is none."""
 
     length: Float  # [m]
     cell_size: Float  # length of its cells [m]

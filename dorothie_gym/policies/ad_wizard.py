@@ -419,7 +419,7 @@ def _task(state: AdWizardState, observation: ObservationMapping, now: float, rng
 
 
 def _sensor(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
-    """Lets a sensor fail; it recovers by itself."""
+    """Makes a sensor fail; it recovers by itself."""
     sensor = tuple(Sensor)[int(rng.integers(len(Sensor)))]
     return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=sensor, on=True), state
 

@@ -1,7 +1,7 @@
 """Beliefs of a Co-Wizard and the reasons for its actions: the record that scripted and learned Co-Wizards fill.
 
 `co_wizard.proposition_truth` judges propositions and reasons over it, and `co_wizard.answers` words what follows. The
-state of the scripted Co-Wizard comes about by rules, the memory of the learned one by a network. The learned one does
+state of the scripted Co-Wizard follows from rules, the memory of the learned one from a network. The learned one does
 not keep whether a place that is not on its map was described to it, the obstacle for which it stopped by a decision,
 and the reason for an instruction to stop.
 """

@@ -121,7 +121,7 @@ class SeenObject:
 
 
 def street_of(observation: ObservationMapping, town: Town, lane: int) -> StreetName:
-    """Returns the name of the street that a lane belongs to; UNKNOWN where it has none."""
+    """Returns the name of the street that a lane belongs to; UNKNOWN if it has none."""
     street = town.lanes[lane].street
     names = observation["street_names"]
     return StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN

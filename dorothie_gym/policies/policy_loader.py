@@ -120,7 +120,7 @@ def register_loader(kind: str, loader: Loader) -> None:
 
     Args:
         kind: suffix of the files (".safetensors"), or the field "kind" of their JSON ("ppo").
-        loader: function that reads them; it raises `ValueError` where it cannot.
+        loader: function that reads them; it raises `ValueError` if it cannot.
 
     Raises:
         ValueError: another loader has the kind.
@@ -271,7 +271,7 @@ def _cost(value: object) -> float | None:
 
 
 def _description(path: Path) -> Mapping[str, object]:
-    """Returns the JSON of a file, or of a folder's description; empty where there is none."""
+    """Returns the JSON of a file, or of a folder's description; empty if there is none."""
     file = path / DESCRIPTION if path.is_dir() else path
     if file.suffix != ".json" or not file.exists():
         return {}

@@ -134,7 +134,7 @@ class SessionEngine(Restorable):
         return self.observations
 
     def step(self, actions: Mapping[str, ActionMapping]) -> StepOutcome:
-        """Plays one decision: the actions of all roles, then the physics until the next decision.
+        """Runs one decision: the actions of all roles, then the physics until the next decision.
 
         Args:
             actions: an action for each agent, see `dorothie_gym.session.spaces.action_space`.

@@ -180,7 +180,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
 
     @property
     def destination_direction(self) -> Array:
-        """Direction to its destination (2,) of length 1, or zeros where it is there."""
+        """Unit vector to its destination (2,), or zeros at the destination."""
         away = self.destination - self.position
         far = pm.hypot(*away)
         return away / far if far > 0.0 else np.zeros(2)

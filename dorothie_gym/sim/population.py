@@ -406,7 +406,7 @@ def _add_people(
 
 @lru_cache(maxsize=16)
 def _footways(network: TownNetwork) -> Array:
-    """Returns the shares of the footways on which pedestrians begin, cumulated; (0,) where there are none."""
+    """Returns the shares of the footways on which pedestrians begin, cumulated; (0,) if there are none."""
     walks = plain(town_arrays(network).walks)
     for kind in (Footway.PAVEMENT, Footway.STREET):
         lengths = np.where(walks["kind"] == kind, walks["length"], 0.0)

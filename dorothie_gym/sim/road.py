@@ -97,7 +97,7 @@ class TownRoad(CachedViews, Road):
         return not abs(self.height_of(one) - self.height_of(other)) > LEVEL_HEIGHT
 
     def step(self, dt: float) -> None:
-        """Moves everything by `dt` [s] and checks for collisions.
+        """Moves all bodies by `dt` [s] and checks for collisions.
 
         Equals highway-env's step for bodies at one height; pairs that its own first check would dismiss are skipped.
         """

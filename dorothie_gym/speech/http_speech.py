@@ -66,7 +66,7 @@ class HttpSynthesizer:
         timeout: time for an answer [s].
 
     Raises:
-        ValueError: `url` is no address, or there are no voices.
+        ValueError: `url` is not an address, or there are no voices.
         SpeechError: httpx is not installed.
     """
 

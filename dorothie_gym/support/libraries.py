@@ -20,7 +20,7 @@ class Library:
         self._name = name
 
     def __getattr__(self, name: str) -> object:
-        """Returns something of the module, which is imported for it; raises `ImportError` if that is not possible."""
+        """Returns an attribute of the module, which is imported on first use; raises `ImportError` if that fails."""
         value = getattr(importlib.import_module(self._name), name)
         self.__dict__[name] = value  # so that this method is not called for it again
         return value

@@ -134,7 +134,7 @@ def check_session(
     Args:
         session: a session, or its folder.
         town: the town of the session if it is not shipped with the package.
-        storyboard: its storyboard's template, where that is not shipped.
+        storyboard: its storyboard's template, if that is not shipped.
         replay: whether to play it again; sessions whose actions were not recorded cannot be.
 
     Raises:

@@ -137,7 +137,7 @@ class GraphAttention(nn.Module):
 
         Args:
             nodes: (L, inputs).
-            edges: (2, E) from and to.
+            edges: (2, E) sources and targets.
             edge_types: (E,).
         """
         count = len(nodes)

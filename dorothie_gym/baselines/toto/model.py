@@ -46,7 +46,7 @@ _OBJECT_UNITS: Final = (30.0, ANGLE_UNIT, 30.0, 30.0, ANGLE_UNIT, 10.0, 5.0, 5.0
 
 
 class TOTO(Model):
-    """Transformer encoder over everything visible at a point, with a head for each prediction.
+    """Transformer encoder over all data visible at a point, with a head for each prediction.
 
     Args:
         config: sizes and inputs.

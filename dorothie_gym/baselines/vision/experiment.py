@@ -258,5 +258,5 @@ def _test(learner: PixelLearner | ObjectLearner, pictures: FrameSet) -> dict[str
 
 
 def _known(figures: Mapping[str, float]) -> dict[str, object]:
-    """Returns figures in JSON types: None where there is none."""
+    """Returns figures in JSON types: None if there is none."""
     return {name: None if math.isnan(value) else round(value, 5) for name, value in figures.items()}

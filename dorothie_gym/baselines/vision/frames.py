@@ -198,7 +198,7 @@ class SessionFrames:
     Attributes:
         name: name of the session.
         town: name of its town.
-        key: hash of everything that determines the pictures.
+        key: hash of all that determines the pictures.
         rgb: (n, h, w, 3) uint8.
         semantic: (n, h, w) uint8 `ObjectClass`.
         depth: (n, h, w) float16 distance along the axis of the camera [m], infinite for the sky.
@@ -282,7 +282,7 @@ class FrameSet:
 
     @property
     def key(self) -> str:
-        """Hash of everything that determines the pictures."""
+        """Hash of all that determines the pictures."""
         return hashlib.sha256(" ".join(session.key for session in self.sessions).encode()).hexdigest()
 
 
@@ -294,7 +294,7 @@ def load_frames(
     folder: Path | None = None,
     on_session: OnFrames = lambda done, planned: None,
 ) -> dict[str, FrameSet]:
-    """Returns the labelled pictures of a corpus by fold, drawn now where they are not in the cache.
+    """Returns the labelled pictures of a corpus by fold, drawn now if they are not in the cache.
 
     Args:
         corpus: the corpus.
@@ -422,7 +422,7 @@ def _mapped(path: Path, name: str, town: str) -> SessionFrames:
 
 @functools.cache
 def _builder_digest() -> str:
-    """Returns a digest of everything except the session that determines its pictures."""
+    """Returns a digest of all that determines the pictures of a session except the session itself."""
     scenes = builder_digest()
     if scenes is None:
         raise SessionError("the sources of the camera cannot be read; no pictures can be kept for the training")

@@ -59,7 +59,7 @@ class Readings:
         goal: place of the named goal ahead of the car and to its right [m]; None if it is not known.
         speed: speed of the car [m/s].
         wanted: target speed: the cruise speed, or the speed that the path allows [m/s].
-        limit: speed limit [m/s]; None where it is not known.
+        limit: speed limit [m/s]; None if unknown.
         hazard: whether the car brakes for a hazard.
         lights: whether the headlights are on.
         steering: share of the greatest steering angle, positive right; None where the car steers itself.

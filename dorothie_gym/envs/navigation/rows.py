@@ -284,7 +284,7 @@ class DrivingRows(CachedViews):
 
     @property
     def any_refused(self) -> NDArray[np.bool_]:
-        """Environments at whose last decision something was refused (environments,)."""
+        """Environments whose last decision had a refusal (environments,)."""
         refused: NDArray[np.bool_] = (self._decisions["refusal"] > 0) | (self._decisions["refused"] > 0)
         return refused
 

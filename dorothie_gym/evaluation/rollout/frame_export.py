@@ -175,7 +175,7 @@ def export_frames(
 
 
 def _finished(folder: Path, export: FrameExport) -> ExportedSession | None:
-    """Returns the result of an earlier export with these settings; None where there is nothing yet."""
+    """Returns the result of an earlier export with these settings; None if there is nothing yet."""
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return None
     try:

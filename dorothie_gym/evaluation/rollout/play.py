@@ -117,7 +117,7 @@ def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> 
 def with_personas(
     header: SessionHeader, policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
 ) -> SessionHeader:
-    """Returns a header that records the personas of policies, by role; the same one where there are none."""
+    """Returns a header that records the personas of policies, by role; the same one if there are none."""
     personas = personas_of(policies, states)
     return replace(header, extra={**header.extra, PERSONAS: personas}) if personas else header
 

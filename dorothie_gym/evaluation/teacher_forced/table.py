@@ -78,7 +78,7 @@ class ResultsTable:
         return tuple(sorted((run for run in self.runs if run.model == model), key=lambda run: run.seed))
 
     def estimate(self, model: str, part: str, key: str, handled: Handled | None = None) -> Estimate:
-        """Returns a figure over the seeds of a model, without any seed where it was not run or is undefined.
+        """Returns a figure over the seeds of a model, without any seed if it was not run or is undefined.
 
         Args:
             model: name of the model.
@@ -101,7 +101,7 @@ class ResultsTable:
         return _scores_of(runs[0], part, handled).points.get(task, 0) if runs else 0
 
     def confusion(self, model: str, part: str, task: Task) -> NDArray[np.int64] | None:
-        """Returns the confusion matrix of a task, summed over seeds; None where it was not predicted."""
+        """Returns the confusion matrix of a task, summed over seeds; None if it was not predicted."""
         found = [run.parts[part].confusion[task] for run in self.runs_of(model) if task in run.parts[part].confusion]
         return np.sum(found, axis=0, dtype=np.int64) if found else None
 

@@ -26,7 +26,7 @@ class TalkLog:
         awaiting: last move that the seat heard, which an answer may follow; None if there is none.
 
     Args:
-        role: role of the seat; None for spectators, who hear everything with its acts.
+        role: role of the seat; None for spectators, who hear all utterances with their acts.
     """
 
     def __init__(self, role: Role | None) -> None:

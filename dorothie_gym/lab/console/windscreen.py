@@ -28,7 +28,7 @@ class Windscreen:
         self._camera: SessionCamera | None = None
 
     def prepare(self, session: LiveSession) -> None:
-        """Builds the scene of a session, which takes seconds where it is not in the cache."""
+        """Builds the scene of a session, which takes seconds if it is not in the cache."""
         camera = windscreen_camera(session.world.town, session.scenario, session.config, self._config.picture_size)
         self._session, self._camera = session, camera
 

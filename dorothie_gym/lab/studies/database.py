@@ -149,5 +149,5 @@ class RunLock:
             ) from None
 
     def close(self) -> None:
-        """Gives the lock back."""
+        """Releases the lock."""
         self._connection.close()

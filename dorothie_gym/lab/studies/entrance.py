@@ -14,7 +14,7 @@ _PLACEHOLDER: Final = re.compile(r"[{}<>\[\]%$]")
 """Signs of templates, such as {{%PROLIFIC_PID%}}, ${e://Field/id}, [ID] or <id>; ids of platforms have none of them."""
 
 _NO_VALUES: Final = frozenset(("null", "undefined", "none", "assignment_id_not_available"))
-"""Values, in lower case, that programs write where they have no id; the last one is of MTurk's preview."""
+"""Values, in lower case, that programs write if they have no id; the last one is of MTurk's preview."""
 
 
 def is_placeholder(name: str, value: str) -> bool:

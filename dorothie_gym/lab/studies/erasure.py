@@ -108,7 +108,7 @@ def _attempt(left: list[str], step: Callable[[], None]) -> None:
 
 
 def is_unfinished(records: StudyRecords) -> bool:
-    """Returns whether an erasure was interrupted, so that `finish_erasures` has something to do."""
+    """Returns whether an erasure was interrupted, so that `finish_erasures` has work to do."""
     return bool(records.pending_erasures() or _forgotten(records))
 
 
@@ -200,7 +200,7 @@ def _reason(path: Path, error: OSError) -> str:
 
 
 def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence[str]) -> list[str]:
-    """Returns the files of a study folder that people have put there and that may still hold something of a person.
+    """Returns other files in a study folder that may still contain data of a person.
 
     Databases and the recordings of other sessions are not searched, because the deleted data there are known.
 

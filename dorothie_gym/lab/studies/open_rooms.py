@@ -196,7 +196,7 @@ class OpenRooms:
         return max(LEAST_PATIENCE, self._study.absence.seconds)
 
     def _go_on_without(self, room: Room) -> None:
-        """Applies the rules for people who leave to people who do not come back after a restart."""
+        """Applies the rules for people who leave to people who do not return after a restart."""
         if self._study.absence.then is AfterAbsence.END:
             room.end(EndReason.LEFT)
         elif self._study.absence.then is AfterAbsence.SCRIPT:

@@ -42,7 +42,7 @@ class Outcome(enum.StrEnum):
     LEFT = "left"
     """The participant left a session and came back after its end."""
     NO_PARTNER = "no partner"
-    """The participant waited in vain and played no session."""
+    """The participant found no partner and played no session."""
 
 
 QUESTIONNAIRES = {

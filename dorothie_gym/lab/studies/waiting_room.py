@@ -92,13 +92,13 @@ class WaitingRoom:
             self._records.set_role(person.id, role)
 
     def mend_roles(self) -> bool:
-        """Changes the role of a person who reads the instructions or practises, if others would otherwise wait in vain.
+        """Changes the role of a person who reads the instructions or practises, if others would find no partner.
 
         Returns:
             Whether a role has changed.
         """
         there = self._there()
-        if there == self._looked_at or time.monotonic() - self._opened < GONE_SECONDS:  # pages come back first
+        if there == self._looked_at or time.monotonic() - self._opened < GONE_SECONDS:  # pages reconnect first
             return False
         self._looked_at = there
         change = changed_role(self._assigner, there, self._records.taken_slots())

@@ -114,7 +114,7 @@ def _is_open(widths: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
 def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
     """Removes the samples at the ends of a centre line (n, 4) where the lane is still opening or already closing."""
     wide = np.flatnonzero(_is_open(line[:, 3]))
-    if not len(wide):  # a width that is no number
+    if not len(wide):  # a width that is not a number
         return line
     first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
     kept = line[first : last + 1]

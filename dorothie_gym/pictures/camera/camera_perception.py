@@ -71,7 +71,7 @@ class CameraPerception(CachedViews):
         return empty_records(SeenRecord, 0)
 
     def look(self) -> None:
-        """Looks at the current decision."""
+        """Updates to the current decision."""
         boxes = self._camera.render(self._world).bodies
         self._pixels = dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))
         self.in_view = tuple(

@@ -244,7 +244,7 @@ def _least(line: NDArray[np.float32], k: int) -> np.float32:
 
 @compiled
 def is_hidden(view: View, tiles: NDArray[np.float32], low: Array, high: Array) -> bool:
-    """Returns whether all samples that a box (3,), (3,) [m] may cover see something nearer than the whole box."""
+    """Returns whether all samples that a box (3,), (3,) [m] may cover see a surface nearer than the whole box."""
     left, right, top, bottom, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
     for corner in range(8):
         x = (high[0] if corner & 1 else low[0]) - view.origin[0]

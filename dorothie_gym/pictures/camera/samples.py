@@ -73,7 +73,7 @@ class Samples(NamedTuple):
             BRIGHT: 1 for surfaces that emit their own colour, 0 otherwise.
             AMBIENT: share of the light of the sky.
             SUN: cosine to the sun, negative for surfaces that face away.
-            BIAS: height by which something must be higher to cast a shadow on the sample [m].
+            BIAS: minimum height of a body above the sample for a shadow on it [m].
             LAMP: share of the light of street lamps.
         indices: whole numbers, intermediate results.
         surfaces: (ROOM,) `Surface` of each sample.

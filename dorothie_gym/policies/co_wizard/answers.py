@@ -205,7 +205,7 @@ def why_turning_round(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
 
 
 def _explanation(effect: Proposition, cause: Proposition | None, at: int | None = None) -> Remark:
-    """Returns the answer to why something is so, or was so at a time [s]; one without content if there is no cause."""
+    """Returns the answer to why an effect holds, or held at a time [s], without content if there is no cause."""
     if cause is None:
         return intend(Function.UNCERTAIN_ANSWER)
     because = Proposition.of(Predicate.BECAUSE, effect=effect, cause=cause, at=at)

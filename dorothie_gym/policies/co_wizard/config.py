@@ -28,7 +28,7 @@ class CoWizardConfig:
         gentle_speed: speed of a gentle approach to a place or a turn [km/h].
         turn_ease_distance: distance to the junction at which a style that eases into turns slows down [m].
         gentle_distance: distance to the goal at which a gentle style slows down [m].
-        held_up_after: time after which a hazard that stops the car is a reason to stop for good [s].
+        held_up_after: time after which a hazard that stops the car is a reason to command a stop [s].
         place_sight: distance along the lanes ahead within which places are looked for [m].
         rest_time: duration of a stop for an obstruction [s].
         red_light_time: longest duration of a stop for a red light [s].

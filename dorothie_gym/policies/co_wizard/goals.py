@@ -88,7 +88,7 @@ def set_goal(
         name: the place.
         streets: streets named with it.
         rng: random generator of the decision.
-        dropped: place that is given up for it.
+        dropped: place that is abandoned for it.
         corrected: whether the name corrects a misunderstanding.
         sure: whether the name was understood; otherwise it is checked.
     """

@@ -69,7 +69,7 @@ def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
 
 
 def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    # a car that was stopped for a place off the map and now is to turn round has gone past it
+    # a car that was stopped for a place off the map and now must turn round has passed it
     guided = state.beliefs.goal is not None and not state.beliefs.exact
     creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
     state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)

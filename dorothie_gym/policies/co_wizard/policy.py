@@ -81,7 +81,7 @@ class ScriptedCoWizard(Policy[CoWizardState]):
         return None if state.persona is None else state.persona.to_json()
 
     def step(self, observation: ObservationMapping, state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
-        """Listens, looks, drives, and says something or nothing."""
+        """Processes utterances and observation, drives, and possibly speaks."""
         decision = attend(observation, state)
         updated, view = decision.state, decision.view
         rest(updated, view, decision.rng)

@@ -231,7 +231,7 @@ def _with_goal(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWiza
 
 
 def _with_mark(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWizardMemory:
-    """Marks where the goal is supposed to be; the car drives there, and slows down when it comes near."""
+    """Marks the assumed place of the goal; the car drives there, and slows down near it."""
     if label == NONE:
         return memory
     place = mark_options(view, memory.town)[label]

@@ -112,7 +112,7 @@ class CostToGo:
 
     @property
     def rows(self) -> tuple[RecordArray[RoutingLane], Array]:
-        """Lanes and costs for `cost_from`; no costs where there is no goal."""
+        """Lanes and costs for `cost_from`; no costs if there is no goal."""
         if self._table is None:
             return routing_graph(self._town).lanes, np.zeros(0)
         return self._table.lanes, self._table.costs

@@ -96,7 +96,7 @@ class HeardRecord:
 
 
 class CostRecord:
-    """Costs of the routes to the goal [m at 40 km/h], infinite where there is none."""
+    """Costs of the routes to the goal [m at 40 km/h], infinite if there is none."""
 
     here: Float
     back: Float  # after a U-turn

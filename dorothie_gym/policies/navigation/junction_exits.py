@@ -68,7 +68,7 @@ class JunctionExits:
         return found
 
     def choice_ahead(self, observation: ObservationMapping) -> int | None:
-        """Returns the lane before the next junction with a choice; None where the car comes to none.
+        """Returns the lane before the next junction with a choice; None if the car reaches none.
 
         The turn options of the Co-Wizard's observation identify the lane, even where the position has drifted. The
         position decides only where several lanes have the same options, or more than are observed.

@@ -86,7 +86,7 @@ def destination(state: CoWizardState) -> Place | None:
 
 
 def next_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) -> GuidanceStep | None:
-    """Returns the step to carry out now; None where there is no other than those given already.
+    """Returns the step to carry out now; None if there is none besides those already given.
 
     It is the step that the instructor of `Navigation-v0` would give: turns shortly before they are due, destinations
     by name, Stop with the distance to the stopping place.
@@ -278,7 +278,7 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
     def step(
         self, observation: ObservationMapping, state: NavigationPolicyState
     ) -> tuple[ActionDict, NavigationPolicyState]:
-        """Listens and looks, drives, and says something or nothing."""
+        """Processes utterances and observation, drives, and possibly speaks."""
         decision = attend(observation, state.co_wizard)
         inputs = self._inputs_of(decision.state.town)
         updated = inputs.update(state, decision.state, decision.view, dict(observation))

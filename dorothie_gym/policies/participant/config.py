@@ -29,7 +29,7 @@ class ParticipantConfig(GuidanceConfig):
         wait_distance: distance to the goal within which the car is not halted for news about tasks [m].
         thinking_time: duration of such a halt [s].
         report_delay: range of the delay before the completion of a task is reported [s].
-        next_task_delay: pause before the next task where it does not follow at once [s].
+        next_task_delay: pause before the next task if it does not follow at once [s].
         goes_first: probability that a new task on the way is done before the current one.
         announces_ahead: probability that the change of a later task is mentioned at once.
         tells_message: probability that the sender and the reason of a message are mentioned with the change.
@@ -61,7 +61,7 @@ class ParticipantConfig(GuidanceConfig):
         slow_speed: speed below which the participant does not ask for less speed [m/s].
         soon_speed: speed expected of a car that has just started or turned [m/s].
         short_stop: distance before the goal at which the car is stopped after a miss [m].
-        pull: acceleration expected of a car that comes out of a turn [m/s^2].
+        pull: expected acceleration of a car after a turn [m/s^2].
         ready_time: standstill after which a car near the goal gets its next instruction [s].
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
             rolls on [m].

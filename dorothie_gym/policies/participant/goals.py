@@ -130,7 +130,7 @@ def _is_on_the_way(
 
 
 def route_length(state: ParticipantState, view: ParticipantView, landmark: SeenLandmark) -> float:
-    """Returns the length of the route to a landmark [m]; infinity where there is none."""
+    """Returns the length of the route to a landmark [m]; infinity if there is none."""
     route = router(state.town).route(view.place, landmark.place, state.route.blocked)
     return route.length if route is not None else math.inf
 

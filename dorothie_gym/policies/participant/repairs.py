@@ -66,7 +66,7 @@ def correction(state: ParticipantState, view: ParticipantView, act: DialogueAct,
 
 
 def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None:
-    """Returns the place again if another one was taken up, or this one was given up."""
+    """Names the place again if the car has adopted another one or abandoned this one."""
     goal = state.task.destination
     named = {value for value in act.values(Slot.LANDMARK) if value.label not in ("Unknown", "Queried")}
     said = {value for item in state.speech.said for value in item.act.slots}

@@ -69,7 +69,7 @@ _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
 """Beginning of a question for the destination, the rest of which was not understood."""
 
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
-"""Words by which the car says that it has come to a place."""
+"""Words by which the car says that it has reached a place."""
 
 _LACKS_PLACE = re.compile(
     r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|(don't know|no idea) where (?!we|i\b)"
@@ -333,7 +333,7 @@ def _confusion(
 
 
 def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated unchanged: a question, a yes or no, small talk, an action no step names."""
+    """Returns whether a remark is repeated unchanged: a question, yes or no, small talk, an action outside the route."""
     if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)

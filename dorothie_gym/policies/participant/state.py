@@ -253,7 +253,7 @@ class GuidanceState:
         return self if guiding is self.guiding else replace(self, guiding=guiding)
 
     def for_new_target(self) -> GuidanceState:
-        """Resets everything that belongs to one target."""
+        """Resets all state that belongs to one target."""
         kept = GuidanceState()
         return replace(kept, step_at=self.step_at, considered=self.considered, left_to_ask=self.left_to_ask)
 

@@ -247,7 +247,7 @@ def correct_arrival(state: ParticipantState, view: ParticipantView, said: Propos
 
 
 def deny_other_place(state: ParticipantState, places: Collection[SlotValue]) -> None:
-    """Corrects a car that says it has come to another place, and names the target again."""
+    """Corrects a car that claims to have reached another place, and names the target again."""
     if state.task.goal is None or not state.task.announced:
         return
     state.set_guiding(True)

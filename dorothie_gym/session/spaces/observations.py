@@ -126,7 +126,7 @@ def observation_fields(role: Role, limits: SpaceLimits, observe_acts: bool = Tru
     """Returns the specifications of the observation fields of a role.
 
     The Participant observes true positions and all landmarks, the Co-Wizard estimated positions and the landmarks that
-    are not hidden, the Ad-Wizard everything. For the Co-Wizard, exit distances, the first waypoint and object positions
+    are not hidden, the Ad-Wizard all data. For the Co-Wizard, exit distances, the first waypoint and object positions
     follow from the estimated pose; distances and bearings of objects are as perceived.
 
     Args:

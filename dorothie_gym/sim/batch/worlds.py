@@ -63,7 +63,7 @@ def step_alone(
     Args:
         town: arrays of the town.
         world: arrays of the world, changed in place.
-        substeps: how many.
+        substeps: number of substeps.
         dt: time of each [s].
         acceleration: acceleration of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
@@ -135,7 +135,7 @@ class VectorWorld(CachedViews):
         return world_of(self.arrays, range(len(self))[number])
 
     def put(self, number: int, world: WorldArrays) -> None:
-        """Makes one of the worlds the same as another world, which has room for as many bodies."""
+        """Copies another world, which has room for equally many bodies, into one of the worlds."""
         put(self.arrays, range(len(self))[number], world)
 
     def make_room(self, world: WorldArrays) -> bool:
@@ -160,7 +160,7 @@ class VectorWorld(CachedViews):
         """Steps worlds, as `sim.step.step` does with one; if a path needs more room, the arrays of all worlds grow.
 
         Args:
-            substeps: how many.
+            substeps: number of substeps.
             dt: time of each [s].
             acceleration: (worlds,) or one for all: of vehicles of the kind `Kind.EGO` [m/s^2].
             steering: (worlds,) or one for all: angle of their front wheels, positive to the right [rad].

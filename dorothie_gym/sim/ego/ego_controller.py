@@ -180,7 +180,7 @@ def request_path(
     town: TownArrays, holder: ArrayHolder, action: int, *, angle: int = 0, speed: float = 0.0, lane: int = 0,
     station: float = 0.0, offset: float = 0.0,
 ) -> int:  # fmt: skip
-    """Calls `manoeuvres.request`, again with longer arrays where they have no room for the path; returns its answer."""
+    """Calls `manoeuvres.request`, again with longer arrays if they have no room for the path; returns its answer."""
     while True:
         answer = _request(
             town, holder.arrays, action, int(angle), float(speed), int(lane), float(station), float(offset)

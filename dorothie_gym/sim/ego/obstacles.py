@@ -1,4 +1,4 @@
-"""Obstacles of the ego: bodies on its path, and bodies about to be there."""
+"""Obstacles of the ego: bodies on its path, and bodies about to enter it."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def bodies_ahead(town: TownArrays, world: WorldArrays, seen: int) -> float:
         seen: number of perceived bodies.
 
     Returns:
-        The speed that it allows [m/s], infinite if nothing is there.
+        The speed that it allows [m/s], infinite if there is none.
     """
     car, vehicle = world.car[0], world.vehicles[0]
     tight = bool(world.course[car.at].manoeuvre)

@@ -1,6 +1,6 @@
 """The whole path of the ego: pieces along lanes, lane switches and U-turns, directions, speeds, places (compiled).
 
-A path is laid twice: the first time its points are only counted, so that nothing changes where there is no room.
+A path is laid twice: the first time its points are only counted, so that nothing changes if there is no room.
 """
 
 from __future__ import annotations

@@ -27,11 +27,11 @@ _Rest: TypeAlias = tuple[tuple[str, str, int | None], ...]
 
 
 class Chain(NamedTuple):
-    """Lanes one after the other.
+    """Sequence of lanes.
 
     Attributes:
         rows: (n,) in the network's table.
-        offsets: (n,) where each begins, from the start of the first one [m].
+        offsets: (n,) start of each, measured from the start of the first one [m].
     """
 
     rows: IntArray

@@ -229,7 +229,7 @@ class TownNetwork(RoadNetwork):
         Args:
             current_index: lane that ends.
             route: edges or lanes to come (a lane id of None leaves the lane open); its head is dropped when it is the
-                current edge. Ignored where it is not a continuation of the current lane by a link.
+                current edge. Ignored if it is not a continuation of the current lane by a link.
             position: not needed here; part of highway-env's interface.
             np_random: source of the choice between several continuations.
 

@@ -100,7 +100,7 @@ def place_beside(
 
 @inlined
 def enter_next(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Moves a pedestrian to the next footway at the end of one, or turns it round where there is none."""
+    """Moves a pedestrian to the next footway at the end of one, or turns it round if there is none."""
     way = town.walks[walker.walk]
     end = 1 if walker.direction > 0.0 else 0
     if way.next_walk[end] < 0:
@@ -192,7 +192,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
 
 
 def _beside(points: Array, lane: LaneRecord) -> Array | None:
-    """Returns x, y, station on the lane, heading, height, 0 at the kerb of a lane; None where there is no footway."""
+    """Returns x, y, station on the lane, heading, height, 0 at the kerb of a lane; None if there is no footway."""
     count = int((lane.length - 2.0 * FROM_ENDS) / WALK_STEP) + 1
     if lane.right >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
         return None

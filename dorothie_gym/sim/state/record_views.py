@@ -113,7 +113,7 @@ def _accessors(
 
 
 class BodyView(CachedViews, Generic[Record_co]):
-    """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
+    """A row of the arrays. Its memory address is cached until the holder has other arrays.
 
     Attributes:
         road: road of the body.

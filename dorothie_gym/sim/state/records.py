@@ -254,7 +254,7 @@ class BreachRecord:
     station: Float  # along the lane [m]
     kind: Int32  # `codes.Breach`
     lane: Int32  # lane that the ego left over its end, or the nearest one, -1 for none nearby
-    signal: Int32  # id of the light or sign, -1 where there is none
+    signal: Int32  # id of the light or sign, -1 if there is none
 
 
 # --- Bodies, clock and lights -----------------------------------------------------------------------------------------

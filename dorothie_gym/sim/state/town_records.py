@@ -11,7 +11,7 @@ from dorothie_gym.support.compilation.records import Flag, Float, Int32
 
 
 class LaneRecord:
-    """A lane of a town; indices are -1 where there is none."""
+    """A lane of a town; indices are -1 if there is none."""
 
     length: Float  # [m]
     limit: Float  # speed limit [m/s]

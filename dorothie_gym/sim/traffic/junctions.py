@@ -58,7 +58,7 @@ def phase_at(town: TownArrays, number: int, time: float) -> tuple[int, float]:
 
 @compiled
 def colour_at(town: TownArrays, number: int, time: float) -> int:
-    """Returns the `Colour` of the light at the end of a lane at any time [s]; -1 where there is none."""
+    """Returns the `Colour` of the light at the end of a lane at any time [s]; -1 if there is none."""
     lane = town.lanes[number]
     if lane.programme < 0:
         return -1

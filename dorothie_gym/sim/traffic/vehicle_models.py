@@ -309,7 +309,7 @@ def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -
 
 @compiled
 def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: float, must: bool) -> bool:
-    """Returns whether to change to a lane beside: it brings acceleration, and makes no other vehicle brake hard.
+    """Returns whether to change to an adjacent lane: this allows acceleration, and forces no vehicle to brake hard.
 
     Args:
         town: arrays of the town.

@@ -125,7 +125,7 @@ def empty_records(kind: type[Record], count: int) -> RecordArray[Record]:
 
 
 def filled_records(kind: type[Record], rows: Sequence[tuple[object, ...]]) -> RecordArray[Record]:
-    """Returns an array of records with given fields; a single record of zeros where there are none."""
+    """Returns an array of records with given fields; a single record of zeros if there are none."""
     if not rows:
         return empty_records(kind, 1)
     return cast("RecordArray[Record]", np.array(list(rows), dtype=record_dtype(kind)).view(np.recarray))

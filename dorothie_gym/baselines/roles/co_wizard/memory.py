@@ -50,7 +50,7 @@ VARIABLES: Final[Mapping[str, int]] = MappingProxyType(
 
 `manoeuvre` is none, a U-turn, or a lane switch to the left or right that was requested; `onto_street`: the turn leads
 into the street that was named; `skip`: junctions to pass before it; `nudging`: the car goes a little further, to stop
-again; `resting`: it stops for good before a hazard; `lights`: not mentioned, on, off; `proposed`: a route that was
+again; `resting`: it commands a stop before a hazard; `lights`: not mentioned, on, off; `proposed`: a route that was
 proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower`: similarly.
 """
 

@@ -66,7 +66,7 @@ def sources(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utte
 
 
 def form_of(remark: Remark, available: Sources) -> str | None:
-    """Returns the form of a remark, a whole one where it is said by rules; None if something in it has no source."""
+    """Returns the form of a remark, a whole one if rules produce it; None if a part of it has no source."""
     answer, again = (available.get(name) for name in _WHOLES)
     if isinstance(again, Remark) and (remark.act, remark.meaning) == (again.act, again.meaning):
         return _whole_form("again")
@@ -80,7 +80,7 @@ def _whole_form(source: str) -> str:
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a form of a remark."""
     remark_forms.check_form(form, remark_forms.sources_of(form), remark_forms.filled, _example)
 
 

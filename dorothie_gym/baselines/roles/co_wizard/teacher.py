@@ -39,7 +39,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 CALM = CoWizardStyle(
     echoes=0.3, checks=0.1, announces=0.0, silent=0.4, asks=0.6, proposes=0.0, mishears=0.0, careful=1.0, notices=0.9
 )
-"""Style of the teacher while the player plays: it understands everything, and makes no random choices."""
+"""Style of the teacher while the player plays: it understands all utterances, and makes no random choices."""
 
 _WISHES = (None, Wish.U_TURN, Wish.SWITCH_LEFT, Wish.SWITCH_RIGHT)
 

@@ -53,7 +53,7 @@ class ModelFiles(Generic[Network]):
         page: class of `model.json`, which has the field `layout`.
         layout: returns the layout of this version for a vocabulary of a given size.
         make: returns the network of a layout, with any weights.
-        check_form: raises an error for a text that is no form of a remark.
+        check_form: raises an error for a text that is not a form of a remark.
     """
 
     kind: str

@@ -321,7 +321,7 @@ ERRAND_SIZE: Final = 12
 
 
 def _way_to(memory: SessionMemory, view: ParticipantView, subgoal: SeenSubgoal) -> float:
-    """Returns the length of the route to a subgoal [m]; infinite where there is none."""
+    """Returns the length of the route to a subgoal [m]; infinite if there is none."""
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return math.inf

@@ -241,7 +241,7 @@ _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_str
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a form of a remark."""
     if form != STOP_FORM:
         remark_forms.check_form(form, sources_of(form), filled, _example)
 

@@ -95,7 +95,7 @@ def _begins_anew(move: MoveRecord) -> bool:
 
 
 def _place(session: Session, time: float) -> tuple[float, float, float]:
-    """Returns position [m] and heading [degrees] of the car at a time [s]; zeros where there is no trajectory."""
+    """Returns position [m] and heading [degrees] of the car at a time [s]; zeros if there is no trajectory."""
     rows = session.trajectory
     if not len(rows):
         return 0.0, 0.0, 0.0

@@ -109,10 +109,10 @@ class ActionRows:
         tenth: when it was done.
         event: number of its event in the session.
         action: `PhysicalAction` less 1: 0..5 are the classes of NfD, 6 is SpeedChange, 7 LightChange.
-        angle: argument as shown in a history [degrees, positive left]: -180 for a U-turn, 0 where it has none or
+        angle: argument as shown in a history [degrees, positive left]: -180 for a U-turn, 0 if it has none or
             it is not known (`history_angle`).
         up: 1 for faster or on, -1 for slower or off, 0 for other actions.
-        label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
+        label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN if unknown.
         flagged: whether it is a point of NfD.
         handling: as in `MoveRows`, by the rule of `handling_of_events`.
     """
@@ -137,7 +137,7 @@ class FrameRows:
         tenth: when.
         pose: (n, 3) x, y [m], heading [degrees, clockwise from east, in [-180, 180)].
         speed: over the tenth before [m/s]; 0 in a session's first row.
-        lane: lane of the town, -1 where it is not known.
+        lane: lane of the town, -1 if unknown.
         look: row of `Columns.looks` that was the last then, -1 before the first.
     """
 
@@ -184,7 +184,7 @@ class LandmarkRows:
     Attributes:
         start: (S + 1,) those of session s are `start[s]:start[s + 1]`.
         place: (n, 2) x, y [m].
-        lane: lane of the town that it is at, -1 where it is not known.
+        lane: lane of the town that it is at, -1 if unknown.
         street: number of its street, -1 for none.
         text: its name.
     """

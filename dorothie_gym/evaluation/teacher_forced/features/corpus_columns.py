@@ -146,7 +146,7 @@ def _fold_name(fold: Fold | None) -> str:
 
 
 def _key(corpus: Corpus, sight: Sight | None) -> str:
-    """Returns the hash of everything that determines the columns: files, names and folds of sessions, and sources."""
+    """Returns the hash of all that determines the columns: files, names and folds of sessions, and sources."""
     digest = hashlib.sha256(f"{_sources_digest()} {compiler_digest()} numpy {np.__version__}\n".encode())
     if sight is not None:
         digest.update(f"sight {sight.digest}\n".encode())
@@ -200,7 +200,7 @@ def join(
     """Joins the columns of sessions to those of a corpus.
 
     Args:
-        key: hash of everything that determines them.
+        key: hash of all that determines them.
         names: names of the sessions.
         folds: their folds.
         parts: their columns, in the same order.

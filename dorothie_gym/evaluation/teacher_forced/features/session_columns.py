@@ -48,7 +48,7 @@ class SessionColumns:
         arrays: by "group.field".
         texts: distinct texts.
         town: name of the town.
-        seed: seed of the session, -1 where there is none.
+        seed: seed of the session, -1 if there is none.
         unpointed: flagged events that are not points, (event, reason) each.
         signature: hash of the above, independent of the layout of the session.
     """
@@ -245,7 +245,7 @@ def _pairs(values: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
 
 
 def town_graph(name: str, town: Town | None) -> TownGraph:
-    """Returns the graph of a town; without lanes where it is not known."""
+    """Returns the graph of a town; without lanes if unknown."""
     if town is None:
         empty = np.empty(0, dtype=np.int32)
         return TownGraph(

@@ -27,7 +27,7 @@ FOOTWAY = 1.0
 
 _TREES = (palette.TREE, palette.COUNTRY_TREE)
 _OPEN = (palette.COUNTRY, palette.BLOCK, palette.PARK, palette.BRIDGE_SHADOW, *_TREES)
-"""Colours of ground on which something may stand."""
+"""Colours of ground on which scenery may stand."""
 
 _PAINT = (
     palette.LANE_LINE,

@@ -17,7 +17,7 @@ class Heights(Hashable, Protocol):
     """Ground with heights."""
 
     def height_at(self, points: Array) -> Array:
-        """Returns the heights (n,) [m] of the ground at points (n, 2) [m], NaN where there is none."""
+        """Returns the heights (n,) [m] of the ground at points (n, 2) [m], NaN if there is none."""
         ...
 
 
