@@ -7,8 +7,8 @@ This module alone states the rule; environments read it as a `PointView`, batche
   At an NfD point, utterances of the point's own time that precede it in the record are visible as well: an action may
   obey an utterance at once.
 * At a UfN point, the words of the current utterance and the moves of its earlier spans are visible.
-* At an RfN point, the earlier spans of the Co-Wizard's own utterance are visible with their words and moves; nothing of
-  its other spans is. Under the strict rule nothing of the utterance is visible: its spans then have equal inputs and
+* At an RfN point, the earlier spans of the Co-Wizard's own utterance are visible with their words and moves; no part
+  of its other spans is. Under the strict rule no part of the utterance is visible: its spans then have equal inputs and
   different labels.
 * Hidden landmarks, which the car does not know, are never visible.
 """

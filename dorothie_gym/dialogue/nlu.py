@@ -128,7 +128,7 @@ class ParsedText:
         speed: a speed [km/h].
         distance: a distance [m].
         here: whether the text refers to the current position ("here").
-        further: whether the car is to continue for a short distance.
+        further: whether the car should continue for a short distance.
         affirms: True for an initial yes, False for an initial no.
         question: whether the text contains a question mark.
         asked: proposition of a question, if the words determine it; slot values identify other questions.

@@ -138,7 +138,7 @@ class PlannedTrick:
 
 @dataclass(frozen=True, kw_only=True)
 class Restoration:
-    """Change that is to be undone, a parameter of the weather or the position of a prop [m], and the time [s]."""
+    """Change that will be undone, a parameter of the weather or the position of a prop [m], and the time [s]."""
 
     at: float
     change: WeatherParameter | tuple[float, float]

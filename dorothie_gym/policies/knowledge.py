@@ -65,7 +65,7 @@ class CoWizardKnowledge:
         goal_is_findable: whether the place of the goal is taken from the map or was described.
         progress: route to the goal and the progress on it; None without a place to go to.
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
-        halted: whether the car is to stand.
+        halted: whether the car must stand.
         arrived: whether the car has stopped at its goal and waits for the next task.
         sent_on: whether the stop ends a short advance on request, at a place that may be the goal.
         pausing: whether the car stops before the junction ahead until the way is known.

@@ -76,7 +76,7 @@ class Persona:
 
     @property
     def ignores(self) -> bool:
-        """Whether the speaker remarks on nothing around the car."""
+        """Whether the speaker makes no remarks on the surroundings of the car."""
         return self.attention < INATTENTIVE
 
     @property
@@ -137,7 +137,7 @@ REACTION_SPREAD: Final = 0.25
 """Standard deviation of the logarithm of one speaker's reaction times; set by hand."""
 
 INATTENTIVE: Final = 0.08
-"""Attention below which a speaker remarks on nothing around the car."""
+"""Attention below which a speaker makes no remarks on the surroundings of the car."""
 
 SHARES: Final = ("talkativeness", "patience", "politeness", "certainty", "knowledge", "attention", "humour")
 """Traits in [0, 1]."""

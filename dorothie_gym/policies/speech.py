@@ -43,7 +43,7 @@ _WANTS_ANSWER = frozenset(
 
 @dataclass(frozen=True, kw_only=True)
 class Remark:
-    """Dialogue act that is to be said.
+    """Dialogue act to be spoken.
 
     Attributes:
         act: move and slots.

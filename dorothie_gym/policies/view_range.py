@@ -61,7 +61,7 @@ def camera_fault(observation: ObservationMapping) -> Sensor | None:
 
 
 def limit_of(observation: ObservationMapping) -> Limit | None:
-    """Returns the cause of a limited view; None if nothing does."""
+    """Returns the cause of a limited view; None if the view is not limited."""
     if camera_fault(observation) is not None:
         return Limit.CAMERA
     if is_foggy(observation):

@@ -151,7 +151,7 @@ class EnvConfig:
         world: settings of traffic, pedestrians and sensing.
         rewards: weights of the reward terms.
         camera: first-person camera on the car, observed by the participant and the Co-Wizard; None for no camera.
-            It affects nothing else in a session.
+            It has no other effect on a session.
         perception: perception model of the participant and the Co-Wizard. With `PerceptionModel.CAMERA` they observe
             the objects that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The
             car's own safety functions are not affected.
@@ -201,7 +201,7 @@ class EnvConfig:
     def record(self) -> dict[str, object]:
         """Returns the settings in JSON types, for records.
 
-        They lack the camera, which changes nothing in a session, and the usual perception and channel, so that records
+        They lack the camera, which has no effect on a session, and the usual perception and channel, so that records
         are equal to those of versions without a choice.
         """
         settings = asdict(self)

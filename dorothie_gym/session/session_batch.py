@@ -101,7 +101,7 @@ class SessionBatch(CachedViews):
         self.views = taken(values, "views", RoleArrays)
 
     def begin(self, row: int, seed: int | None, scenario: Scenario | None) -> None:
-        """Begins a session, see `SessionEngine.reset`; `observe` is to follow."""
+        """Begins a session, see `SessionEngine.reset`; `observe` must follow."""
         engine = self.engines[row]
         engine.reset(seed, scenario=scenario)
         self._worlds.put(row, engine.session.world)
@@ -127,7 +127,7 @@ class SessionBatch(CachedViews):
         return decoded
 
     def step(self, actions: Mapping[int, Mapping[Role, RoleAction]]) -> dict[int, StepOutcome]:
-        """Steps the given sessions by one decision; `observe` is to follow.
+        """Steps the given sessions by one decision; `observe` must follow.
 
         Args:
             actions: decoded actions by row of the session.
@@ -178,7 +178,7 @@ class SessionBatch(CachedViews):
 
     @property
     def infractions(self) -> NDArray[np.int64]:
-        """Numbers of infractions so far (sessions, 5), in the order of `INFRACTION_KINDS`, to be copied."""
+        """Numbers of infractions so far (sessions, 5), in the order of `INFRACTION_KINDS`; callers must copy them."""
         counts: NDArray[np.int64] = plain(self._worlds.arrays.watch)[:, 0]["counts"]
         return counts
 

@@ -66,7 +66,7 @@ class SessionEngine(Restorable):
         storyboard: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one in each reset.
         config: settings of the sessions, also as a mapping, like that in the JSON of `env.spec`.
         max_cycles: decisions until truncation, instead of `config.max_seconds`.
-        limits: sizes of the spaces, if they are to be larger than the town needs.
+        limits: sizes of the spaces, to make them larger than the town needs.
 
     Attributes:
         town: the map.
@@ -161,7 +161,7 @@ class SessionEngine(Restorable):
         return decoded
 
     def begin_step(self, actions: Mapping[Role, RoleAction]) -> StepBegun:
-        """Carries out the actions of a decision; the world is to be stepped next, and then the step to be ended."""
+        """Carries out the actions of a decision; callers then step the world and end the step."""
         self._observations = None
         return self.session.begin_step(actions)
 

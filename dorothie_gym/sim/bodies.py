@@ -212,7 +212,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         self.action = action
 
     def on_state_update(self) -> None:
-        """Finds the closest lane, and the place on the lane that it follows; to be called after it was moved."""
+        """Finds the closest lane, and the place on the lane that it follows; must be called after a move."""
         update_lane(town_arrays(self.road.network), self.record)
         if self.road.record_history:
             self.remember()

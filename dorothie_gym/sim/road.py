@@ -279,7 +279,7 @@ class CompiledRoad(TownRoad):
         return town_arrays(self.network)
 
     def show(self) -> None:
-        """Lists all bodies of the arrays, guests first; to be called after bodies were added to the arrays."""
+        """Lists all bodies of the arrays, guests first; must be called after bodies were added to the arrays."""
         self._note_changes()
         self.vehicles[:] = [*self._guests, *self._bodies.vehicles()]
         self.objects[:] = [*self._things, *self._bodies.pedestrians(), *self._bodies.props()]

@@ -472,7 +472,7 @@ _CONSTANT = frozenset({
 
 
 def check_action(name: str, action: object, space: spaces.Space[object]) -> None:
-    """Raises `ValueError` for an action of another form than those of a space; numbers of a `Box` are to be finite."""
+    """Raises `ValueError` for an action of another form than those of a space; numbers of a `Box` must be finite."""
     if isinstance(space, spaces.Discrete):
         whole_number(name, action, int(space.start), int(space.start + space.n) - 1)
     elif isinstance(space, spaces.Box):

@@ -1,7 +1,7 @@
 """Weather and light: the ten parameters, and their effects on grip, sight and side wind.
 
 Cloudiness and the sun's altitude dim the light, fog and precipitation dim the air (`visibility`), water on the road
-takes grip, wind pushes the car (`wind`). The sun's azimuth only turns shadows. On a clear noon nothing has any effect.
+takes grip, wind pushes the car (`wind`). The sun's azimuth only turns shadows. On a clear noon there is no effect.
 """
 
 from __future__ import annotations

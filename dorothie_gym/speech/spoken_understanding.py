@@ -19,7 +19,7 @@ from dorothie_gym.support.copying import shared
 
 DOUBTFUL: Final = 0.2
 """Confidence of a word below which it is probably wrong. Of the 256 shortest of 400 spans in the noise of the car, 9
-are marked by it, of which 6 are wrong; two lost a value: one is marked, and of the other nothing is recognised."""
+are marked by it, of which 6 are wrong; two lost a value: one is marked, and the other is not recognised at all."""
 
 SHORT: Final = 2
 """Number of words up to which every uncertain word matters, because there is no context to compensate for it."""

@@ -57,7 +57,7 @@ def exit_code() -> int:
 
 
 def message() -> str:
-    """Returns a line on the last signal, for commands that have nothing to add."""
+    """Returns a line on the last signal, for commands without a message of their own."""
     return "Terminated." if _State.received == signal.SIGTERM else "Interrupted."
 
 

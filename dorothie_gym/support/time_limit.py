@@ -19,7 +19,7 @@ class TimeLimited(ABC):
     """Part of an environment; its `spec.max_episode_steps` is the number of decisions until it truncates an episode.
 
     The number follows from the arguments. The ids are registered without one, because `gymnasium.make` would then
-    add a `TimeLimit` of the default arguments and cut episodes that are to last longer.
+    add a `TimeLimit` of the default arguments and truncate longer episodes.
     """
 
     _spec: EnvSpec | None = None

@@ -266,7 +266,7 @@ def _key(cache: Path) -> bytes:
 
 
 def seal(folder: Path, name: str, keys: Path) -> None:
-    """Writes a signed list of the hashes of all files in a folder that is to become an entry of the cache.
+    """Writes a signed list of the hashes of all files in a folder that will become an entry of the cache.
 
     Args:
         folder: folder with all of its files, under any name.

@@ -1,4 +1,4 @@
-"""Check that a role observes nothing that it must not know."""
+"""Check that a role observes no hidden information."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     scenarios: hidden landmarks are at other sites; the story and the order of the tasks differ. Observation,
     action mask and refusals of the Co-Wizard must be bit-identical at every decision (with other tasks: up to the
     first arrival, which all roles may notice, and with an idle Ad-Wizard, because its refusals depend on the task). The
-    participant's observation must differ, or the check would prove nothing.
+    participant's observation must differ, or the check would be meaningless.
 
     Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
     equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,

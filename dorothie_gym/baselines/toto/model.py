@@ -296,7 +296,7 @@ class TOTO(Model):
         heard, said = inputs["current_recognised"], inputs["current_text"]
         if self.config.sound_width or self.config.sound_frames:
             read, time = self.sound if self.config.sound_frames else self.speech, inputs["time"][:, None]
-            if "current_sound" not in inputs:  # of a session in progress, in which no utterance is to be predicted
+            if "current_sound" not in inputs:  # of a session in progress, in which no utterance must be predicted
                 return time.new_zeros(len(time), 1, self.config.width), torch.zeros_like(time, dtype=torch.bool), time
             return read(inputs["current_sound"])[:, None], (said >= 0)[:, None], time
         text = torch.where(heard >= 0, heard, said)[:, None]

@@ -249,7 +249,7 @@ class DrivingRows(CachedViews):
 
     @cached_property
     def infractions(self) -> NDArray[np.int64]:
-        """Numbers of infractions so far (environments, 5), in the order of `INFRACTION_KINDS`, to be copied."""
+        """Numbers of infractions so far (environments, 5), ordered as `INFRACTION_KINDS`; callers must copy them."""
         counts: NDArray[np.int64] = plain(self.worlds.watch)[:, 0]["counts"]
         return counts
 

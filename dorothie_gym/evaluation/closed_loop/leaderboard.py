@@ -83,7 +83,7 @@ class LeaderboardEntry:
 
     @property
     def claims(self) -> tuple[Claim, ...]:
-        """Statements in the rollout's files that nothing has checked."""
+        """Unchecked statements in the files of a rollout."""
         if self.check is not None:
             return self.check.claims
         usage, run_time = bool(self.result.usage()), bool(self.cost)
@@ -175,7 +175,7 @@ def checked_entries(
         entries: the rollouts.
         protocol: protocol of the leaderboard.
         workers: number of processes, as in `check_submission`.
-        on_session: called with the numbers of sessions checked and to be checked, of all rollouts.
+        on_session: called with the numbers of checked sessions and of all sessions to check, over all rollouts.
 
     Raises:
         RolloutError: a rollout has faults.

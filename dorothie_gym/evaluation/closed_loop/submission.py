@@ -116,9 +116,9 @@ class SubmissionCheck:
         submission: content of the submission's file; None if there are faults.
         resimulated: numbers of the sessions that were played again and found equal.
         sessions: number of sessions of the protocol.
-        seed: seed of the sample; None if all sessions were to be played again.
+        seed: seed of the sample; None if all sessions were selected.
         played: whether the Co-Wizard's policy was also played again.
-        claims: statements of the rollout that nothing checks.
+        claims: statements of the rollout that cannot be checked.
     """
 
     faults: tuple[str, ...]

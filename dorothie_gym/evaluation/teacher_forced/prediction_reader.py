@@ -153,7 +153,7 @@ def _is_type(kind: pa.DataType, wanted: str) -> bool:
     from pyarrow import types
 
     if types.is_null(kind):
-        return True  # a column of nothing but nulls: its rows are checked one by one
+        return True  # a column of nulls only: its rows are checked one by one
     if types.is_dictionary(kind):
         kind = kind.value_type
     if wanted == "str":

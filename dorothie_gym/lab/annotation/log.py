@@ -217,7 +217,7 @@ class AnnotationLog:
         Raises:
             AnnotationError: the change does not match the text, or the log is full or a link.
             StaleError: another program has written to the log.
-            OSError: the log cannot be written; then nothing of the edit is kept.
+            OSError: the log cannot be written; then no part of the edit is kept.
         """
         check_change(change, self.text)
         done = self.annotation.after(change).difference(self.annotation)

@@ -73,7 +73,7 @@ class Database:
         """Makes the changes of a block in one step, or none of them if it fails; blocks may be nested.
 
         Raises:
-            StorageError: nothing of the block is stored.
+            StorageError: no part of the block is stored.
         """
         if self._connection.in_transaction:
             yield

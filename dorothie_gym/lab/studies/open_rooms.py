@@ -75,7 +75,7 @@ class OpenRooms:
         builder: builder of rooms.
         records: records of the study.
         console: server of the rooms.
-        changed: called when participants have to be notified of a change.
+        changed: called when participants must be notified of a change.
     """
 
     def __init__(

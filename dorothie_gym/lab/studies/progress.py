@@ -234,7 +234,7 @@ class Progress:
         """Deletes all data of a person; a session in progress ends for all its people.
 
         Returns:
-            Whether nothing is left; otherwise the server tries again.
+            Whether all data are removed; otherwise the server tries again.
 
         Raises:
             StorageError: nothing is deleted; the person takes part as before.
@@ -253,7 +253,7 @@ class Progress:
         return self.finish_erasures()
 
     def finish_erasures(self) -> bool:
-        """Removes the data of deleted people from other files; returns whether nothing is left."""
+        """Removes the data of deleted people from other files; returns whether all are removed."""
         left = finish_erasures(self.records)
         for each in left if left != self._left else []:
             logger.warning("still to be deleted: %s", each)

@@ -100,7 +100,7 @@ class StudyRecords:
         return name, secret
 
     def _new_id(self) -> str:
-        """Returns an unused random id, which says nothing about the person or the order of arrival."""
+        """Returns an unused random id, which reveals nothing about the person or the order of arrival."""
         while True:
             name = "P" + "".join(secrets.choice("23456789ABCDEFGHJKLMNPQRSTUVWXYZ") for _ in range(7))
             if self.participant(name) is None:
@@ -364,7 +364,7 @@ class StudyRecords:
         return [row["folder"] for row in self.data.rows("SELECT folder FROM erasures ORDER BY folder")]
 
     def erased(self, session: str) -> None:
-        """Records that nothing of a session is left."""
+        """Records that all data of a session are removed."""
         self.data.run("DELETE FROM erasures WHERE folder = ?", session)
 
 

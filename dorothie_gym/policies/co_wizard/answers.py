@@ -57,7 +57,7 @@ def answer_yes_no(
     if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
         set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
     elif asked is None:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
     elif asked.predicate is Predicate.LIGHTS_ON:
         _answer_lights(state, view)
     else:
@@ -151,7 +151,7 @@ def answer_open(
     ):
         _name_street(state, view)
     else:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
 
 
 def arrival(known: CoWizardKnowledge, view: CoWizardView) -> Remark:

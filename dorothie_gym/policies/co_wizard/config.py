@@ -140,7 +140,7 @@ class CoWizardStyle:
         offers: probability of proposing to do a task on the way first.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
         recalls: probability of repeating the item or person of an errand, or mentioning it on arrival.
-        pace: cruise speed where nothing is said about it [km/h].
+        pace: default cruise speed [km/h].
     """
 
     echoes: float

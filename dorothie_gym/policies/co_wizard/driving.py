@@ -176,7 +176,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _needs_switch(state: CoWizardState, view: CoWizardView, crossing: RouteJunction | None) -> bool:
-    """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
+    """Returns whether a lane change must be commanded; a turn from another lane includes its own lane change."""
     progress = state.route.to_goal
     if crossing is None or progress.changes_before(crossing) or view.choice is None:
         return True

@@ -45,8 +45,8 @@ class Intentions:
         directive: requested turn.
         wish: requested manoeuvre.
         wish_until: time at which the manoeuvre is given up [s].
-        halted: whether the car is to stand.
-        nudge: place a little further on at which the car is to stop again.
+        halted: whether the car must stand.
+        nudge: place a little further on where the car must stop again.
         creeping: whether the goal is close and its guessed place is carried along ahead of the car.
         arrived: whether the car has stopped at its goal and waits for the next task.
         sent_on: whether the stop ends a short advance on request, at a place that may be the goal.

@@ -63,7 +63,7 @@ class CoWizardMemory(Memory):
         navigator: route to the goal.
         step: next step on the route; None without a route.
         drive: action to be carried out, with the time until which it is kept [s]; None if there is none.
-        updates: belief updates that are to be sent, the next first.
+        updates: belief updates to be sent, the next first.
         motion: state of motion at the last decision.
         standing_since: time since which the car stands [s]; None if it drives.
         told_held_up: whether the current standstill before a hazard was pointed out.

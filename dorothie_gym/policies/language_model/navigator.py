@@ -53,7 +53,7 @@ class RouteStep:
         action: the action.
         angle: turn angle, or 90 and -90 for a lane switch [degrees, positive left].
         distance: distance to where it takes place [m].
-        due: whether it is to be commanded now.
+        due: whether it must be commanded now.
         place: lane, which distinguishes steps of one kind.
     """
 
@@ -186,7 +186,7 @@ class Navigator:
         return RouteStep(action=PhysicalAction.U_TURN, distance=max(distance, 0.0), due=due, place=view.lane)
 
     def _needs_switch(self, town: Town, view: CoWizardView, crossing: RouteJunction | None) -> bool:
-        """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
+        """Returns whether a lane change must be commanded; a turn from another lane includes its own lane change."""
         progress = self.route.to_goal
         if crossing is None or progress.changes_before(crossing) or view.choice is None:
             return True

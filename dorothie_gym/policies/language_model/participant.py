@@ -217,7 +217,7 @@ def _left_words(progress: RouteProgress, view: ParticipantView) -> str:
 
 
 def _notice_step(memory: ParticipantMemory, view: ParticipantView) -> tuple[ParticipantMemory, list[str]]:
-    """Notices a step of the route that is to be announced."""
+    """Notices a step of the route that is due for announcement."""
     step = _next_step(memory, view)
     if step is None or not step[2] or step[0] == memory.told:
         return memory, []

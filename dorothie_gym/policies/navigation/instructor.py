@@ -71,7 +71,7 @@ class GuidanceStep(NamedTuple):
         key: identity of the step; two steps with the same key are the same instruction, repeated.
         values: slot values.
         sector: direction as an index of `junction_exits.SECTORS`, or None.
-        distance: distance to where it is to be carried out [m].
+        distance: distance to the place of the action [m].
     """
 
     key: tuple[object, ...]

@@ -44,7 +44,7 @@ class ParticipantConfig(GuidanceConfig):
         corner_distance: distance to a junction within which a goal right after it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
         careful_speeds: speeds requested where the goal is easily missed [km/h].
-        manoeuvre_cost: extra cost of each lane change and U-turn on a route that has to be described in words [m].
+        manoeuvre_cost: extra cost of each lane change and U-turn on a route that must be described in words [m].
         run_up: minimum distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].

@@ -337,7 +337,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         if text is not None and len(text) <= LONGEST_REASON
     }
     if told.reason is not None and refers_back(told.reason) and not _has_told_purpose(state, view, goal):
-        options.pop("reason", None)  # the antecedent of "she" has to be mentioned first
+        options.pop("reason", None)  # the antecedent of "she" must be mentioned first
     if not options:
         return ()
     prefers = "purpose" if rng.random() < PURPOSES else "reason"

@@ -27,7 +27,7 @@ _PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this
 
 
 def refers_back(text: str) -> bool:
-    """Returns whether a text has a pronoun, whose antecedent has to be mentioned before."""
+    """Returns whether a text has a pronoun, whose antecedent must have been mentioned."""
     return _PRONOUN.search(text) is not None
 
 

@@ -145,7 +145,7 @@ def _open_question(
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
-        state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
@@ -333,7 +333,7 @@ def _confusion(
 
 
 def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated unchanged: a question, yes or no, small talk, an action outside the route."""
+    """Returns whether a remark is repeated unchanged: a question, yes or no, small talk, an action off the route."""
     if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)

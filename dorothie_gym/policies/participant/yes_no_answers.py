@@ -156,7 +156,7 @@ def answer_yes_no(
         place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
         asked = words.asked or place or (checked(state, act, words) if act.slots else None)
         if asked is None:
-            state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+            state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
             return
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)

@@ -83,7 +83,7 @@ class SessionWriter:
             frames: (n, 9) float64, see `TRAJECTORY_COLUMNS`; frames must rise.
 
         Raises:
-            SessionError: an event or a row cannot be written; nothing of the batch is written then.
+            SessionError: an event or a row cannot be written; no part of the batch is written then.
         """
         self._check_open("nothing can be appended")
         lines = [encode_event(event) for event in events]

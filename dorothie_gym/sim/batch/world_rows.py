@@ -22,7 +22,7 @@ class WorldRows:
 
         Args:
             world: a world of the town; the rows have room for equally many bodies, and grow when one needs more.
-            rows: how many.
+            rows: number of rows.
             threads: number of threads at most, the caller's included.
         """
         self._batch = VectorWorld(world.actors.town_arrays, world.actors.arrays, rows, threads=threads)

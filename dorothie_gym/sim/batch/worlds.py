@@ -92,7 +92,7 @@ class VectorWorld(CachedViews):
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
     threads have not reached yet, so that a late or busy thread does fewer. A world depends only on its own arrays: not
-    on the other worlds, its row in the batch, or the threads. Threads share nothing that is written to, and hold the
+    on the other worlds, its row in the batch, or the threads. Threads share no memory that they write, and hold the
     interpreter's lock between calls only.
 
     Attributes:
@@ -109,7 +109,7 @@ class VectorWorld(CachedViews):
         Args:
             town: arrays of the town.
             world: a world of the town; the others have room for equally many bodies.
-            worlds: how many.
+            worlds: number of worlds.
             threads: how many threads at most, by default as many as there are processors for this process.
 
         Raises:

@@ -224,7 +224,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def state(self) -> tuple[object, ...]:
-        """What the feasibility of navigation actions depends on besides the speed: to be compared."""
+        """Values, besides the speed, on which the feasibility of navigation actions depends, for comparison."""
         plan = self._look_up()
         props = self._holder.arrays.seen_props[: int(plan["props"])].tobytes()
         return (

@@ -130,7 +130,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the line before a junction that the ego may not enter yet."""
     car, vehicle, course = world.car[0], world.vehicles[0], world.course
     if car.held and vehicle.speed < EGO_STANDING:
-        return best  # requests nothing that it does not use
+        return best  # requests only what it uses
     asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + EGO_ASKING
     half = 0.5 * vehicle.length
     last = point_at(world, car.s + max(asking, CRITICAL_GAP * vehicle.speed) + half)

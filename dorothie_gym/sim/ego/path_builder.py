@@ -167,7 +167,7 @@ SEARCH_RANGE = 6.0
 
 @inlined
 def count_points(world: WorldArrays, points: int, write: bool) -> bool:
-    """Counts the points of a piece, unless they are to be written; returns whether they are."""
+    """Counts the points of a piece, or returns True if they must be written."""
     if not write:
         world.plan[0].needed += points
     return write

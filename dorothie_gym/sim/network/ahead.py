@@ -145,7 +145,7 @@ def neighbours_on(
         points: see `LaneTable`.
         offsets: see `LaneTable`.
         ends: see `LaneTable`.
-        zones: (n, 4) rectangles outside of which nothing is on a lane; see `lane_zones`.
+        zones: (n, 4) rectangles outside of which no body is on a lane; see `lane_zones`.
         rows: lanes of the chain; the first is the one to start from.
         starts: where they begin [m].
         own: one's own position (2,) [m].

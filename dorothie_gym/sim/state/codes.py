@@ -146,7 +146,7 @@ class Refusal(enum.IntEnum):
     """Answer to a navigation action: carried out, or the reason of a refusal."""
 
     NO_SPACE = -1
-    """The arrays have no room for the new path: to be repeated with longer ones, see `world_arrays.lengthened`."""
+    """The arrays have no room for the new path: repeat with longer ones, see `world_arrays.lengthened`."""
     NONE = 0
     STOPPED = 1
     NOT_STOPPED = 2

@@ -42,7 +42,7 @@ CAR_REAR = CAR_LENGTH / 2
 """Distance from the centre of a car to its rear [m]."""
 
 LEVEL_TOWN = 2.0
-"""In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
+"""In a town whose lanes are no further apart in height than this, heights have no effect [m]."""
 
 OFF_ROAD_MARGIN = 0.5
 """Distance of the car's centre from all lanes and connectors at which the car counts as off the road [m]."""

@@ -39,7 +39,7 @@ ANSWERED_WITHIN: Final = 10.0
 """Longest time between a question and its answer [s]."""
 
 SAID_AGAIN_AFTER: Final = 8.0
-"""Time after which the same is said again although the participant has said nothing since [s]."""
+"""Time after which a remark may be repeated although the participant has said nothing since [s]."""
 
 _ANSWERS: Final = (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM)
 _REASONS_AND_TIMES: Final = (Predicate.BECAUSE, Predicate.STANDS, Predicate.ARRIVES_IN)

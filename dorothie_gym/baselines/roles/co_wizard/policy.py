@@ -42,7 +42,7 @@ TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""
 
 KEPT_BONUS: Final = 2.0
-"""Added to the logit of each current value of the memory where nothing has just been heard.
+"""Added to the logit of each current value of the memory if no utterance has just been heard.
 
 A change that was missed is made up for at the next decision; one for no reason stays. In the second round of a
 training, 2 reduced the latter from 635 to 214, while 166 instead of 87 of 472 changes came later.
@@ -79,7 +79,7 @@ class Turn:
         action: the action.
         remarks: chosen remarks.
         queued: whether its remarks waited before.
-        silent: whether nothing new could be said.
+        silent: whether no new remark was possible.
         state: state after the decision.
     """
 

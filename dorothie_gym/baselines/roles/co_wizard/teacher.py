@@ -85,7 +85,7 @@ class Teacher:
 
     @property
     def usual_speed(self) -> int:
-        """Cruise speed where nothing is said about it [km/h]."""
+        """Default cruise speed [km/h]."""
         return self._state.intentions.usual
 
     @property
