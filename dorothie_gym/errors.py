@@ -10,7 +10,7 @@ DorothieGymError
 ├── TownError            a map cannot be read or used
 ├── TownArchiveError     a cached town is damaged or of another format
 ├── StoryboardError      a storyboard cannot be read, bound or played
-├── AnnotationError      an annotation does not fit its session, or names what the vocabularies do not contain
+├── AnnotationError      an annotation does not match its session, or names unknown members of a vocabulary
 ├── SessionError         a recorded session or corpus cannot be read or written
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
@@ -127,7 +127,7 @@ class SessionError(DorothieGymError, ValueError):
 
 
 class AnnotationError(DorothieGymError, ValueError):
-    """An annotation does not fit its session, or cannot be represented; the message names the place."""
+    """An annotation does not match its session, or cannot be represented; the message names the place."""
 
 
 class OutputFolderError(DorothieGymError, RuntimeError):

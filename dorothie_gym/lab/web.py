@@ -248,7 +248,7 @@ def quieten(names: tuple[str, ...]) -> None:
 
 @dataclass
 class _Kind:
-    """Messages of one kind: when one was logged, and how many were not."""
+    """Messages of one kind: time of the last logged one, and number of those not logged since."""
 
     logged: float
     left_out: int = 0

@@ -359,8 +359,8 @@ def local_coordinates(
 ) -> tuple[float, float]:
     """Returns the lane coordinates of a world position: station [m] and distance to the right [m].
 
-    Refers to the closest point, the first of equally close ones. Beyond both ends the lane continues straight. The sum of
-    |lateral| and overshoot is never less than the distance to the centre line, which the grid index relies on.
+    Refers to the closest point, the first of equals. Beyond both ends the lane continues straight. The sum of |lateral|
+    and overshoot is never less than the distance to the centre line, which the grid index relies on.
     """
     first, last = offsets[row], offsets[row + 1] - 1
     best, at, share = np.inf, first, 0.0

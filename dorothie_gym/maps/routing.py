@@ -373,7 +373,7 @@ TURNS_BEHIND = 16.0
 ahead first, and half the length of a prop [m]."""
 
 ONE_ROADBLOCK = 3.0
-"""Largest distance along the road of props on lanes beside one another that form one roadblock [m]."""
+"""Largest distance along the road of props on adjacent lanes that form one roadblock [m]."""
 
 APART = 22.0
 """Minimum distance along the road of other props [m]: a U-turn before the one swings out onto the other lane."""

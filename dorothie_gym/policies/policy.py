@@ -81,7 +81,7 @@ class Policy(ABC, Generic[State]):
         return None
 
     def usage_of(self, state: State) -> Mapping[str, object] | None:
-        """Returns the costs of a session so far (calls, tokens), in JSON types, for the record; None if there are none."""
+        """Returns the costs of a session so far (calls, tokens), in JSON types, for the record; None without costs."""
         return None
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Policies by name, shipped trained policies among them, and trained policies from files.
+"""Policies by name, including shipped trained policies, and trained policies from files.
 
 The module of a policy is imported when the policy is made (through the lazy packages below `policies`), so that listing
 the names imports none of them.

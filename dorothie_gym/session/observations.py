@@ -433,7 +433,7 @@ class LazyObservations(Mapping[str, Observation]):
     """Observations of the roles at one decision, each built when it is first read.
 
     A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
-    read in time is asked for afterwards.
+    read in time is requested afterwards.
     """
 
     def __init__(self, session: Observable) -> None:

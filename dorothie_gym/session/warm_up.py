@@ -44,7 +44,7 @@ TOWN: Final = "brookside"
 """Town of the short session that is played; machine code is the same for all towns."""
 
 Progress: TypeAlias = Callable[[str, int, int], None]
-"""Called with the name of the function that is being compiled, and how many functions are begun of how many in all."""
+"""Called with the name of the function that is being compiled, and the numbers of functions begun and in total."""
 
 _HELPER: Final = """
 import os, sys, threading

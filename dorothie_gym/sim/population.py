@@ -327,8 +327,8 @@ def populate(
         town: its arrays.
         world: arrays of the world; the ego, if there is one, is the first of its vehicles.
         seed: seed of the places and the desired speeds.
-        vehicles: how many, cyclists included.
-        pedestrians: how many; on pavements, or in a town without them beside the streets.
+        vehicles: number of vehicles, cyclists included.
+        pedestrians: number of pedestrians; on pavements, or in a town without them beside the streets.
         cyclists: share of the vehicles; they ride to the right on slow roads.
     """
     rng = np.random.default_rng(seed)

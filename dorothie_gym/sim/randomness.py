@@ -51,7 +51,7 @@ def seed_of(first: int, second: int, pool: NDArray[np.int64]) -> int:
 
     Args:
         first: number in 0..2^32 - 1.
-        second: likewise.
+        second: number in 0..2^32 - 1.
         pool: (4,) scratch.
     """
     _fill_pool(first, second, pool)

@@ -46,7 +46,7 @@ class TimeLimitedEnv(TimeLimited, gym.Env[ObsType, ActType]):
 
 
 def steps_until(seconds: float, step: float) -> int:
-    """Returns after how many steps a clock that adds up steps of equal length [s] has reached a time [s]."""
+    """Returns the number of steps of equal length [s] after which a clock reaches a time [s]."""
     return next(number for number, time in enumerate(accumulate(repeat(step)), start=1) if time >= seconds)
 
 

@@ -204,7 +204,7 @@ def read_places(path: Path, report: ReadReport) -> CarPoses:
     """Returns the poses of the file.
 
     The file ends at a second header line. Rows with a missing number are left out, rows out of order are sorted, and
-    the first of several rows of a frame is taken.
+    if a frame has several rows, the first is used.
 
     Raises:
         SessionError: it lacks a header line or one of the first four columns, is too large, or is not UTF-8.

@@ -215,7 +215,7 @@ def _partings(clauses: Sequence[str], count: int) -> Iterator[tuple[str, ...]]:
 
 
 def _fit(pieces: Sequence[str], acts: Sequence[DialogueAct]) -> tuple[int, int]:
-    """Returns how many moves, and how many slot sets, the classifier predicts correctly."""
+    """Returns the numbers of moves and of slot sets that the classifier predicts correctly."""
     guessed = [_guess(piece) for piece in pieces]
     moves = sum(guess.move is act.move for guess, act in zip(guessed, acts, strict=True))
     return moves, sum(guess.slots == act.slots for guess, act in zip(guessed, acts, strict=True))

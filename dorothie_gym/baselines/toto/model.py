@@ -144,7 +144,7 @@ class TOTO(Model):
         return self.norm(tokens) + time_encoding(times, self.config.width), mask
 
     def token_count(self, inputs: Inputs) -> int:
-        """Returns how many tokens the longest of B points has."""
+        """Returns the number of tokens of the longest of B points."""
         return int(torch.cat([mask for _, mask, _ in self._channels(inputs)], dim=1).sum(1).max())
 
     def heads(self, last: Tensor) -> Outputs:

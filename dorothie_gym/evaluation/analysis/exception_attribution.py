@@ -14,7 +14,7 @@ sessions with recorded meanings, the propositions decide (`exception_mentions`).
 
 For an object on the road, the window starts again when the car comes near. A question within `ANSWER_TIMEOUT` after an
 exchange that handles an object on the road belongs to it if it names no landmark; after an exchange that handles a task
-exception, a question for status or destination does. If several exceptions fit, the latest counts.
+exception, a question for status or destination does. If several exceptions match, the latest counts.
 
 If annotators have marked what an exchange handles, their mark counts.
 """

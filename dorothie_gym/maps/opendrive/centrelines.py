@@ -189,7 +189,7 @@ def thin(line: Array) -> Array:
     longest = np.where(curvature > _STRAIGHT_CURVATURE, _LONGEST_CURVE_STEP, _LONGEST_STEP)
     spacing = np.clip(np.sqrt(8.0 * _CHORD_ERROR / np.maximum(sharpest, 1e-9)), _SHORTEST_STEP, longest)
     spacing = np.concatenate((spacing[:1], np.minimum(spacing[:-1], spacing[1:]), spacing[-1:]))  # (count,) intervals
-    points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # how many points until here
+    points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # number of points so far
     total = max(1, int(np.ceil(points[-1] - 1e-9)))
     return _at(np.interp(np.linspace(0.0, points[-1], total + 1), points, grid), station, line)
 

@@ -43,7 +43,7 @@ _WISHED = {
     Wish.SWITCH_LEFT: ActionValue.LANE_SWITCH,
     Wish.SWITCH_RIGHT: ActionValue.LANE_SWITCH,
 }
-"""Action of each manoeuvre that the participant may have asked for."""
+"""Action of each manoeuvre that the participant may have requested."""
 
 
 def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:

@@ -356,7 +356,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> bool:
-    """Returns whether a recent remark has stated the target's purpose, and thereby the person or thing in question."""
+    """Returns whether a recent remark has stated the target's purpose, and thereby the person or item in question."""
     if not state.speech.has_just_spoken(view.time, _SPOKEN_OF):
         return False
     recent = (said for item in state.speech.said[-3:] for said in item.meaning)

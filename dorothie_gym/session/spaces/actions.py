@@ -75,7 +75,7 @@ class Speech:
 
     Attributes:
         act: the dialogue act.
-        text: its words; empty to have them generated.
+        text: its words; if empty, they are generated.
         meaning: propositions that the speaker states, asks or requests. They are recorded, but no role observes them.
         onset: time from the decision to the first word of an utterance [s]; a span that continues one has none.
         pace: speaking rate relative to that of the environment.

@@ -109,7 +109,7 @@ class SharedTexts(tuple[str, ...]):
         return tuple(self).index(text, *bounds)
 
     def count(self, text: object) -> int:
-        """Returns how many environments have a text."""
+        """Returns the number of environments with a text."""
         return tuple(self).count(text)
 
     def __deepcopy__(self, memo: dict[int, object]) -> tuple[str, ...]:

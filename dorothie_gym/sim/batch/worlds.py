@@ -110,7 +110,7 @@ class VectorWorld(CachedViews):
             town: arrays of the town.
             world: a world of the town; the others have room for equally many bodies.
             worlds: number of worlds.
-            threads: how many threads at most, by default as many as there are processors for this process.
+            threads: maximum number of threads, by default the number of processors for this process.
 
         Raises:
             ValueError: there is not at least one world and one thread.

@@ -113,7 +113,7 @@ def misfit_of(town: TownArrays, number: int, angle: int) -> int:
 
 @compiled
 def find_turn(town: TownArrays, world: WorldArrays, station: float, angle: int) -> int:
-    """Adds to the plan the lanes to the exit that fits an angle best, with lane changes if that fits much better.
+    """Adds to the plan the lanes to the exit closest to an angle, with lane changes if that exit is much closer.
 
     Args:
         town: arrays of the town.

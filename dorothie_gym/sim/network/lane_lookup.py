@@ -307,7 +307,7 @@ def value_near(points: Array, lane: LaneRecord, segment: int, column: int, stati
 
 @inlined
 def closest_segment(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, float, float]:
-    """Returns the closest segment (the first of several), its share up to the closest place, and distance^2 [m^2]."""
+    """Returns the closest segment (the first of equals), its share up to the closest place, and distance^2 [m^2]."""
     best, at, share = math.inf, first, 0.0
     ax, ay = points[first, 0], points[first, 1]
     for k in range(first, last + 1):

@@ -1,4 +1,4 @@
-"""Steps of pedestrians: towards a place, past one another, clear of vehicles and props."""
+"""Steps of pedestrians: towards a place, past each other, clear of vehicles and props."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ from dorothie_gym.support.compilation.records import RecordArray, by_reference, 
 from dorothie_gym.support.copying import shared
 
 PASSING_WIDTH = 2.5
-"""Two vehicles whose centres are this far apart across their lanes pass one another [m]: they are 2 m wide."""
+"""Two vehicles whose centres are this far apart across their lanes pass each other [m]: they are 2 m wide."""
 
 CAR_REAR = CAR_LENGTH / 2
 """Distance from the centre of a car to its rear [m]."""

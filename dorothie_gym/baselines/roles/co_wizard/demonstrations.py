@@ -43,7 +43,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 CO_WIZARD: Final = Role.CO_WIZARD
 
 SHORTEST_TURN, LONGEST_TURN = 10, 80
-"""Range of the number of decisions for which teacher and player in turns drive."""
+"""Range of the number of decisions between changes of the driver, teacher or player."""
 
 PATIENCE: Final = 8
 """Number of decisions in a row with another command than the teacher's after which the teacher takes over.

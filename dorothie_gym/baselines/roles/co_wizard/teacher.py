@@ -51,7 +51,7 @@ class Lesson:
     Attributes:
         update: its memory after listening and looking.
         physical: its physical action.
-        remarks: remarks that it chooses now, in one breath or the next.
+        remarks: remarks that it chooses now, for this utterance or the next.
         queued: whether remarks were waiting to be said before.
         ready: whether it has reacted to the last utterance; before, it gives no commands.
         action: the whole action.

@@ -30,7 +30,7 @@ def is_held_out(header: SessionHeader) -> bool:
 
 
 class Turns(Protocol):
-    """Player and teacher of one role, who act in turns."""
+    """Player and teacher of one role, who act alternately."""
 
     @property
     def is_stuck(self) -> bool:
@@ -47,7 +47,7 @@ class Turns(Protocol):
 
 
 def play_in_turns(role: Role, turns: Turns, others: Mapping[Role, AnyPolicy], engine: SessionEngine, seed: int) -> None:
-    """Plays a session to its end, in which player and teacher of a role act in turns.
+    """Plays a session to its end, in which player and teacher of a role act alternately.
 
     Args:
         role: the role.

@@ -1,6 +1,6 @@
 """Rounds of training: imitation of a corpus, then rounds of practice with the teacher (DAgger).
 
-A round plays sessions in which the previous round's player and the teacher act in turns, adds the teacher's
+A round plays sessions in which the previous round's player and the teacher alternate, adds the teacher's
 decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). The examples of each
 session and the model of each fit are saved, so that an interrupted training can be resumed; all depend only on the
 seed.

@@ -48,7 +48,7 @@ class LearnedRole(Generic[Network, Batch, Example, Settings]):
         examples: class of its examples.
         loss: loss of a network in the given examples [nats].
         follow: simulates a recorded session again, and hands on the examples of the role.
-        practise: plays the session of a seed, in which a network with a vocabulary and the teacher act in turns, and
+        practise: plays the session of a seed, in which a network with a vocabulary and the teacher alternate, and
             hands on the teacher's decisions.
         branch: branch of the seed from which the sessions of practice are drawn; no rollout or corpus draws from it.
     """

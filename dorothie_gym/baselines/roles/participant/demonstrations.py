@@ -36,7 +36,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 PARTICIPANT: Final = Role.PARTICIPANT
 
 SHORTEST_TURN, LONGEST_TURN = 20, 160
-"""Range of the number of decisions for which teacher and player in turns guide the car."""
+"""Range of the number of decisions between changes of the guide, teacher or player."""
 
 OnExample = Callable[[Example], None]
 
@@ -111,7 +111,7 @@ def practise(
     on_example: OnExample,
     settings: RoundSettings,
 ) -> None:
-    """Plays a session in which teacher and player guide the car in turns; hands on the examples.
+    """Plays a session in which teacher and player guide the car alternately; passes the examples on.
 
     Args:
         network: network of the player.

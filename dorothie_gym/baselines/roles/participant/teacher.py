@@ -28,7 +28,7 @@ class Lesson:
     Attributes:
         target: number of the subgoal that is its target; None if there is none.
         guiding: whether it guides the car.
-        remarks: remarks that it chooses now, in one breath or the next.
+        remarks: remarks that it chooses now, for this utterance or the next.
         action: its action.
     """
 

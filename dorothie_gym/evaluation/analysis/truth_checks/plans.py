@@ -76,8 +76,8 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
     """Returns whether a place is one of the open tasks; without a place, whether one has been named.
 
     Statements of the Co-Wizard that agree with its recorded beliefs count as true: it may have misheard the place.
-    It cannot be decided whether an open task is not the current one, nor which of several places of a name is meant by
-    its street.
+    It cannot be decided whether an open task is not the current one, nor which of several places with one name a
+    street identifies.
     """
     place, own = said.get("place"), speaker is Role.CO_WIZARD
     if place is None:
