@@ -22,7 +22,7 @@ class RegisteredEnvironment:
         entry_point: "module:class".
         description: task of the agent.
         kwargs: arguments that the id sets.
-        parallel: whether it is an environment of PettingZoo, with the agents in parallel and in turns (AEC).
+        parallel: whether it is an environment of PettingZoo, with the agents in parallel and alternating (AEC).
         vector_entry_point: "module:class" of the vectorised environment.
         reward_threshold: mean return that counts as solved.
     """

@@ -16,7 +16,7 @@ def is_command_line() -> bool:
     if "--multiprocessing-fork" in sys.orig_argv:
         return False
     name = sys.argv[0] if sys.argv else ""
-    if name == "-m":  # the package is being imported on the way to its module
+    if name == "-m":  # the package is imported as a parent of its module
         after = sys.orig_argv[sys.orig_argv.index("-m") + 1 :] if "-m" in sys.orig_argv else []
         return bool(after) and after[0] in _MODULES
     return os.path.splitext(os.path.basename(name))[0] == "dorothie-gym"

@@ -5,12 +5,12 @@ for an environment that does not allow the work), so that `except ValueError` ke
 
 ```
 DorothieGymError
-├── InputFileError       a file is no regular file, too large, malformed, or has a field of another type
+├── InputFileError       a file is not a regular file, too large, malformed, or has a field of another type
 ├── OntologyError        a text, number or combination that the closed vocabularies do not contain
 ├── TownError            a map cannot be read or used
 ├── TownArchiveError     a cached town is damaged or of another format
 ├── StoryboardError      a storyboard cannot be read, bound or played
-├── AnnotationError      an annotation does not fit its session, or names what the vocabularies do not contain
+├── AnnotationError      an annotation does not match its session, or names unknown members of a vocabulary
 ├── SessionError         a recorded session or corpus cannot be read or written
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
@@ -127,7 +127,7 @@ class SessionError(DorothieGymError, ValueError):
 
 
 class AnnotationError(DorothieGymError, ValueError):
-    """An annotation does not fit its session, or cannot be represented; the message names the place."""
+    """An annotation does not match its session, or cannot be represented; the message names the place."""
 
 
 class OutputFolderError(DorothieGymError, RuntimeError):
@@ -231,7 +231,7 @@ def short_repr(value: object) -> str:
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """Returns "did you mean 'NAME'? " for the known name that is most like a given one; "" if none is alike."""
+    """Returns "did you mean 'NAME'? " for the known name that is most similar to a given one; "" if none is similar."""
     names = {name.casefold(): name for name in known}
     found = get_close_matches(str(given)[:MAX_SHOWN].casefold(), names, n=1, cutoff=0.6)
     return f"did you mean {names[found[0]]!r}? " if found else ""

@@ -34,8 +34,8 @@ class ActorTracks:
 
     Attributes:
         table: recorded actors, rows of `ACTOR_DTYPE`.
-        before: (m,) row of the same actor in the record before, -1 for none.
-        after: (m,) row of the same actor in the record after, -1 for none.
+        before: (m,) row of the same actor in the previous record, -1 for none.
+        after: (m,) row of the same actor in the next record, -1 for none.
         times: (m,) time of each row [s].
     """
 
@@ -66,7 +66,7 @@ class ActorTracks:
         return Moment(rows, np.where(after >= 0, after, rows), share, since / FRAME_RATE)
 
     def actors(self, moment: Moment) -> Rows:
-        """Returns the actors of a moment (n,), interpolated linearly; before the first record they drive straight on.
+        """Returns the actors at a time (n,), interpolated linearly; before the first record, along their headings.
 
         Kinds and sizes are those of the earlier record.
         """

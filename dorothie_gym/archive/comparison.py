@@ -29,7 +29,7 @@ class Difference:
     """First difference of two recordings.
 
     Attributes:
-        frame: the first frame at which they differ; -1 for data from before the beginning of the session.
+        frame: the first frame at which they differ; -1 for data from before the start of the session.
         field: the field, such as "frames.x", "actors.speed of number 7", "events[12].data.text".
         recorded: value in the first recording, as text.
         replayed: value in the second, as text.
@@ -53,7 +53,7 @@ def first_difference(recorded: Session, replayed: Session, *, strict: bool = Fal
         recorded: the first recording.
         replayed: the second.
         strict: whether completeness and further columns of the frames count. Otherwise, a first recording that was cut
-            off, and thus has no outcome, equals the beginning of a longer one.
+            off, and thus has no outcome, equals the start of a longer one.
     """
     return _Comparison(recorded, replayed, strict=strict).first()
 
@@ -104,7 +104,7 @@ class _Comparison:
     Args:
         recorded: the first.
         replayed: the second.
-        strict: as of `first_difference`.
+        strict: as in `first_difference`.
     """
 
     def __init__(self, recorded: Session, replayed: Session, *, strict: bool) -> None:
@@ -151,7 +151,7 @@ class _Comparison:
             {decision.frame: canonical(decision.actions, "actions") for decision in session.decisions or ()}
             for session in self._pair
         )
-        # A recording that was cut off may hold its last decision without the frames after it.
+        # An interrupted recording may contain its last decision without the frames after it.
         frames = sorted(frame for frame in one.keys() | other.keys() if self._whole or frame < self._last)
         return _first(_in_values(frame, "actions", one.get(frame), other.get(frame)) for frame in frames)
 

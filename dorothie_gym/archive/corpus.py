@@ -226,7 +226,7 @@ class Corpus:
 
     @property
     def folds(self) -> Mapping[Fold, int]:
-        """Number of sessions of each fold that has any."""
+        """Number of sessions of each fold that is not empty."""
         counts = {fold: sum(entry.fold is fold for entry in self.entries) for fold in (*FOLDS, Fold.VAL, Fold.TEST)}
         return {fold: count for fold, count in counts.items() if count}
 
@@ -242,7 +242,7 @@ class Corpus:
         Args:
             fold: a fold, or a group of folds: "val", "test", "seen", "unseen".
             town: name of the town.
-            exception: a kind that occurs, "environmental" or "task" for any of them, "none" for sessions without.
+            exception: a kind that occurs, "environmental" or "task" for any of that type, "none" if none occurs.
 
         Raises:
             SessionError: the fold or the kind is unknown, or a session cannot be read.
@@ -322,7 +322,7 @@ def load_sessions(path: Path | str) -> tuple[Session, ...]:
 
 
 def load_readable(path: Path | str) -> tuple[tuple[Session, ...], dict[str, str]]:
-    """Returns the sessions in a folder, by name, and for each that cannot be read its name and the reason."""
+    """Returns the readable sessions in a folder, by name, and the name and error of each unreadable one."""
     sessions: list[Session] = []
     unreadable: dict[str, str] = {}
     for entry in Corpus.load(path).entries:
@@ -334,7 +334,7 @@ def load_readable(path: Path | str) -> tuple[tuple[Session, ...], dict[str, str]
 
 
 def split_by_name(sessions: Sequence[Session]) -> tuple[tuple[Session, ...], tuple[Session, ...]]:
-    """Returns the first half of the sessions by name, to train on, and the second (the larger if odd), to test on."""
+    """Returns the sessions by name in two halves, for training and for testing; the second may be larger by one."""
     ordered = sorted(sessions, key=lambda session: session.name)
     middle = len(ordered) // 2
     return tuple(ordered[:middle]), tuple(ordered[middle:])

@@ -29,7 +29,7 @@ ANGLE_TOLERANCE: Final = 15.0
 """Largest error of a navigation action's angle that counts as right [degrees] (paper, section 5, Evaluation)."""
 
 WAY_LENGTH: Final = 25
-"""Most states of the car in a view: 100 frames of 10 Hz, every fourth (working memory, paper, section 6)."""
+"""Maximum number of states of the car in a view: every fourth of 100 at 10 Hz (working memory, paper, section 6)."""
 
 WAY_STEP: Final = 12
 """Frames (30 Hz) between two states of the car in a view."""
@@ -248,12 +248,12 @@ Point: TypeAlias = InferencePoint | DecisionPoint
 
 
 def ufn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the participant, from event number `since` on."""
+    """Yields a point for each flagged dialogue move of the participant, starting with event number `since`."""
     yield from _inference_points(SessionHistory(session), Task.UFN, since)
 
 
 def rfn_points(session: Session, *, since: int = 0, strict: bool = False) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the Co-Wizard, from event number `since` on.
+    """Yields a point for each flagged dialogue move of the Co-Wizard, starting with event number `since`.
 
     Args:
         session: the session.
@@ -264,7 +264,7 @@ def rfn_points(session: Session, *, since: int = 0, strict: bool = False) -> Ite
 
 
 def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
-    """Yields a point for each flagged navigation action of the Co-Wizard, from event number `since` on."""
+    """Yields a point for each flagged navigation action of the Co-Wizard, starting with event number `since`."""
     history = SessionHistory(session)
     for record in history.actions:
         if record.index >= since and is_decision(record):
@@ -285,7 +285,7 @@ def _inference_points(history: SessionHistory, task: Task, since: int) -> Iterat
 
 
 def task_points(session: Session, task: Task, *, since: int = 0, strict: bool = False) -> tuple[Point, ...]:
-    """Returns the points of a task in a session, from event number `since` on; `strict` as of `rfn_points`."""
+    """Returns the points of a task in a session, starting with event number `since`; `strict` as in `rfn_points`."""
     match task:
         case Task.UFN:
             return tuple(ufn_points(session, since=since))
@@ -332,7 +332,7 @@ def _why_no_point(event: Event, action: ActionRecord | None) -> str:
 
 
 def at_tenths(session: Session) -> Session:
-    """Returns a session as recorded at 10 Hz: events move to the beginning of their tenth, frames between are dropped.
+    """Returns a session as if recorded at 10 Hz: events move to the start of their interval, other frames are dropped.
 
     Points and views of the result do not depend on the layout that the session was read from.
     """
@@ -349,14 +349,14 @@ def at_tenths(session: Session) -> Session:
 
 
 def history_angle(record: ActionRecord) -> float:
-    """Returns the angle of a past action [degrees]: -180 for a U-turn (as in SDN), 0 where it is not known."""
+    """Returns the angle of a past action [degrees]: -180 for a U-turn (as in SDN), 0 if unknown."""
     if record.action is PhysicalAction.U_TURN:
         return U_TURN_ANGLE
     return wrap_degrees(record.angle or 0.0)
 
 
 def label_angle(record: ActionRecord) -> float:
-    """Returns the angle that NfD predicts [degrees]: 0 for actions without one, NaN where it is not known."""
+    """Returns the angle that NfD predicts [degrees]: 0 for actions without one, NaN if unknown."""
     if record.action.argument not in (ArgumentKind.ANGLE, ArgumentKind.SIDE):
         return 0.0
     return math.nan if record.angle is None else wrap_degrees(record.angle)

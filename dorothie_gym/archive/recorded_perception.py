@@ -1,6 +1,6 @@
 """Perception of the recorded surroundings from the car.
 
-As in the environment, everything within the sight distance is perceived in all directions: 80 m on a clear day, less in
+As in the environment, objects within the sight distance are perceived in all directions: 80 m on a clear day, less in
 fog, rain and darkness (`dorothie_gym.sim.sensing.visibility`; recorded headlights count). The random parts of the
 environment's perception are left out: glimpses beyond the sight distance and position errors. The state of a traffic
 light is perceived within the sight distance when the car drives towards it. Positions are relative to the car's pose at
@@ -54,7 +54,7 @@ in metres ahead and to the left, heading relative to the car's [degrees, positiv
 [m]; for a light, distance, bearing and position are those of its stop line, and the rest is 0."""
 
 MAX_OBJECTS: Final = 64
-"""Most objects of a look, the nearest ones: more than any batch takes."""
+"""Maximum number of objects of a perception, the nearest ones: more than any batch uses."""
 
 MAX_LIGHT_ANGLE: Final = 90.0
 """Largest angle between the car's heading and the lane of a visible light [degrees]."""
@@ -63,12 +63,12 @@ MAX_LIGHT_ANGLE: Final = 90.0
 def perceived(
     scene: Surroundings, pose: Array, frames: NDArray[np.int64], switches: Switches, town: Town | None
 ) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
-    """Yields for each look the frame (int), kinds (k,) and values (k, 8) of the perceived objects, the nearest first.
+    """Yields for each perception the frame (int), kinds (k,) and values (k, 8) of the objects, the nearest first.
 
     Args:
         scene: recorded surroundings of the car.
         pose: (n, 3) x, y [m] and heading [degrees, clockwise] of the car.
-        frames: (n,) frames of the poses, rising, including those of the scene.
+        frames: (n,) frames of the poses, ascending, including those of the scene.
         switches: switches of the headlights, which are off at first.
         town: the town, if known, for the positions of the traffic lights.
     """
@@ -96,7 +96,7 @@ def last_perceived(session: Session, frame: int, town: Town | None) -> tuple[NDA
     Args:
         session: the session so far.
         frame: looks of this frame and later ones do not count.
-        town: as of `perceived`.
+        town: as in `perceived`.
     """
     scene, trajectory = session.scene, session.trajectory
     look = _last(scene.actors, frame - 1)

@@ -7,8 +7,8 @@ This module alone states the rule; environments read it as a `PointView`, batche
   At an NfD point, utterances of the point's own time that precede it in the record are visible as well: an action may
   obey an utterance at once.
 * At a UfN point, the words of the current utterance and the moves of its earlier spans are visible.
-* At an RfN point, the earlier spans of the Co-Wizard's own utterance are visible with their words and moves; nothing of
-  its other spans is. Under the strict rule nothing of the utterance is visible: its spans then have equal inputs and
+* At an RfN point, the earlier spans of the Co-Wizard's own utterance are visible with their words and moves; no part
+  of its other spans is. Under the strict rule no part of the utterance is visible: its spans then have equal inputs and
   different labels.
 * Hidden landmarks, which the car does not know, are never visible.
 """
@@ -41,7 +41,7 @@ _TIME_BITS: Final = 32
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Session and time of n rows, in rising order.
+    """Session and time of n rows, in ascending order.
 
     Attributes:
         session: (n,) index of the session.
@@ -141,7 +141,7 @@ def earlier_spans(utterance_of_move: NDArray[np.integer], moves: ArrayLike) -> R
     """Returns the rows of the moves that precede each given move within its own utterance.
 
     Args:
-        utterance_of_move: utterance of each move of a record, rising.
+        utterance_of_move: utterance of each move of a record, ascending.
         moves: (n,) rows of moves.
     """
     rows = np.asarray(moves, dtype=np.int32).reshape(-1)

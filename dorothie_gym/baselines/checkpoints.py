@@ -125,7 +125,7 @@ class ModelCard:
         spread: divisor of the vectors of texts; None if the model's text encoder is trained.
         merges: byte pairs learned from the training sessions; None if the model uses none.
         weights: name of the file with the weights, in the same folder.
-        weights_sha256: its SHA-256; a hash of this file thereby covers the weights.
+        weights_sha256: its SHA-256; a hash of this file thus covers the weights.
         steps: points of an epoch times the number of epochs.
         seconds: duration of the training [s].
     """

@@ -151,7 +151,7 @@ class Dataset:
             fold: the fold.
             spec: sizes.
             queries: whether the inputs have the queries of the detector (N, q, d) at the last look, under "detector".
-            sound: encoder of the sound of the current utterances (N, ...), under "current_sound"; None for none.
+            sound: encoder of the sound of the current utterances (N, ...), under "current_sound"; None for no sound.
         """
         if (fold, spec) not in self._examples:
             self._examples[fold, spec] = Examples.gather(self.columns, self.tables(fold), spec)
@@ -189,7 +189,7 @@ class Dataset:
         return self._sight
 
     def _queries(self, fold: str) -> Tensor:
-        """Returns the queries (N, q, d) at the last look of all points of a fold, float16; 0 where there is none."""
+        """Returns the queries (N, q, d) at the last look of all points of a fold, float16; 0 if there is none."""
         columns, detector, tables = self.columns, self.detector, self.tables(fold)
         session = np.concatenate([table.session for table in tables])
         start, stop = (

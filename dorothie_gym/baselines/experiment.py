@@ -87,7 +87,7 @@ class Experiment:
         return find_row(self.model)
 
     def material(self, every: Dataset, on_session: Callable[[], object] | None = None) -> Dataset:
-        """Returns the dataset with the objects of this model; arguments and errors as of `Dataset.seeing`."""
+        """Returns the dataset with the objects of this model; arguments and errors as in `Dataset.seeing`."""
         objects = self.row.objects
         return every.seeing(objects, on_session, self.detector if objects == "detections" else None)
 
@@ -328,7 +328,7 @@ def run_experiments(
 
     Args:
         jobs: the trainings.
-        workers: processes; with 1 everything happens in this one.
+        workers: number of processes; with 1, everything runs in this process.
         on_epoch: called after each epoch in this process.
         on_session: called after each session whose pictures were drawn, for models that see by the camera.
 
@@ -422,14 +422,14 @@ def gather_table(
 
     Args:
         jobs: complete trainings on one corpus.
-        floors: whether the trivial baselines get rows, with the same seeds.
+        floors: whether the table has rows for the trivial baselines, with the same seeds.
 
     Returns:
         The table, and the predictions behind it.
 
     Raises:
         ValueError: there is no job.
-        PredictionError: a file of predictions does not fit the corpus.
+        PredictionError: a file of predictions does not match the corpus.
         SessionError: the corpus cannot be read.
     """
     if not jobs:

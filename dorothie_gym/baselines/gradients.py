@@ -6,5 +6,5 @@ from torch import Tensor
 
 
 def backpropagate(loss: Tensor) -> None:
-    """Adds the gradients of a loss to the parameters that it depends on."""
+    """Adds the gradients of a loss to its parameters."""
     loss.backward()  # type: ignore[no-untyped-call]  # torch publishes no types for it

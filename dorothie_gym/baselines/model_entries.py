@@ -14,7 +14,7 @@ from dorothie_gym.evaluation.teacher_forced.paper_comparison import paper_name
 Kind = Literal["toto", "reader", "ppo", "cloning", "shallow"]
 
 Objects: TypeAlias = Literal["record", "boxes", "detections"]
-"""Source of the objects around the ego: all near ones in the record, those of them that the camera on the car shows, or
+"""Source of the objects around the ego: all nearby ones in the record, only those that the camera on the car shows, or
 those that a trained detector finds in its pictures."""
 
 Sound: TypeAlias = Literal["log-mel", "speech-embedding", "hubert"]
@@ -79,7 +79,7 @@ def _only(*channels: Channel) -> Change:
 
 
 _EPISODIC: Final = (Channel.ACTIONS, Channel.MOVES, Channel.TRANSCRIPT, Channel.VISION)
-"""Inputs that the paper gives to the Episodic Transformer (Pashevich et al., 2021): actions, text, and the window, here
+"""Inputs of the Episodic Transformer in the paper (Pashevich et al., 2021): actions, text, and the window, here
 with the objects around the ego instead of images."""
 
 ROWS: Final[tuple[ModelEntry, ...]] = (
@@ -218,7 +218,7 @@ def find_row(name: str) -> ModelEntry:
 
 
 def stored_row(command: str) -> ModelEntry:
-    """Returns the model of a file by its command, also that of a former version; raises `ValueError` as `find_row`."""
+    """Returns the model of a file by its command, also of an earlier version; raises `ValueError` like `find_row`."""
     return find_row(FORMER_COMMANDS.get(command, command))
 
 

@@ -59,7 +59,7 @@ class Labels:
         return len(self.task)
 
     def take(self, rows: Tensor) -> Labels:
-        """Returns the labels of some points."""
+        """Returns the labels of the given points."""
         return Labels(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def to(self, device: torch.device) -> Labels:
@@ -96,7 +96,7 @@ class Examples:
         return len(self.labels)
 
     def take(self, rows: Tensor, device: torch.device | None = None) -> tuple[dict[str, Tensor], Labels]:
-        """Returns inputs and labels of some points."""
+        """Returns inputs and labels of the given points."""
         inputs = {name: values[rows] for name, values in self.inputs.items()}
         labels = self.labels.take(rows)
         if device is None or device.type == "cpu":
@@ -105,7 +105,7 @@ class Examples:
 
     @classmethod
     def gather(cls, columns: Columns, tables: Sequence[PointTable], spec: BatchSpec) -> Self:
-        """Gathers all points of some tables, in their order.
+        """Gathers all points of the given tables, in their order.
 
         Raises:
             ValueError: there is no point.
@@ -185,7 +185,7 @@ TAKES_SIDE: Final = tuple(action.argument is ArgumentKind.SIDE for action in NAV
 
 
 def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
-    """Returns the likeliest values that the ontology allows (see `allowed_angle`).
+    """Returns the most likely values that the ontology allows (see `allowed_angle`).
 
     Args:
         outputs: outputs of a model.

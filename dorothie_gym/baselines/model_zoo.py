@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def make_model(row: ModelEntry, size: str, material: Dataset, seed: int, *, strict: bool = False) -> TOTO:
-    """Returns a model with weights drawn from a seed; `strict` as of `TOTOConfig`.
+    """Returns a model with weights drawn from a seed; `strict` as in `TOTOConfig`.
 
     Raises:
         ValueError: the size is unknown, or the model cannot be run.

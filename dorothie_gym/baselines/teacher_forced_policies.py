@@ -118,7 +118,7 @@ def run_policy(
         corpus: folder of the corpus.
         kind: "ppo" or "cloning".
         seed: seed of weights and order.
-        folder: gets the policies.
+        folder: folder to which the policies are written.
         name: name of the row.
         strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
 

@@ -116,7 +116,7 @@ def read_header(path: Path, limit: int = MAX_WEIGHTS) -> TensorHeader:
         limit: largest size of the file [bytes].
 
     Raises:
-        InputFileError: it is not a regular file, too large, cut off, or its header is damaged; the message names the
+        InputFileError: it is not a regular file, too large, truncated, or its header is damaged; the message names the
             tensor.
         OSError: it is missing or cannot be read.
     """
@@ -176,7 +176,7 @@ def _check_places(path: Path, tensors: Mapping[str, StoredTensor], size: int) ->
 
 
 def read_tensors(path: Path, limit: int = MAX_WEIGHTS) -> tuple[dict[str, Tensor], Mapping[str, str]]:
-    """Returns the tensors of a safetensors file by name, and its metadata; arguments and errors as of `read_header`."""
+    """Returns the tensors of a safetensors file by name, and its metadata; arguments and errors as in `read_header`."""
     header = read_header(path, limit)
     try:
         with safe_open(path, framework="pt") as file:
@@ -251,7 +251,7 @@ def check_optimiser(
         mark: character between number and quantity.
 
     Raises:
-        InputFileError: as of `check_tensors`.
+        InputFileError: as in `check_tensors`.
     """
     for name, value in found.items():
         number, _, quantity = name.partition(mark)

@@ -160,7 +160,7 @@ def train(
 
 
 def predict(model: Model, examples: Examples) -> Predicted:
-    """Returns the predictions of a model at some points, on the CPU."""
+    """Returns the predictions of a model at the given points, on the CPU."""
     where = next(model.parameters()).device
     model.eval()
     parts = []

@@ -99,7 +99,7 @@ def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
 
 @contextmanager
 def reporting_errors() -> Iterator[None]:
-    """Turns errors into one message and exit code 2, or 1 if the disk is full or the output was deleted meanwhile."""
+    """Turns errors into one message and exit code 2, or 1 if the disk is full or the output was deleted in between."""
     try:
         yield
     except OutputFolderError as error:

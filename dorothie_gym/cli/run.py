@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 
 PICTURE = Path("dorothie.png")
-"""Picture that is written where none is asked for."""
+"""Picture that is written by default."""
 
 
 @dataclass(frozen=True, kw_only=True)

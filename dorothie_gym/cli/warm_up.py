@@ -58,7 +58,7 @@ def compile_with_progress(*, everything: bool = False, batches: bool, pictures: 
     """Compiles with a progress bar on a terminal.
 
     Args:
-        everything: whether to compile what `Town-v0` needs, too.
+        everything: whether to compile the functions of `Town-v0` as well.
         batches: see `compile_first`.
         pictures: see `compile_first`.
 

@@ -72,7 +72,7 @@ class AsrChannel:
         Args:
             text: spoken text.
             rng: source of randomness.
-            circumstances: error rate of the speaker in the present noise relative to the mean
+            circumstances: error rate of the speaker in the current noise relative to the mean
                 (`ErrorProfile.circumstances`).
 
         Returns:

@@ -55,7 +55,7 @@ class Span:
     Attributes:
         text: words of the span; never blank.
         act: the dialogue act (move and slot values).
-        meaning: propositions that the speaker states, asks or asks for; empty if they are not known.
+        meaning: propositions that the speaker states, asks or requests; empty if they are unknown.
     """
 
     text: str
@@ -131,7 +131,7 @@ class Conversation:
 
         Args:
             words_per_second: speaking rate [words/s], positive.
-            max_spans: largest number of spans in one utterance, at least 1.
+            max_spans: maximum number of spans in one utterance, at least 1.
 
         Raises:
             ValueError: if an argument is out of its range.
@@ -173,12 +173,12 @@ class Conversation:
         return None
 
     def has_room(self, speaker: Role) -> bool:
-        """Returns whether a speaker can begin an utterance, or a further span of the present one."""
+        """Returns whether a speaker can begin an utterance, or a further span of the current one."""
         current = self._air.get(speaker)
         return current is None or len(current.spans) < self.max_spans
 
     def deliver(self, now: float) -> list[Utterance]:
-        """Removes and returns the utterances that are over at `now`.
+        """Removes and returns the utterances that have ended at `now`.
 
         Args:
             now: time [s].

@@ -1,6 +1,6 @@
 """Disfluencies: hesitations and restarts of a speaker, and their removal from a text.
 
-Filled pauses stand mostly at the beginning of a phrase, and restarts repeat its first words (Shriberg, Preliminaries to
+Filled pauses mostly occur at the beginning of a phrase, and restarts repeat its first words (Shriberg, Preliminaries to
 a Theory of Speech Disfluencies, 1994; Clark and Fox Tree, Cognition 84, 2002). A withdrawn name ("the KFC, no, the
 Ikea") is also a disfluency.
 """
@@ -21,7 +21,7 @@ _AT_FRONT = 0.5
 """Share of hesitations at the beginning of the sentence; the others follow its first words."""
 
 _LEAST_WORDS = 5
-"""Number of words from which on a sentence may be interrupted by a hesitation."""
+"""Minimum number of words of a sentence that a hesitation may interrupt."""
 
 _FILLER = rf"(?:{'|'.join(FILLED_PAUSES)})"
 _RESTART = re.compile(rf"\b((?:[\w'-]+ ){{0,2}}[\w'-]+),? {_FILLER},? (?=\1\b)", re.IGNORECASE)
@@ -29,7 +29,7 @@ _PAUSE = re.compile(rf"(?:^|,? ){_FILLER}\b,?(?= |$)|^{_FILLER},? ", re.IGNORECA
 
 
 def hesitating(body: str, filler: str, draw: Callable[[], float]) -> str:
-    """Returns a sentence with a filled pause, by chance with a restart of its first words.
+    """Returns a sentence with a filled pause and, with some probability, a restart of its first words.
 
     Args:
         body: the sentence, without a full stop.

@@ -79,7 +79,7 @@ _UNKNOWN = ActionValue.UNKNOWN.label
 """Label of the unknown value in every slot."""
 
 _OPEN_LABELS = frozenset({_UNKNOWN, ActionValue.QUERIED.label})
-"""Labels of values that name nothing."""
+"""Labels of values that are not names."""
 
 _REPAIRS = frozenset({DialogueMove.CLARIFY, DialogueMove.CONFIRM, DialogueMove.REPLY_W})
 """Moves with which the initiator repairs an exchange after a Confuse."""
@@ -319,5 +319,5 @@ class ExchangeTracker:
 
 
 def _names(act: DialogueAct) -> frozenset[SlotValue]:
-    """Returns the slot values that name something."""
+    """Returns the slot values that are names."""
     return frozenset(value for value in act.slots if value.label not in _OPEN_LABELS)

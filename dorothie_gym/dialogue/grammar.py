@@ -120,7 +120,7 @@ class Grammar:
         joints: links between two acts of one utterance, by (previous move, move).
         fillers: filled pauses.
         clauses: clauses that state a proposition, by its topic ("red", "not goal"), with "past " in front for the past
-            and its action ("told LaneFollow") behind where that has a clause of its own.
+            and its action ("told LaneFollow") last if it has a clause of its own.
         props: names of each kind of prop, with an article.
     """
 

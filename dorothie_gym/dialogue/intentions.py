@@ -35,12 +35,12 @@ class CommunicativeFunction(enum.StrEnum):
     CHECK_QUESTION = "check_question"
     """Asks whether something inferred is right."""
     OFFER = "offer"
-    """Proposes an own action and asks for consent: "shall I find another way?"."""
+    """Proposes an action of the speaker and asks for consent: "shall I find another way?"."""
     FEEDBACK_ELICITATION = "feedback_elicitation"
     """Asks whether the other speaker is following: "did you get that?"."""
     # responses about the talk
     POSITIVE_FEEDBACK = "positive_feedback"
-    """Shows that a message has arrived: "okay", "got it", also by repeating a part of it."""
+    """Shows that an utterance was received: "okay", "got it", also by repeating a part of it."""
     NEGATIVE_FEEDBACK = "negative_feedback"
     """Shows that a message has not arrived or was not understood."""
     # responses about the drive

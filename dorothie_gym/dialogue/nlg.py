@@ -1,6 +1,6 @@
 """Natural language generation (NLG): short spoken English utterances from dialogue acts, speaker and context.
 
-The template that covers most of the given information is used; ties are broken by chance and by the style of the
+The template that covers most of the given information is used; ties are broken at random and by the style of the
 speaker. Slots without coverage are appended as afterthoughts.
 """
 
@@ -154,7 +154,7 @@ def _word(
         if len(text) <= limit:
             return text
         own = replace(own, chattiness=0.0, disfluency=0.0, repairs=0.0, addressing=0.0)
-    # Optional words do not make the difference: the tersest of several sentences that say the same.
+    # Optional words should not decide: the tersest of the sentences with equal content.
     own = replace(own, register=Register.BLUNT, indirectness=0.0, habit=0.0)
     tries = (_Sentence(act, voice, draw, wording, own, scene, 1, MAX_CHARACTERS).text() for _ in range(_TRIES))
     shortest = min(tries, key=len)

@@ -92,7 +92,7 @@ _AFTER_ADDRESSEE = frozenset(
         "make", "pull",
     }
 )  # fmt: skip
-"""Words behind a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""
+"""Words after a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""
 _DENIAL = re.compile(
     r"(don't|do not|dont|never|not|instead of|rather than|without)"
     r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
@@ -130,12 +130,12 @@ class ParsedText:
         speed: a speed [km/h].
         distance: a distance [m].
         here: whether the text refers to the current position ("here").
-        further: whether the car is to continue for a short distance.
+        further: whether the car should continue for a short distance.
         affirms: True for an initial yes, False for an initial no.
         question: whether the text contains a question mark.
-        asked: proposition that a question is about, if the words tell; other questions are told by their slot values.
-        about_hearing: whether the words ask if the other one hears, rather than understands: "can you hear me?".
-        told: proposition about weather, crowds, sensors or the view that a statement makes, if the words tell.
+        asked: proposition of a question, if the words determine it; slot values identify other questions.
+        about_hearing: whether the words ask if the listener hears, rather than understands: "can you hear me?".
+        told: proposition of a statement about weather, crowds, sensors or the view, if the words determine it.
     """
 
     text: str
@@ -238,7 +238,7 @@ def _stated(text: str) -> str:
 
 
 def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative at the end ("stop here, man"), at the beginning or behind a greeting."""
+    """Returns the words without a vocative: at the end ("stop here, man"), at the start, or after a greeting."""
     while words and words[-1] == ",":
         words.pop()
     words = _without_addressee(words, lists)

@@ -37,7 +37,7 @@ NUMBER_WORDS = frozenset((*_ONES, *_ROUND, "hundred"))
 
 
 def cardinal(number: int) -> str:
-    """Returns the words for a whole number, e.g. 25 -> "twenty-five"; digits from 1000 on.
+    """Returns the words for a whole number, e.g. 25 -> "twenty-five"; digits for 1000 and above.
 
     Raises:
         ValueError: if `number` is negative.

@@ -41,7 +41,7 @@ class Asked(enum.Enum):
 
 
 ASKED: Final = Asked.ASKED
-"""Value of the argument that an open question asks for."""
+"""Value of the argument that an open question queries."""
 
 
 class Predicate(enum.StrEnum):
@@ -53,9 +53,9 @@ class Predicate(enum.StrEnum):
     ON_STREET = "on_street"
     """The car is on a street."""
     LOCATED = "located"
-    """A landmark lies on a street, near the corner of another one (`cross`), or on a side of it, seen from the car."""
+    """A landmark is on a street, near the corner of another one (`cross`), or on a side of it, seen from the car."""
     NEAR = "near"
-    """A landmark lies near another one, or near an object."""
+    """A landmark is near another one, or near an object."""
     LOOKS = "looks"
     """The building or person at a landmark has a feature."""
     WEATHER = "weather"
@@ -78,7 +78,7 @@ class Predicate(enum.StrEnum):
     DOES = "does"
     """The car is carrying out an action."""
     WILL = "will"
-    """The car is going to carry out an action, by its present plan."""
+    """The car will carry out an action according to its current plan."""
     ARRIVES_IN = "arrives_in"
     """The car will stop at a landmark after a time."""
     DISTANCE = "distance"
@@ -86,7 +86,7 @@ class Predicate(enum.StrEnum):
     CLOSE = "close"
     """The route to a landmark is short."""
     KNOWS = "knows"
-    """The Co-Wizard knows where a landmark lies."""
+    """The Co-Wizard knows where a landmark is."""
     HAS_ROUTE = "has_route"
     """The Co-Wizard has a route to a landmark."""
     RIGHT_WAY = "right_way"
@@ -96,7 +96,7 @@ class Predicate(enum.StrEnum):
     LOCALISED = "localised"
     """The Co-Wizard knows where the car is."""
     LIGHTS_ON = "lights_on"
-    """The head lights are on."""
+    """The headlights are on."""
     DRIVES_AT = "drives_at"
     """The car drives at a speed, or is set to it."""
     ARRIVED = "arrived"
@@ -106,7 +106,7 @@ class Predicate(enum.StrEnum):
     SAFE = "safe"
     """Nothing endangers the drive: no hazard, poor view or failed sensor."""
     BEHIND = "behind"
-    """A landmark lies behind the car."""
+    """A landmark is behind the car."""
     PASSED = "passed"
     """The car has driven past a landmark, a number of times."""
     TRIED = "tried"
@@ -123,10 +123,10 @@ class Predicate(enum.StrEnum):
     GOAL = "goal"
     """Current destination of the car."""
     TOLD = "told"
-    """The other speaker has told the speaker to do something."""
+    """The other speaker has given the speaker an order."""
     # reasons and feelings
     BECAUSE = "because"
-    """An effect has a cause, or had it at a time of the session [s]."""
+    """An effect has a cause, or had one at a time of the session [s]."""
     FEELS = "feels"
     """The speaker has a feeling, which may have a cause."""
 
@@ -192,7 +192,7 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
 )
 """Arguments of each predicate, by name; all of them may be left out."""
 
-_DEEPEST = 3  # propositions within one another
+_DEEPEST = 3  # nested propositions
 
 
 @shared
@@ -232,7 +232,7 @@ class Proposition:
 
     @property
     def asks(self) -> bool:
-        """Returns whether an argument is asked for, here or in a proposition inside."""
+        """Returns whether an argument is queried, here or in a nested proposition."""
         return any(value is ASKED or (isinstance(value, Proposition) and value.asks) for _, value in self.arguments)
 
     @property
@@ -241,17 +241,17 @@ class Proposition:
         return Proposition(self.predicate, self.arguments, not self.negated)
 
     def contains(self, other: Proposition) -> bool:
-        """Returns whether this proposition includes everything that another one states."""
+        """Returns whether this proposition entails another one."""
         same = self.predicate is other.predicate and self.negated is other.negated
         return same and set(other.arguments) <= set(self.arguments)
 
     def without(self, *names: str) -> Proposition:
-        """Returns the proposition without some arguments."""
+        """Returns the proposition without the given arguments."""
         kept = tuple((name, value) for name, value in self.arguments if name not in names)
         return Proposition(self.predicate, kept, self.negated)
 
     def slots(self) -> frozenset[SlotValue]:
-        """Returns the slot values among the arguments; an argument that is asked for gives "Queried" of its slot."""
+        """Returns the slot values among the arguments; a queried argument gives "Queried" of its slot."""
         found: set[SlotValue] = set()
         for name, value in self.arguments:
             if isinstance(value, Proposition):
@@ -275,7 +275,7 @@ class Proposition:
 
         Args:
             data: decoded JSON.
-            where: beginning of error messages.
+            where: prefix of error messages.
             depth: number of propositions around it.
 
         Raises:
@@ -318,7 +318,7 @@ def encode_meaning(propositions: Iterable[Proposition]) -> str:
 
 
 def find_meaning(text: str) -> tuple[Proposition, ...] | None:
-    """Returns the propositions in the JSON that `encode_meaning` writes; None if the text is anything else."""
+    """Returns the propositions in the JSON that `encode_meaning` writes; None for any other text."""
     try:
         return read_meaning(json.loads(text)) if text else ()
     except (ValueError, RecursionError):

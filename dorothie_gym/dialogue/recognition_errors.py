@@ -1,4 +1,4 @@
-"""Measured profile of recognition errors: how their rate depends on speaker, noise in the car and class of word."""
+"""Measured profile of recognition errors: dependence of their rate on speaker, noise in the car and class of word."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ class ErrorProfile:
         substitutions: share of substitutions among the errors.
         deletions: share of deletions among the errors; the rest are insertions.
         speakers: error rates by speaker relative to `rate`; 1 for speakers that are not listed.
-        noises: likewise by noise in the car.
-        word_classes: likewise by class of word.
+        noises: the same by noise in the car.
+        word_classes: the same by class of word.
     """
 
     rate: float

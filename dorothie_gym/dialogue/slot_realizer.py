@@ -100,7 +100,7 @@ class SlotRealizer:
             wording: details of the act.
             style: style of the speaker.
             scene: dialogue history and objects in view.
-            names: largest number of names per slot.
+            names: maximum number of names per slot.
             of_rider: whether the friends and home in question are the speaker's.
         """
         self.random = draw
@@ -144,13 +144,13 @@ class SlotRealizer:
         return _listed(spoken)
 
     def landmark(self, named: bool = False) -> str:
-        """Returns the names of the landmarks, or anaphoric references unless they have to be `named`."""
+        """Returns the names of the landmarks, or anaphoric references unless they must be `named`."""
         values = self.values[_LANDMARK]
         kept = tuple(value for value in values if value is not self._without) if self._without else values
         return self._named(kept or values, named)
 
     def street(self, named: bool = False) -> str:
-        """Returns the names of the streets, or anaphoric references unless they have to be `named`."""
+        """Returns the names of the streets, or anaphoric references unless they must be `named`."""
         return self._named(self.values[_STREET], named)
 
     def spoken(self, slot: Slot, form: str) -> str:
@@ -277,7 +277,7 @@ class SlotRealizer:
         return name
 
     def _of_person(self, value: SlotValue) -> str | None:
-        """Returns a name by a person, "Mateo's house" or "my friend Priya"; None by chance or if it is not known."""
+        """Returns a name by a person, "Mateo's house" or "my friend Priya"; None if unknown, or at random."""
         scene = self._scene
         owner, friend = value is LandmarkName.HOUSE and scene.owner, value is LandmarkName.PERSON and scene.friend
         elsewhere = not _ELSEWHERE.isdisjoint(self.values.get(Slot.STATUS, ()))

@@ -32,7 +32,7 @@ class SpeakerStyle:
         repairs: share of names that follow a wrong name as its correction.
         habit: share of choices that use the favourite alternative; below 1.
         idiolect: number that determines the favourite alternatives; not negative.
-        address: vocative for the other speaker; empty for none.
+        address: vocative for the other speaker; empty if there is none.
         addressing: share of sentences with the vocative.
         proper: whether sentences start with a capital letter and end with a full stop.
 
@@ -79,7 +79,7 @@ def draw_style(role: Role, rng: np.random.Generator, leanings: Mapping[str, floa
     Args:
         role: the Ad-Wizard shares the distribution of the participant, the car itself that of the Co-Wizard.
         rng: source of randomness; the same numbers are drawn for all leanings.
-        leanings: places in [0, 1] of some shares in their ranges, and of "register" from blunt to polite.
+        leanings: places in [0, 1] of shares within their ranges, and of "register" from blunt to polite.
     """
     leanings = leanings or {}
     spread = _spreads()[Role.PARTICIPANT if role in (Role.PARTICIPANT, Role.AD_WIZARD) else Role.CO_WIZARD]

@@ -6,7 +6,7 @@ The rules use utterances and arrivals only, so that a live session and its recor
    several targets in one utterance, the last one without a finished or pending status counts.
 2. An act with a target continues the transaction of that landmark, or starts one. This includes pending goals (Pending)
    and finished goals (Complete, Abandoned), which do not replace the current transaction. Where several goals bear the
-   name of the landmark, such as two houses, one that is named after the last one is over is the next of them.
+   name of the landmark, such as two houses, a name after the end of the last one refers to the next of them.
 3. An act without a target belongs to the transaction of its exchange, otherwise to the current transaction.
 4. A transaction ends when its landmark is reached or abandoned. The next command, or question for the next goal, starts
    another transaction, whose landmark is None until one is named.
@@ -149,7 +149,7 @@ class TransactionTracker:
         return next((each for each in reversed(self.transactions) if each.landmark is landmark), None)
 
     def _is_next_of_its_name(self, landmark: LandmarkName) -> bool:
-        """Returns whether the goals of a name talked about so far are over, and there is another one."""
+        """Returns whether the goals with a name discussed so far have ended, and there is another one."""
         known = [each for each in self.transactions if each.landmark is landmark]
         return bool(known) and all(each.over for each in known) and len(known) < self._goals[landmark]
 

@@ -20,7 +20,7 @@ from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.support.processors import available_processors
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
-"""A town, or several that the environments of a batch play in turn."""
+"""A town, or several over which the environments of a batch cycle."""
 
 
 C = TypeVar("C", bound=EnvConfig | NavigationConfig)

@@ -179,7 +179,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         return self.engine.observations.of(), rewards, terminations, truncations, infos
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the whole session: an array (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
+        """Draws the session into an array: (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
         return self._view.render(self.session)
 
     def close(self) -> None:
@@ -281,7 +281,7 @@ parallel_env = raw_env = DuoWizardEnv
 
 
 def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict | None]:
-    """Returns the environment in PettingZoo's turn-based form; arguments as of `DuoWizardEnv`."""
+    """Returns the environment in PettingZoo's turn-based form; arguments as in `DuoWizardEnv`."""
     return OrderEnforcingWrapper(TurnBasedDuoWizard(parallel_env(**arguments)))
 
 

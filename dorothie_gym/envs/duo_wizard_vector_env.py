@@ -49,7 +49,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     """Many sessions of `DuoWizardEnv` in one batch, by agent as in PettingZoo and stacked as in Gymnasium.
 
-    Worlds, observations and masks of all sessions lie in arrays, which compiled code steps on threads; the dialogue is
+    Worlds, observations and masks of all sessions are in arrays, which compiled code steps on threads; the dialogue is
     computed in Python. A session depends on its seed and its actions, and neither on the others, nor on its place among
     them, nor
     on the number of threads: it is that of a `DuoWizardEnv`.
@@ -94,7 +94,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
 
         Args:
             num_envs: number of environments.
-            town: a town as in `DuoWizardEnv`, or several that the environments play in turn.
+            town: a town as in `DuoWizardEnv`, or several over which the environments cycle.
             storyboard: as in `DuoWizardEnv`.
             config: as in `DuoWizardEnv`, with symbolic perception. Pictures of a camera are drawn on the threads.
             render_mode: None or "rgb_array".
@@ -197,7 +197,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     ) -> tuple[
         dict[str, Stacked], dict[str, NDArray[np.float64]], dict[str, Flags], dict[str, Flags], dict[str, Infos]
     ]:
-        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
+        """Steps every environment by one decision; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: by agent the fields of its action, each an array (num_envs, ...) or a sequence of `num_envs`
@@ -209,7 +209,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         Raises:
             ValueError: an action is missing or malformed; the message names environment, agent and field. Nothing was
                 played.
-            gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
+            gymnasium.error.ResetNeeded: an environment was never reset, or has ended and is not reset automatically.
         """
         begun = np.array([engine.has_begun for engine in self.engines])
         mode, again = self.autoreset_mode, self._over.copy()
@@ -252,7 +252,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     # --- Parts of a step ----------------------------------------------------------------------------------------------
 
     def _play(self, actions: Sequence[Mapping[str, ActionMapping]], playing: Flags) -> dict[int, StepOutcome]:
-        """Plays a decision in some environments; returns the outcomes by number of the environment."""
+        """Steps the given environments by one decision; returns the outcomes by number of the environment."""
         decoded = [
             batch.decode({row: actions[number] for row, number in enumerate(batch.numbers) if playing[number]})
             for batch in self.batches

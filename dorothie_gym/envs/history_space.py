@@ -222,7 +222,7 @@ def check_action(action: object, space: spaces.Dict) -> ActionMapping:
 
 
 def clean_text(words: str) -> str:
-    """Returns words that fit a `Text` space: other characters become "?", and long text is truncated."""
+    """Returns words that are valid in a `Text` space: other characters become "?", and long text is truncated."""
     return "".join(character if character in TEXT_CHARACTERS else "?" for character in words)[:MAX_UTTERANCE]
 
 

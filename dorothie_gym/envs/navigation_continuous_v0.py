@@ -86,7 +86,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     """Driving with throttle, steering and brake.
 
     ## Description
-    As `NavigationEnv`, guided turn by turn, but the agent controls the car itself: it follows the path, keeps to the
+    Like `NavigationEnv`, guided turn by turn, but the agent controls the car itself: it follows the path, keeps to the
     limits, and stops for lights, people and vehicles, and at the goals. Instructions become the path ahead: turns, lane
     switches and U-turns are planned for the driver.
 
@@ -103,17 +103,17 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     braking.
 
     ## Rewards
-    As `NavigationEnv`.
+    Like `NavigationEnv`.
 
     ## Episode End
-    As `NavigationEnv`; it also terminates when the car is 15 m off the road (`info["reason"]` is "left the road").
+    Like `NavigationEnv`; it also terminates when the car is 15 m off the road (`info["reason"]` is "left the road").
 
     ## Arguments
-    As `NavigationEnv` without `guidance`, and:
+    Like `NavigationEnv` without `guidance`, and:
 
     - `decision_frequency` [Hz], which divides 30.
     - `control`: "pedals" or "acceleration", with which random actions explore more: a car whose throttle and brake
-      are drawn apart hardly moves.
+      are drawn independently hardly moves.
 
     ## Version History
     - v0: first version.
@@ -164,7 +164,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
         Raises:
             ValueError: the action does not consist of as many finite numbers as the action space.
-            gymnasium.error.ResetNeeded: no session is in progress, or it is over.
+            gymnasium.error.ResetNeeded: no session has begun, or it has ended.
         """
         values = controls_of("action", action, self.control)
         self._check_begun()

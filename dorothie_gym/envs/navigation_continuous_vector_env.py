@@ -33,7 +33,7 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
     acceleration and steer.
 
     ## Episode End
-    As `NavigationContinuousEnv`, with the autoreset modes of `NavigationVectorEnv`.
+    Like `NavigationContinuousEnv`, with the autoreset modes of `NavigationVectorEnv`.
 
     ## Arguments
     `num_envs`, `town`, `threads`, `autoreset_mode` and `render_mode` as in `NavigationVectorEnv`, the others as in

@@ -43,9 +43,9 @@ class NavigationEnv(DrivingEnv[np.int64]):
     With `observation="camera"`, `Box(0, 255, (84, 84, 3), uint8)`: the picture of the car's camera, above a dashboard
     in the lowest rows. From the left: icon of the instruction (an arrow into the sector of a turn, lane switch, U-turn,
     stop, start), or needle to the goal that was named; icon of the manoeuvre that the car prepares, in green; distance
-    to the instruction's place on gauges of 112 m and 28 m (red behind it), or to the goal on one of 560 m; speed
+    to the instruction's place on gauges of 112 m and 28 m (red once past it), or to the goal on one of 560 m; speed
     (white) and cruise speed (blue) on gauges of 28 m/s, with red marks at the limit; lamps for a hazard ahead and the
-    head lights.
+    headlights.
 
     ## Action Space
     `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` marks the feasible actions (int8, for
@@ -75,7 +75,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `camera`: `CameraConfig` of the pictures that are observed; None for 84 x 84 pixels.
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `view`: picture of `render()`: `"role"` (what the Co-Wizard observes, and the instructions) or `"session"`
-      (everything).
+      (the whole session).
     - `render_view`: `"map"`, `"camera"` (the windscreen) or `"both"`, side by side.
 
     `reset(seed=...)` plays the scenario of `DuoWizardEnv` for this seed; `reset(options={"scenario": Scenario})`
@@ -134,7 +134,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
 
         Raises:
             ValueError: the action is not a `NavigationAction`.
-            gymnasium.error.ResetNeeded: no session is in progress, or it is over.
+            gymnasium.error.ResetNeeded: no session has begun, or it has ended.
         """
         self._check_begun()
         return self._play(whole_number("action", action, 0, len(ACTIONS) - 1))

@@ -41,13 +41,13 @@ class NavigationVectorEnv(DrivingVectorEnv):
     `action_masks()`, which sb3-contrib calls.
 
     ## Episode End
-    As `NavigationEnv`. `metadata["autoreset_mode"]` selects the reset: by default an environment that ended is reset by
-    the next step, whose action it ignores.
+    Like `NavigationEnv`. `metadata["autoreset_mode"]` selects the reset: by default an environment that ended is reset
+    by the next step, whose action it ignores.
 
     ## Arguments
-    - `num_envs`: how many environments.
-    - `town`: a town as in `NavigationEnv`, or a sequence of them, which the environments play in turn.
-    - `threads`: how many step the environments at most, by default one per processor.
+    - `num_envs`: number of environments.
+    - `town`: a town as in `NavigationEnv`, or a sequence of towns over which the environments cycle.
+    - `threads`: maximum number of threads that step the environments, by default one per processor.
     - `autoreset_mode`: Gymnasium's. `options["reset_mask"]` of `reset` resets some environments only.
     - `render_mode`: None or `"rgb_array"`; `render()` draws the first environment, `render_one(number)` any.
     - The others as in `NavigationEnv`.

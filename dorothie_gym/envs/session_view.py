@@ -31,7 +31,7 @@ def metadata_at(decision_frequency: float) -> dict[str, object]:
 
 
 Notes: TypeAlias = tuple["pictures.RoleView | None", "list[pictures.SpokenLine]"]
-"""What was noted of a session for its pictures: what the role has seen, and what was said."""
+"""Notes on a session for its pictures: what the role has seen, and what was said."""
 
 METADATA: Final[dict[str, object]] = metadata_at(2.0)
 """Metadata of the environments with two decisions per second."""

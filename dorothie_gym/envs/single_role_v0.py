@@ -59,8 +59,8 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
 
     ## Arguments
     - `role`: role of the agent, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
-    - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`, `render_view`: as of `DuoWizardEnv`.
-    - `view`: picture of `render()`: `"role"` (what the role observes) or `"session"` (everything).
+    - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`, `render_view`: as in `DuoWizardEnv`.
+    - `view`: picture of `render()`: `"role"` (what the role observes) or `"session"` (the whole session).
     - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
 
     `reset(seed=...)` plays the session that `DuoWizardEnv` has for this seed; the seeds of the partners follow from it.

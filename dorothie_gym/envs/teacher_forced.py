@@ -161,11 +161,11 @@ class _Library(CachedViews):
     """Sessions of a split, read on demand.
 
     Args:
-        corpus: as of `TeacherForcedEnv`; `split` likewise.
-        split: see there.
+        corpus: as in `TeacherForcedEnv`.
+        split: as in `TeacherForcedEnv`.
         task: task of the points.
-        limits: largest numbers of landmarks and streets.
-        strict: as of `TeacherForcedEnv`.
+        limits: maximum numbers of landmarks and streets.
+        strict: as in `TeacherForcedEnv`.
     """
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("read",)

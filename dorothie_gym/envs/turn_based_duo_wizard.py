@@ -26,7 +26,7 @@ class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | 
         parallel.turns = self
 
     def clone_state(self) -> State:
-        """Returns the present state, see `DuoWizardEnv.clone_state`."""
+        """Returns the current state, see `DuoWizardEnv.clone_state`."""
         return self.env.clone_state()
 
     def restore_state(self, state: State) -> None:
@@ -34,7 +34,7 @@ class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | 
         self.env.restore_state(state)
 
     def turn_values(self) -> dict[str, object]:
-        """Returns what changes beside the session: whose turn it is, the actions of the others, results to be seen."""
+        """Returns the state outside the session: whose turn it is, actions of the others, results not yet returned."""
         return {name: value for name, value in vars(self).items() if name not in self._constant}
 
     def apply_turn_values(self, values: dict[str, object]) -> None:

@@ -1,9 +1,9 @@
 """Connections of a web server under floods: which are kept when there are too many, and in which order they are read.
 
-Whoever holds a seat or another valid secret is known and keeps its connection. All others are strangers: they share
-a limited number of places, and have a limited time. When the places are taken, a new connection is still let in. Those
-that give way are of the address that has most strangers: first those that ask too often, then the oldest. So a browser
-that asks at once is served, also if the flood comes from its address.
+A connection with a seat or another valid secret is known and is kept. All others are strangers: they share
+a limited number of places, and have a limited time. When the places are taken, a new connection is still admitted.
+Those of the address with most strangers give way: first those with too many requests, then the oldest. A browser that
+sends its request at once is thus served, even if the flood comes from its address.
 
 Connections are read in turns, so that a flood of requests cannot occupy the event loop.
 """
@@ -19,13 +19,13 @@ from itertools import chain, islice
 from typing import Final, Protocol
 
 MOST_STRANGERS: Final = 2000
-"""Most connections without a valid secret: 300 browsers that load the page at once."""
+"""Maximum number of connections without a valid secret: 300 browsers that load the page at once."""
 
 MOST_KNOWN: Final = 1500
-"""Most connections with a valid secret; further ones count as strangers."""
+"""Maximum number of connections with a valid secret; further ones count as strangers."""
 
 GIVING_WAY: Final = 16
-"""Connections that give way at once: they are chosen less often, which costs less."""
+"""Number of connections that give way together, so that they are chosen less often, which costs less."""
 
 PATIENCE: Final = 1.0
 """Time by which a connection that has sent its request may be older than others before it gives way [s]."""
@@ -40,20 +40,20 @@ ANSWER_SECONDS: Final = 60.0
 """Time of a stranger to receive an answer [s]."""
 
 REQUESTS: Final = (60.0, 10.0)
-"""Requests of a connection that are served in turn at once, and per second: a page has 20 files."""
+"""Requests of a connection that are served in one burst, and per second: a page has 20 files."""
 
 ENDED_AT_ONCE: Final = 50
-"""Connections whose time is over that are ended in one pass: those of a flood are late together, and all of them would
+"""Timed-out connections that are ended in one pass: those of a flood time out together, and all of them would
 keep the seats waiting for 0.2 s."""
 
 TURNS_AT_ONCE: Final = 8
 """Turns between two passes of the event loop, in which seats are served: 10 ms of work."""
 
 PAUSE: Final = 0.002
-"""Shortest pause between two series of turns if somebody waits for one [s], for the threads of the sessions."""
+"""Shortest pause between two series of turns if connections wait for one [s], for the threads of the sessions."""
 
 REST: Final = 1.0
-"""Length of the pause after a series relative to the time that it took with what it set off: strangers get half of the
+"""Length of the pause after a series relative to the time of the series and its consequences: strangers get half of the
 time of the event loop, however much a turn costs. A new websocket costs 1.5 ms, ten times as much as a page."""
 
 
@@ -61,7 +61,7 @@ class TokenBucket:
     """Tokens that are taken one by one and grow back at a constant rate.
 
     Args:
-        burst: most tokens, and those at the beginning.
+        burst: maximum and initial number of tokens.
         rate: tokens that grow back per second [1/s].
     """
 
@@ -112,9 +112,9 @@ class Visitor:
         transport: the connection itself.
         since: clock at which the server began to wait for its request [s].
         known: whether it has shown a valid secret.
-        served: whether the server has something to do for it; otherwise it waits for the client.
+        served: whether the server is working for it; otherwise it waits for the client.
         socket: whether it is a websocket.
-        heavy: whether it asks too often.
+        heavy: whether it sends too many requests.
     """
 
     address: str
@@ -127,7 +127,7 @@ class Visitor:
     requests: TokenBucket = field(default_factory=lambda: TokenBucket(*REQUESTS))
 
     def is_late(self, now: float) -> bool:
-        """Returns whether its time is over; `now` is the clock [s]."""
+        """Returns whether it has timed out; `now` is the clock [s]."""
         if self.known and (self.socket or self.served):
             return False
         return now - self.since > (KNOWN_SECONDS if self.known else ANSWER_SECONDS if self.served else STRANGER_SECONDS)
@@ -171,7 +171,7 @@ class Visitors:
         return visitor
 
     def leave(self, visitor: Visitor) -> None:
-        """Forgets a connection that has ended."""
+        """Removes a connection that has ended."""
         self._known.discard(visitor)
         if visitor in self._strangers:
             del self._strangers[visitor]
@@ -187,14 +187,14 @@ class Visitors:
             visitor.known = True
 
     def sweep(self) -> None:
-        """Ends connections whose time is over, `ENDED_AT_ONCE` at most."""
+        """Ends connections that have timed out, at most `ENDED_AT_ONCE`."""
         now = self._clock()
         late = (each for each in chain(self._strangers, self._known) if each.is_late(now))
         for visitor in list(islice(late, ENDED_AT_ONCE)):
             self._end(visitor)
 
     def close(self) -> None:
-        """Ends the connections of all strangers, and admits no more: the server stops."""
+        """Ends the connections of all strangers, and admits no others: the server stops."""
         self._closed = True
         for visitor in list(self._strangers):
             self._end(visitor)
@@ -215,7 +215,7 @@ class Visitors:
 
 
 class Reader(Protocol):
-    """Connection with something to be read."""
+    """Connection with unread data."""
 
     transport: asyncio.Transport
     visitor: Visitor
@@ -225,7 +225,7 @@ class Reader(Protocol):
 
 
 class Lane:
-    """Connections that wait; addresses take turns, and of an address the newest and the oldest connection in turn.
+    """Waiting connections; addresses take turns, and of an address the newest and the oldest connection alternate.
 
     If a flood is more than can be read, the oldest connections have little hope of an answer in time, and a person's
     browser is among the newest. If it is less, the newest ones alone would keep some of the others waiting for long.
@@ -253,7 +253,7 @@ class Lane:
 
 
 class Turns:
-    """Order in which connections are read: known people first; those that ask too often come a lane later."""
+    """Order in which connections are read: known people first; those with too many requests are one lane lower."""
 
     def __init__(self) -> None:
         self._lanes = [Lane(), Lane(), Lane()]

@@ -24,10 +24,10 @@ MAX_BODY: Final = 256 * 1024
 """Largest body of a request [bytes]: 50 long texts of a questionnaire take as much, marks of an utterance 1 kB."""
 
 MOST_CALLERS: Final = 10_000
-"""Most callers whose requests a gate counts."""
+"""Maximum number of callers whose requests a gate counts."""
 
 RETRY_SECONDS: Final = 2
-"""Time after which a page that was refused as one of too many asks again [s]."""
+"""Time after which a page that was refused for too many requests retries [s]."""
 
 Handler: TypeAlias = Callable[[Request], Awaitable[Response]]
 
@@ -39,7 +39,7 @@ class RequestError(HTTPException):
 
     Args:
         status: status of the answer.
-        reason: what the person reads.
+        reason: message for the person.
         retry: time after which the same request may succeed [s]; None if it will not.
     """
 
@@ -71,7 +71,7 @@ class Wording:
         foreign: reason for requests of other pages.
         hasty: reason for too many requests.
         large: reason for a body of more than `MAX_BODY` bytes.
-        malformed: reason for a malformed body; `{}` stands for details.
+        malformed: reason for a malformed body; `{}` is replaced by details.
     """
 
     field: str
@@ -92,7 +92,7 @@ class Gate:
             recognises people by cookies, which browsers send by themselves.
 
     Attributes:
-        budgets: requests that each caller has left, by key; those who asked last are at the end.
+        budgets: remaining requests of each caller, by key; the most recent callers are at the end.
     """
 
     def __init__(

@@ -20,10 +20,10 @@ LOCAL_NAMES: Final = frozenset({"localhost", "localhost.localdomain", "ip6-local
 class ForeignHosts:
     """Refuses browsers that used a name that does not belong to this machine ("DNS rebinding").
 
-    The owner of a name can let it point to the server, and pages of the owner then count as pages of the server. This
-    takes a name, so addresses are safe. It takes a page without TLS, as nobody has a certificate for the name of
-    somebody else, so requests of pages with TLS are safe: they came through a proxy. Otherwise the name must be
-    one of this machine, or the one at which it was told to listen (`app.state.host_names`).
+    The owner of a name can let it point to the server, and pages of the owner then count as pages of the server. The
+    attack requires a name, so addresses are safe. It requires a page without TLS, because the owner has no certificate
+    for a name of this machine, so pages with TLS are safe: they came through a proxy. Otherwise the name must be one
+    of this machine, or one at which it was configured to listen (`app.state.host_names`).
 
     Websockets and requests that change something have an `Origin`, which scripts cannot change. Programs other than
     browsers send none, and are not refused. A page is refused only to inform the person.
@@ -70,7 +70,7 @@ class ForeignHosts:
 
 
 def host_name(host: str) -> str:
-    """Returns the name or address of a header `Host`, without its port, in small letters."""
+    """Returns the name or address of a header `Host`, without its port, in lower case."""
     host = host.strip().lower()
     if host.startswith("["):
         return host[1:].partition("]")[0]
@@ -87,7 +87,7 @@ def is_address(name: str) -> bool:
 
 
 def is_cleartext_browser(headers: Headers) -> bool:
-    """Returns whether a request is of a browser whose page was loaded without TLS, as far as this is known."""
+    """Returns whether a request comes from a browser whose page was loaded without TLS, if this is known."""
     origin = headers.get("origin")
     if origin is not None:
         return not origin.lower().startswith("https://")

@@ -60,7 +60,7 @@ def page(path: str, title: str, subject: str, script: str, *styles: str) -> Rout
     Args:
         path: path of the page.
         title: title until the script sets another one.
-        subject: what the link at the top leads to, for people who use the keyboard.
+        subject: target of the link at the top, for people who use the keyboard.
         script: path of the script.
         styles: paths of further style sheets.
     """

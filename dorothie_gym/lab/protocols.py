@@ -24,7 +24,7 @@ PART: Final = 16 * 1024
 """Bytes of a connection that are read in one turn; parts of a body may be as small as a byte, and cost as much."""
 
 FIRST_BYTES: Final = 32 * 1024
-"""Most bytes of a websocket that has not joined: joining takes 60."""
+"""Maximum number of bytes of a websocket that has not joined: joining takes 60."""
 
 SLICE: Final = 4 * 1024
 """Bytes of such a websocket that are read in one turn: they may be 700 pings."""
@@ -56,7 +56,7 @@ def recognise(connection: HTTPConnection) -> None:
 
 
 class _Flow(FlowControl):
-    """Flow of a connection that tells when a handler wants to read on."""
+    """Flow of a connection that reports when a handler wants to continue reading."""
 
     def __init__(self, transport: asyncio.Transport, resumed: Callable[[], None]) -> None:
         super().__init__(transport)
@@ -98,7 +98,7 @@ class GuardedHttp(H11Protocol):
         self.app_state = {**self.app_state, _GUARD: guard}
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forgets the connection."""
+        """Removes the connection."""
         self._guard.visitors.leave(self.visitor)
         self._unread.clear()
         super().connection_lost(exc)
@@ -171,7 +171,7 @@ class GuardedHttp(H11Protocol):
             self._guard.turns.ask(self)
 
     def shutdown(self) -> None:
-        """Ends the connection after the present answer."""
+        """Ends the connection after the current answer."""
         if self.conn.our_state is h11.ERROR:
             self.transport.abort()
         else:
@@ -192,7 +192,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         self._refused = False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forgets the connection."""
+        """Removes the connection."""
         self._guard.visitors.leave(self.visitor)
         self._unread.clear()
         super().connection_lost(exc)

@@ -1,11 +1,11 @@
 """Web server of the commands with people in browsers: how a request is accepted, limited and answered.
 
-A request takes this way:
+The path of a request:
 
-1. Its connection gets a place, or another one gives way (`admission.Visitors`).
-2. It is read a part at a time, in turn with the other connections (`protocols`, `admission.Turns`).
-3. Browsers that came by the name of another machine are refused (`hosts.ForeignHosts`).
-4. The gate of the server asks who sends it, receives its body up to a limit, and counts it (`gate.Gate`).
+1. Its connection receives a place, or another one gives way (`admission.Visitors`).
+2. It is read in parts, alternating with the other connections (`protocols`, `admission.Turns`).
+3. Browsers that used the name of another machine are refused (`hosts.ForeignHosts`).
+4. The gate of the server identifies the sender, receives its body up to a limit, and counts it (`gate.Gate`).
 5. The handler answers, or an error says why not; each answer forbids content of other hosts (`HEADERS`).
 
 Pages and static files (`pages`) and websockets, whose first message shows their secret, need no gate.
@@ -49,7 +49,7 @@ MAX_MESSAGE: Final = 16 * 1024
 """Largest message of a websocket [bytes]; a server that expects shorter ones refuses those with a reason."""
 
 DESCRIPTORS: Final = 8192
-"""Open files that the process asks the system for: connections, records and pictures."""
+"""Open files that the process requests from the system: connections, records and pictures."""
 
 FOR_CONNECTIONS: Final = 0.75
 """Share of the open files that connections may take; the rest is for files."""
@@ -104,7 +104,7 @@ class WebServer(Server):
             listener.listen(BACKLOG)  # asyncio has set it to the number of connections that it accepts at once
 
     async def on_tick(self, counter: int) -> bool:
-        """Ends connections whose time is over; returns whether the server must stop."""
+        """Ends connections that have timed out; returns whether the server must stop."""
         if counter in FREEZES:
             gc.freeze()
         self._visitors.sweep()
@@ -175,7 +175,7 @@ class Outermost:
         except (ClientDisconnect, ClientDisconnected):
             logger.debug("a client has gone before its request was complete")
             status = 400
-        except asyncio.CancelledError:  # uvicorn cancels what is not over when it stops
+        except asyncio.CancelledError:  # uvicorn cancels unfinished tasks when it stops
             logger.debug("the server stops before an answer is complete")
             status = 503
         except Exception:
@@ -224,7 +224,7 @@ class SecurityHeaders:
 
 
 def connections_allowed(wanted: int) -> int:
-    """Returns how many connections the limit of open files allows, at most those wanted, after raising that limit."""
+    """Returns how many connections, up to a requested number, the raised limit of open files allows."""
     try:
         import resource
     except ImportError:  # Windows, which has no such limit
@@ -249,7 +249,7 @@ def quieten(names: tuple[str, ...]) -> None:
 
 @dataclass
 class _Kind:
-    """Messages of one kind: when one was logged, and how many were not."""
+    """Messages of one kind: time of the last logged one, and number of those not logged since."""
 
     logged: float
     left_out: int = 0

@@ -70,7 +70,7 @@ _Column: TypeAlias = "list[object] | dict[str, list[list[int]]]"
 def pack(town: Town, key: str) -> bytes:
     """Returns a town as the bytes of an `.npz` file.
 
-    All arrays lie one after another in the member `floats`. Everything else is JSON in the member `document`; its
+    All arrays are concatenated in the member `floats`. The rest is JSON in the member `document`; its
     floats are written with all digits. The zip comment at the end is the SHA-256 of all preceding bytes.
 
     Args:
@@ -252,7 +252,7 @@ def _faults(town: Town) -> Iterator[str]:
 # --- Entries in the cache folder -------------------------------------------------------------------------------------
 
 MOST_TOWNS = 64
-"""Largest number of entries; the oldest are removed beyond it. A town takes up to some megabytes."""
+"""Maximum number of entries; the oldest are removed beyond it. A town takes up to some megabytes."""
 
 _log = logging.getLogger(__name__)
 
@@ -276,7 +276,7 @@ def through_cache(path: Path, read: Callable[[Path], Town]) -> Town:
     town = _recall(folder, key)
     if town is None:
         town = read(path)
-        if _content(path) == content:  # else the file changed meanwhile and the version of the town is unknown
+        if _content(path) == content:  # else the file changed in between and the version of the town is unknown
             _keep(folder, key, town)
     return town
 
@@ -289,7 +289,7 @@ def towns_folder() -> Path | None:
 
 @functools.cache
 def compiler_digest() -> str | None:
-    """Returns a digest of everything except the source file that determines the compiled town.
+    """Returns a digest of all that determines the compiled town except its source file.
 
     It covers the sources of this package and of the arithmetic that it uses (`angles`, `portable_math`,
     `portable_arrays` and their compilation), and the versions of numpy and scipy, which may round differently. None if

@@ -190,7 +190,7 @@ def _features(lane: Lane) -> tuple[float, ...]:
 
 
 def _edges(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Returns the edges (m, 2) and their types (m,); of several edges between two lanes the first type counts."""
+    """Returns the edges (m, 2) and their types (m,); of several edges between two lanes, only the first is kept."""
     sides = {
         LinkType.LANE_CHANGE_LEFT: EdgeType.LEFT_LANE_CHANGE,
         LinkType.LANE_CHANGE_RIGHT: EdgeType.RIGHT_LANE_CHANGE,
@@ -216,7 +216,7 @@ def _u_turns(lanes: Sequence[Lane]) -> Iterator[tuple[int, int]]:
 
 
 def _aside(lane: Lane, other: Lane) -> tuple[bool, int, float]:
-    """Returns the rank of an opposite lane: first those beside the middle of the lane, innermost first; then by gap."""
+    """Returns the rank of an opposite lane: first those beside the centre of the lane, innermost first; then by gap."""
     middle = lane.position(lane.length / 2)
     station, offset = other.project(middle)
     beyond = not 0.0 < station < other.length

@@ -20,7 +20,7 @@ from dorothie_gym.support.portable_math import wrap_degrees
 
 # Largest change of direction at which a street continues across a junction [degrees].
 STREET_BEND = 35.0
-# Smallest number of streets of a large map, and largest number of any map.
+# Minimum number of streets of a large map, and maximum number of any map.
 FEWEST_STREETS, MOST_STREETS = 8, 14
 # Shortest length of lane in each part of a divided street [m].
 SHORTEST_PART = 100.0
@@ -158,7 +158,7 @@ def _pair(a: int, b: int) -> tuple[int, int]:
 def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, float]) -> list[list[int]]:
     """Divides streets until there are enough or the parts become too short.
 
-    The longest street that crosses a junction is cut at the junction nearest its middle; if there is none, the longest
+    The longest street that crosses a junction is cut at the junction nearest its centre; if there is none, the longest
     street of several roads is cut where two of them touch (exporters begin a new road at corners).
     """
     streets = [list(roads) for roads in streets]
@@ -279,7 +279,7 @@ def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
 
 
 def _calm(lanes: list[Lane]) -> list[Lane]:
-    """Returns the lanes slow enough to stop on, or all lanes if most of the map is fast."""
+    """Returns the lanes that are slow enough for stops, or all lanes if most of the map is fast."""
     calm = [lane for lane in lanes if lane.speed_limit <= FASTEST_STOP]
     return calm if 2 * len(calm) >= len(lanes) else lanes
 

@@ -33,8 +33,7 @@ STRAIGHT_RATIO = 3.0
 """A segment this many times longer than its neighbour is a straight beside a curve."""
 
 LEVEL_HEIGHT = 2.5
-"""Difference of height from which on lanes and bodies are on different levels and do not meet [m]: a bridge leaves
-more."""
+"""Difference in height at which lanes and bodies are on different levels and do not meet [m]; bridges leave more."""
 
 
 class LinkType(enum.StrEnum):
@@ -177,7 +176,7 @@ class Exit:
 
     Attributes:
         connector: lane that is entered first: a connector of a junction, or the next lane of the road.
-        lane: lane behind the junction.
+        lane: lane beyond the junction.
         type: turn type.
         angle: change of direction to the exit in whole degrees, at least -180 and below 180, positive left. All exits
             of a lane have different angles: equal ones are moved apart by one degree, from right to left.
@@ -287,7 +286,7 @@ class Sidewalk:
 
     Attributes:
         id: index in `Town.sidewalks`.
-        points: middle line (n, 3) [m].
+        points: centre line (n, 3) [m].
         width: [m].
         street: index of its street, or -1.
     """
@@ -360,8 +359,8 @@ def local_coordinates(
 ) -> tuple[float, float]:
     """Returns the lane coordinates of a world position: station [m] and distance to the right [m].
 
-    Refers to the closest point, of several to the first. Beyond both ends the lane continues straight. |lateral| plus
-    overshoot is never less than the distance to the centre line, which the grid index relies on.
+    Refers to the closest point, the first of equals. Beyond both ends the lane continues straight. The sum of |lateral|
+    and overshoot is never less than the distance to the centre line, which the grid index relies on.
     """
     first, last = offsets[row], offsets[row + 1] - 1
     best, at, share = np.inf, first, 0.0

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 CIRCLE_OFFSET = 1.7
-"""Three circles of radius 1.3 m, one in the middle and one this far to either side, cover a car of 5 m x 2 m [m]."""
+"""Three circles of radius 1.3 m, one in the centre and one this far to either side, cover a car of 5 m x 2 m [m]."""
 
 CLEARANCE = 3.1
 """Distance below which the circles of two vehicles driving straight (almost) touch [m]."""
@@ -64,7 +64,7 @@ class RightOfWay:
         for group in connectors.values():
             for one, other, touch in _meetings(group):
                 follows = one in sources[other] or other in sources[one] or sources[one] & sources[other]
-                if not follows:  # who comes from the same lane drives one behind the other anyway
+                if not follows:  # vehicles from the same lane drive one behind the other anyway
                     foes[one][other] = foes[other][one] = touch
         self._foes = {connector: tuple(sorted(others)) for connector, others in foes.items()}
         turns = _turns(town)

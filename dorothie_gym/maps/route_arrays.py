@@ -41,7 +41,7 @@ class SearchNode:
     """A node during a search: its cost so far [m], and the edge by which it is reached."""
 
     cost: Float
-    edge: Int32  # row of `RoutingGraph.edges`, or from their number on a row of `RouteSearch.extra`
+    edge: Int32  # row of `RoutingGraph.edges`, or, counting on from those, of `RouteSearch.extra`
     place: Int32  # place in the heap; -1: not reached yet, -2: settled
     arrival: Int32  # row of `RouteSearch.extra` that leads from here to the goal, or -1
 
@@ -94,7 +94,7 @@ _NO_PLACES = argument(empty_records(PlaceRecord, 1))
 
 
 def place_records(places: Sequence[tuple[int, float]]) -> RecordArray[PlaceRecord]:
-    """Returns places as records; a single record of zeros where there are none."""
+    """Returns places as records; a single record of zeros if there are none."""
     if not places:
         return _NO_PLACES
     return argument(filled_records(PlaceRecord, [(station, lane) for lane, station in places]))

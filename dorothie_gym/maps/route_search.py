@@ -48,7 +48,7 @@ def find_departures(
 
     Args:
         graph: the routing graph.
-        search: gets the edges.
+        search: receives the edges.
         lane: lane of the start.
         station: station of the start [m].
         goal_lane: lane of the goal, for edges that connect both directly; -1 for none.
@@ -95,7 +95,7 @@ def _add_manoeuvres(
                 number += 1
     if station <= nearest:
         number = add_u_turn(graph, lane, station, station, extra, number)
-    # also from the middle of the cell: just behind a junction there may be no oncoming lane
+    # also from the centre of the cell: just beyond a junction there may be no oncoming lane
     middle = (cell_at(graph, lane, station) - row.first + 0.5) * row.cell_size
     if station < middle <= nearest:
         number = add_u_turn(graph, lane, station, middle, extra, number)
@@ -157,7 +157,7 @@ def _add_arrivals(
 ) -> int:
     """Adds the edges to a goal: along its cell, and lane changes and U-turns that end before it in its cell.
 
-    Each node gets its cheapest one. Returns the new number of edges.
+    Each node keeps its cheapest one. Returns the new number of edges.
     """
     extra, nodes, row = search.extra, search.nodes, graph.lanes[lane]
     cell, goal = cell_at(graph, lane, station), len(graph.rows) - 2
@@ -193,7 +193,7 @@ def find_route(
 
     Args:
         graph: the routing graph.
-        search: gets the route.
+        search: receives the route.
         lane: lane of the start.
         station: station of the start [m].
         goal_lane: lane of the goal; one slightly behind the start on the same lane needs a detour.
@@ -256,8 +256,8 @@ def find_costs(
         station: station of the goal [m].
         blocked: impassable places.
         count: number of impassable places.
-        costs: (cells + lanes,) gets the costs from the starts of the cells; from the ends of the lanes, the costs from
-            the starts of the lanes behind, without the turn.
+        costs: (cells + lanes,) receives the costs from the starts of the cells and, for the ends of the lanes, those
+            from the starts of the next lanes, without the turn.
     """
     _prepare(graph, search, blocked, count, True)
     search.result[0].extra = _add_arrivals(graph, search, 0, lane, station, 0.0)

@@ -203,7 +203,7 @@ class Router:
 
     @property
     def search(self) -> RouteSearch:
-        """Scratch space of the present thread for `find_route`."""
+        """Scratch space of the current thread for `find_route`."""
         return self._searches.search
 
     def cell(self, lane: int, station: float) -> int:
@@ -222,7 +222,7 @@ class Router:
 
         Args:
             start: where the car is.
-            goal: goal; one slightly behind the start on the same lane needs a detour.
+            goal: the goal; a goal slightly behind the start on the same lane needs a detour.
             blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in
                 the cell of the start only those ahead count.
             manoeuvre_cost: extra cost of each lane change and U-turn [m].
@@ -272,12 +272,12 @@ class Router:
         """Returns which nodes of the graph a car can reach by driving on from a place, despite roadblocks (nodes,).
 
         Nodes are the starts of the cells in order, then the tails of the lanes. The cell of the start counts if the car
-        can return to its beginning.
+        can return to its start.
 
         Args:
             start: where the car is.
             blocked: impassable places, see `route`.
-            stands: stopping places before the roadblocks, at the beginnings of the blocked sections.
+            stands: stopping places before the roadblocks, at the starts of the blocked sections.
             held: stopping place of the car before the next roadblock, if that is near.
         """
         extra = [self._departures(start, blocked), *map(self._stand, stands)]
@@ -364,26 +364,26 @@ def router(town: Town) -> Router:
 # --- Roadblocks -------------------------------------------------------------------------------------------------------
 # Check that a town remains passable with roadblocks in it.
 #
-# The cells of the router are closed that a car cannot drive or turn round in because of a prop. What is left has to
-# hold for good, not only from where the car is now: wherever it may still come to, and wherever it may have to stop
-# before a prop, it must be able to reach every place that it could reach before.
+# Cells of the router in which a prop prevents a car from driving or turning round are closed. The remaining cells must
+# suffice not only for the current place of the car: from wherever it may drive, or stop before a prop, it must be able
+# to reach every place that it could reach before.
 
 STANDS_BEFORE = 17.0
-"""Distance of a car that stops for a prop to the prop, between their middles [m]."""
+"""Distance of a car that stops for a prop to the prop, between their centres [m]."""
 
 TURNS_BEHIND = 16.0
-"""Least distance behind a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
+"""Minimum distance beyond a prop at which a U-turn onto its lane ends: `limits.U_TURN_REACH`, by which the car swings
 ahead first, and half the length of a prop [m]."""
 
 ONE_ROADBLOCK = 3.0
-"""Largest distance along the road of props on lanes beside one another that form one roadblock [m]."""
+"""Largest distance along the road of props on adjacent lanes that form one roadblock [m]."""
 
 APART = 22.0
-"""Least distance along the road of other props [m]: a U-turn before the one swings out onto the other lane."""
+"""Minimum distance along the road of other props [m]: a U-turn before the one swings out onto the other lane."""
 
 
 def closed_by(place: Place) -> list[Place]:
-    """Places that no car can use because of a prop: right before it, under it, and where none lands behind it."""
+    """Returns the places that a prop closes to cars: right before it, under it, or too close beyond it to turn."""
     lane, station = place
     return [(lane, station + float(on)) for on in np.arange(-STANDS_BEFORE, TURNS_BEHIND, CELL / 2)]
 
@@ -405,17 +405,17 @@ def crowds(town: Town, place: Place, others: Iterable[Place]) -> bool:
 
 
 def cuts_off(town: Town, car: Place, standing: Sequence[Place], added: Place) -> bool:
-    """Returns whether one more prop would cut a way that the car needs, now or later.
+    """Returns whether one more prop would cut a route that the car needs, now or later.
 
     Args:
         town: the map.
-        car: where the car is.
-        standing: places of the props that are there.
+        car: place of the car.
+        standing: places of the existing props.
         added: place of the new one.
 
     Returns:
-        Whether there is a site that can be reached from the car's place now, and then could not any more: from there,
-        from a place that the car can come to, or from where it would stand before one of the props.
+        Whether there is a site that can be reached from the car's place now, and then no longer: from there,
+        from a place that the car can reach, or from its stopping place before one of the props.
     """
     search = router(town)
     props = [*standing, added]

@@ -69,7 +69,7 @@ LATE_CHANGE = 0.01
 """Extra cost of a lane change for each metre along its lane: of equal ones the first is preferred."""
 
 SHARED = 2.0 / 3.0
-"""Share of a lane change during which obstacles matter: from its beginning for the lane that it leaves, before
+"""Share of a lane change during which obstacles matter: from its start for the lane that it leaves, before
 its end for the other lane (lateral offset 1.7 m by then)."""
 
 MAX_ASIDE = 6.0
@@ -85,13 +85,13 @@ U_TURN_LENGTH = 20.0
 """Length of a U-turn between junctions [m]."""
 
 U_TURN_REST = 6.0
-"""Distance between a U-turn and the earliest stop behind it [m]."""
+"""Distance between a U-turn and the earliest stop after it [m]."""
 
 SLIGHTLY_BEHIND = 1.0
 """Distance by which a goal may lie behind the start without a detour [m]."""
 
 LEAST_COST = 1e-3
-"""Least cost of an edge [m]: searches of sparse graphs ignore edges without cost."""
+"""Minimum cost of an edge [m]: searches of sparse graphs ignore edges without cost."""
 
 USUAL_SPEED = 40.0 / 3.6
 """Reference speed of costs [m/s]: a metre with this limit costs one metre, with a higher limit less."""
@@ -101,12 +101,12 @@ SPEEDS = (10.0 / 3.6, 60.0 / 3.6)
 
 
 class RoutingLane:
-    """A lane of a town, divided into cells; indices are -1 where there is none."""
+    """A lane of a town, divided into cells; indices are -1 if there is none."""
 
     length: Float  # [m]
     cell_size: Float  # length of its cells [m]
     weight: Float  # cost of a metre
-    offset: Float  # beginning of the lane where all lanes lie in one row with gaps of one metre [m]
+    offset: Float  # start of the lane when all lanes are placed in one row with gaps of one metre [m]
     first: Int32  # first cell, and number of cells
     cells: Int32
     left: Int32  # lanes that one may change to
@@ -142,7 +142,7 @@ class RoutingGraph(NamedTuple):
         offsets: (lanes + 1,) first point of each lane, and p.
         ends: (lanes, 4) directions of their ends, see `polyline.LaneTable`.
         near: lanes that may be oncoming somewhere along a lane, lane by lane.
-        near_rows: (lanes + 1,) their beginning for each lane.
+        near_rows: (lanes + 1,) their start for each lane.
         edges: cheapest edge between each pair of cells and tails, sorted by source and target.
         rows: (nodes + 1,) first edge of each source, and the number of edges.
         incoming: edges sorted by target.
@@ -233,7 +233,7 @@ def routing_graph(town: Town) -> RoutingGraph:
 def _following(town: Town, graph: RoutingGraph, cells: int) -> RecordArray[RoutingEdge]:
     """Returns the edges between successive cells of each lane, and from the end of a lane to its successors.
 
-    The latter begin in the last cell and in the tail of the lane, and end in the first cells of the successors.
+    These begin in the last cell and in the tail of the lane, and end in the first cells of the successors.
     """
     lanes = graph.lanes
     owner = np.repeat(np.arange(len(lanes)), lanes["cells"])
@@ -313,7 +313,7 @@ def _position(graph: RoutingGraph, lane: int, station: float) -> tuple[float, fl
     begin = points[low, 2] + offset
     if begin == at or high == len(points):
         return points[low, 0], points[low, 1]
-    # rounded, a station may lie behind the end of the lane: in the gap before the next one
+    # after rounding, a station may lie beyond the end of the lane, in the gap before the next one
     end = points[high, 2] + (offset if high < graph.offsets[lane + 1] else graph.lanes[lane + 1].offset)
     width, ahead = end - begin, at - begin
     x = (points[high, 0] - points[low, 0]) / width * ahead + points[low, 0]
@@ -392,7 +392,7 @@ def _add_change(
     edges: RecordArray[RoutingEdge],
     count: int,
 ) -> int:
-    """Adds a lane change of length `road` [m] if the lanes lie side by side there."""
+    """Adds a lane change of length `road` [m] if the lanes are adjacent there."""
     leave, end = begin + CHANGE_LEAD, begin + road
     x, y = _position(graph, lane, leave)
     landing, first_gap = _project(graph, beside, x, y)
@@ -413,7 +413,7 @@ def _add_change(
 def add_u_turn(
     graph: RoutingGraph, lane: int, begin: float, leave: float, edges: RecordArray[RoutingEdge], count: int
 ) -> int:
-    """Adds a U-turn at a station `leave`, if there is an oncoming lane with sufficient length behind it.
+    """Adds a U-turn at a station `leave`, if there is an oncoming lane with sufficient length beyond it.
 
     Args:
         graph: the routing graph.

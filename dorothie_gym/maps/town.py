@@ -1,4 +1,4 @@
-"""Town: lanes, links and everything along the roads, traffic lights among it, with the queries of the simulation."""
+"""Town: lanes, links and objects along the roads, including traffic lights, with the queries of the simulation."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class _Movement:
         source: id of the incoming lane.
         speed: speed limit of the incoming lane [m/s].
         connector: lane across the junction.
-        targets: ids of the lanes behind it.
+        targets: ids of the lanes beyond it.
         left: whether it turns left.
     """
 
@@ -100,7 +100,7 @@ def derive_programmes(
 ) -> tuple[LightProgramme, ...]:
     """Generates a programme for each junction with traffic lights.
 
-    Approaches that face each other are green together, all others in turn. Left turns yield to oncoming traffic
+    Approaches that face each other are green together, all others in sequence. Left turns yield to oncoming traffic
     (`RightOfWay.waits_for`); other movements never conflict. Lights of left-turn lanes, where there are others
     beside and facing them, have a protected phase just before the lights beside them, shared with facing left-turn
     lanes. Lights that share a lane show the same colour. Every light is green once in a cycle.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 CORNER_DISTANCE = 60.0
-"""Distance to the middle of a junction within which a place is near the corner [m]: half a block of the towns."""
+"""Distance to the centre of a junction within which a place is near the corner [m]: half a block of the towns."""
 
 SIGNAL_DISTANCE = 30.0
 """Distance within which a place is beside a traffic light or sign [m]."""
@@ -33,7 +33,7 @@ def corner_of(town: Town, street: int, x: float, y: float, within: float = CORNE
         street: index of the street on which the point lies.
         x: position [m].
         y: position [m].
-        within: largest distance to the middle of the junction [m].
+        within: largest distance to the centre of the junction [m].
     """
     near = [
         (pm.hypot(corner.x - x, corner.y - y), corner.streets - {street})
@@ -60,7 +60,7 @@ def signals_near(town: Town, x: float, y: float, within: float = SIGNAL_DISTANCE
 
 
 class _Corner(NamedTuple):
-    """Middle of a junction [m], and the named streets that meet there."""
+    """Centre of a junction [m], and the named streets that meet there."""
 
     x: float
     y: float

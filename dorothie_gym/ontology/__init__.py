@@ -6,8 +6,8 @@ The vocabularies are closed: moves, slot values and actions keep the numbers of 
 corpus and ours, and spaces have one entry for each member. Landmark kinds are closed for the same reason. When a list
 grows:
 
-- Models with an input or output for each member no longer fit. The shipped models that read moves, landmarks or weather
-  are refused until they are trained again (`python benchmarks/pretrained.py`).
+- Models with an input or output for each member become incompatible. The shipped models that read moves, landmarks or
+  weather are refused until they are trained again (`python benchmarks/pretrained.py`).
 - Scripted roles and storyboards draw from the lists: the sessions of a seed change.
 - Recordings have a column for each weather parameter; those without the new one are refused.
 - New members go to the end, with a number that no recording, model or layout of SDN uses.

@@ -33,7 +33,7 @@ def unknown_spelling(text: object, vocabulary: str, known: Iterable[str]) -> Ont
     spellings = tuple(known)
     if not isinstance(text, str):
         return OntologyError(f"{vocabulary}: expected a text, got {_shown(repr(text))} of type {type(text).__name__}")
-    # cutoff 0: a far guess still shows the reader what the spellings of this vocabulary look like.
+    # cutoff 0: even a distant guess shows the spelling of this vocabulary.
     nearest = _nearest(text[:LONGEST].lower(), spellings)
     hint = f"; the nearest known spelling is {nearest!r}" if nearest is not None else ""
     return OntologyError(f"{vocabulary}: {_shown(repr(text))} is unknown{hint}")

@@ -120,7 +120,7 @@ class WeatherParameter(StrEnum):
     FOG_DENSITY = "fog_density", 0.0, 100.0, 2.0, "%"
     # Distance at which fog starts. CARLA sets no upper limit; fog beyond 100 m hides nothing in a town.
     FOG_DISTANCE = "fog_distance", 0.0, 100.0, 0.75, "m"
-    # CARLA sets no upper limit; from 5 on the fog is too close to the ground to hide anything.
+    # CARLA sets no upper limit; from a value of 5, the fog is too close to the ground to hide anything.
     FOG_FALLOFF = "fog_falloff", 0.0, 5.0, 0.1, "1"
     WETNESS = "wetness", 0.0, 100.0, 0.0, "%"
 

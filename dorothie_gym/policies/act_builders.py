@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dorothie_gym.dialogue.realization_context import Direction
 
 QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
-"""Moves that ask for an answer about the drive."""
+"""Moves that require an answer about the drive."""
 
 
 def destination(place: LandmarkName | None, street: StreetName | None = None) -> Proposition:
@@ -28,7 +28,7 @@ def errand(place: LandmarkName | None, status: GoalStatus, street: StreetName | 
 
 
 def located(place: LandmarkName | None, street: StreetName | None) -> Proposition:
-    """Returns that a place lies on a street."""
+    """Returns the proposition that a place lies on a street."""
     return Proposition.of(Predicate.LOCATED, place=place, street=street)
 
 
@@ -41,7 +41,7 @@ def action(
     place: LandmarkName | None = None,
     speed: int | None = None,
 ) -> Proposition:
-    """Returns that the car will carry out an action, which is wanted or planned.
+    """Returns the proposition that the car will carry out a requested or planned action.
 
     Args:
         value: the action; None where only the street is said.
@@ -65,7 +65,7 @@ def asked_by_slots(
     places: Sequence[SlotValue],
     streets: Sequence[SlotValue],
 ) -> Proposition | None:
-    """Returns what a yes/no question with slot values asks, by the first of each kind; None if that cannot be told."""
+    """Returns the proposition of a yes/no question with slot values, from the first of each kind; None if unclear."""
     if ActionValue.LIGHT_CHANGE in actions:
         return Proposition.of(Predicate.LIGHTS_ON)
     if objects:
@@ -85,7 +85,7 @@ def named(street: StreetName | None) -> StreetName | None:
 
 
 def named_streets(act: DialogueAct) -> tuple[StreetName, ...]:
-    """Returns the streets that an act names, without "unknown" and "queried"."""
+    """Returns the streets that an act names, except "unknown" and "queried"."""
     unnamed = (StreetName.UNKNOWN, StreetName.QUERIED)
     values = act.values(Slot.STREET)
     return tuple(name for name in values if isinstance(name, StreetName) and name not in unnamed)

@@ -48,16 +48,16 @@ class AdWizardConfig:
 
     Attributes:
         first_at: earliest time of a trick [s].
-        window: range of planned times from then on [s].
-        spacing: least time between two tricks [s].
-        expires_after: time after which a trick that finds no moment is given up [s].
-        weights: weight of each trick in the draw of those of a session.
+        window: length of the period after it in which tricks are planned [s].
+        spacing: minimum time between two tricks [s].
+        expires_after: time after which a trick that could not be played is dropped [s].
+        weights: relative frequency with which each trick is drawn for a session.
         roadblock_ahead: range of distances ahead of the car at which a roadblock is placed [m].
-        roadblock_margins: least distances of a roadblock from the beginning and the end of its lane [m].
-        roadblock_speed: least speed of the car when one is placed [m/s].
-        roadblock_clearance: least distance of a roadblock from a place where the car may have to stop [m].
+        roadblock_margins: minimum distances of a roadblock from the start and the end of its lane [m].
+        roadblock_speed: minimum speed of the car when one is placed [m/s].
+        roadblock_clearance: minimum distance of a roadblock from a place where the car may have to stop [m].
         roadblock_time: time after which a roadblock is removed [s].
-        most_roadblocks: largest number of roadblocks in a session.
+        most_roadblocks: maximum number of roadblocks in a session.
         bad_weather_time: range of durations of bad weather [s].
         crowd_ahead: range of distances ahead at which people or vehicles are spawned [m].
         crowd_extent: size of the area in which they are spawned [m].
@@ -116,7 +116,7 @@ FOGS: Mapping[WeatherParameter, tuple[float, tuple[float, float]]] = MappingProx
 check_complete({*WEATHERS, *FOGS}, WeatherParameter, "WEATHERS", __name__)
 
 FOGS_FROM = 0.4
-"""Share of the density from which on there is fog."""
+"""Density that counts as fog, as a share of the maximum."""
 
 PROPS: Mapping[PropKind, float] = MappingProxyType(
     {kind: 3.0 if kind is PropKind.STREET_BARRIER else 1.0 for kind in PropKind}
@@ -127,7 +127,7 @@ SAME_PROP = 3.0
 """Distance within which a prop is recognized as the one placed [m]."""
 
 MOST_TRICKS = 4
-"""Largest average number of tricks in a session that can be asked for."""
+"""Largest average number of tricks per session that can be set."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +140,7 @@ class PlannedTrick:
 
 @dataclass(frozen=True, kw_only=True)
 class Restoration:
-    """Change that is to be undone, a parameter of the weather or the position of a prop [m], and the time [s]."""
+    """Change that will be undone, a parameter of the weather or the position of a prop [m], and the time [s]."""
 
     at: float
     change: WeatherParameter | tuple[float, float]
@@ -154,7 +154,7 @@ class AdWizardState:
         seed: seed of all random draws.
         town: the map.
         config: tunable numbers.
-        planned: tricks to come.
+        planned: remaining tricks.
         count: number of decisions taken.
         restorations: changes to be undone.
         roadblocks: number of roadblocks placed.
@@ -224,7 +224,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 
     Of a storyboard that is not shipped, it plays every change of the task that the storyboard marks.
 
-    Every change of a task comes with the message that the storyboard gives, or with one made of its texts. Bad weather
+    Every change of a task is announced by the message in the storyboard, or by one composed of its texts. Bad weather
     clears up, and roadblocks are removed after a while.
 
     Attributes:
@@ -290,7 +290,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 def idle_until(policy: ScriptedAdWizard, state: AdWizardState, story: str) -> float:
     """Returns the earliest time at which the next step may do more than count a decision [s].
 
-    A caller that knows that the time has not come need not observe: `state.advanced()` is the state after the step.
+    Before that time a caller need not observe: `state.advanced()` is the state after the step.
 
     Args:
         policy: the policy.
@@ -380,8 +380,8 @@ def suits_roadblock(
         lane: number of the lane.
         station: distance along it [m].
         length: its length [m].
-        margins: least distances from its beginning and its end [m].
-        clearance: least distance from places where a car stops for a landmark [m].
+        margins: minimum distances from the start and the end of its lane [m].
+        clearance: minimum distance from places where a car stops for a landmark [m].
     """
     if not margins[0] < station < length - margins[1]:
         return False
@@ -392,7 +392,7 @@ def suits_roadblock(
 
 
 def _weather(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
-    """Brings fog, heavy rain, night, wind, puddles, ... for a while; fog changes further while it is there."""
+    """Brings fog, heavy rain, night, wind, puddles, ... for a while; further changes follow while there is fog."""
     density = weather(observation, WeatherParameter.FOG_DENSITY) / WeatherParameter.FOG_DENSITY.high
     options = FOGS if density > FOGS_FROM else WEATHERS
     weights = np.array([weight for weight, _ in options.values()])
@@ -421,7 +421,7 @@ def _task(state: AdWizardState, observation: ObservationMapping, now: float, rng
 
 
 def _sensor(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
-    """Lets a sensor fail; it recovers by itself."""
+    """Makes a sensor fail; it recovers by itself."""
     sensor = tuple(Sensor)[int(rng.integers(len(Sensor)))]
     return AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=sensor, on=True), state
 

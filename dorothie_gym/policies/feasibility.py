@@ -1,10 +1,10 @@
-"""Feasibility of manoeuvres as far as a role's observation shows.
+"""Feasibility of manoeuvres, judged from a role's observation.
 
 Policies that need to know which actions the car would accept read the engine's mask (`Policy.reads_mask`). The
 functions here
 are for roles that decide by their own belief: the scripted Co-Wizard, whose refused commands are part of the recorded
 sessions, and drivers that are trained and measured with an estimated mask. The engine knows the planned path and the
-true place of the car; its mask differs where the pose is inaccurate, a manoeuvre is under way, or a roadblock leaves
+true place of the car; its mask differs where the pose is inaccurate, a manoeuvre is in progress, or a roadblock leaves
 too little room.
 """
 
@@ -26,14 +26,14 @@ def slowing_distance(speed: float, target_squared: float = U_TURN_SPEED_SQUARED)
     """Returns the distance in which the car slows down for a U-turn [m].
 
     Args:
-        speed: present speed [m/s].
+        speed: current speed [m/s].
         target_squared: square of the speed of the U-turn [m^2/s^2].
     """
     return u_turn_braking(speed, target_squared)
 
 
 def u_turn_start(station: float, speed: float, target_squared: float = U_TURN_SPEED_SQUARED) -> float:
-    """Returns the station at which a U-turn commanded now would begin [m]; arguments as of `slowing_distance`."""
+    """Returns the station at which a U-turn commanded now would begin [m]; arguments as in `slowing_distance`."""
     return station + slowing_distance(speed, target_squared) + LEAD * (speed > EGO_MOVING)
 
 

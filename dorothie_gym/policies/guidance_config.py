@@ -14,7 +14,7 @@ RAIN_LIMIT = 55.0
 """Precipitation above which the agents call the rain heavy [%]."""
 
 USUAL_SPEED = 40
-"""Cruise speed on open road where nothing is said about it [km/h]; the speed that route costs assume."""
+"""Default cruise speed on open road [km/h], which route costs assume."""
 
 NUDGE_DISTANCE = 2.0
 """Distance meant by "a bit further" [m]; shorter than the stretch around a goal that counts as arrived."""

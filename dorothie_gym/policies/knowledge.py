@@ -1,7 +1,7 @@
 """Beliefs of a Co-Wizard and the reasons for its actions: the record that scripted and learned Co-Wizards fill.
 
 `co_wizard.proposition_truth` judges propositions and reasons over it, and `co_wizard.answers` words what follows. The
-state of the scripted Co-Wizard comes about by rules, the memory of the learned one by a network. The learned one does
+state of the scripted Co-Wizard follows from rules, the memory of the learned one from a network. The learned one does
 not keep whether a place that is not on its map was described to it, the obstacle for which it stopped by a decision,
 and the reason for an instruction to stop.
 """
@@ -26,13 +26,13 @@ TOLD_TO_STOP: Final = Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
 
 @dataclass(frozen=True, kw_only=True)
 class Standstill:
-    """Present or last standstill of the car, and the reason for it.
+    """Current or last standstill of the car, and the reason for it.
 
     Attributes:
-        since: start of the present standstill [s]; None while the car moves.
+        since: start of the current standstill [s]; None while the car moves.
         until: end of the last standstill [s].
-        reason: why the car stands, or stood last, as far as that is known.
-        reason_since: time since which it has stood for this reason [s].
+        reason: why the car stands, or last stood; None if unknown.
+        reason_since: start of the standstill for this reason [s].
     """
 
     since: float | None = 0.0
@@ -65,18 +65,18 @@ class CoWizardKnowledge:
         goal_is_findable: whether the place of the goal is taken from the map or was described.
         progress: route to the goal and the progress on it; None without a place to go to.
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
-        halted: whether the car is to stand.
+        halted: whether the car must stand.
         arrived: whether the car has stopped at its goal and waits for the next task.
-        sent_on: whether the car has only stopped where it was told to drive to, which may be the goal.
+        sent_on: whether the stop ends a short advance on request, at a place that may be the goal.
         pausing: whether the car stops before the junction ahead until the way is known.
-        directed: whether a turn that the participant asked for is ahead.
-        to_turn_round: whether a U-turn that the participant asked for has not begun yet.
-        asks_for_detour: whether a question about a way round an obstacle is open.
+        directed: whether a turn that the participant requested is ahead.
+        to_turn_round: whether a U-turn that the participant requested has not begun yet.
+        asks_for_detour: whether a question about a detour around an obstacle is open.
         blocked_at: time at which an obstacle across the road was last found [s].
         told_to_stop_at: time of the last instruction to stop [s].
         stop_reason: why the car stopped on that instruction.
         told_to_turn_round_at: time of the last instruction to turn round [s].
-        standstill: present or last standstill.
+        standstill: current or last standstill.
         rests_for: obstacle for which the car stops by a decision.
         rests_until: end of that stop [s].
     """

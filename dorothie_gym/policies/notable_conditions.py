@@ -50,7 +50,7 @@ CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = complete(
     "CONSPICUOUS",
     __name__,
 )
-"""Conspicuousness of each parameter, which is noticed from 1 on, and whose end is noticed below `OVER`. The sun is
+"""Conspicuousness of each parameter: a value of at least 1 is noticed, and so is a fall below `OVER`. The sun is
 noticed when it is within 15 degrees of the horizon, or stands elsewhere than at noon."""
 
 OVER: Final = 0.6
@@ -59,10 +59,10 @@ CROWD_DISTANCE: Final = 50.0
 """Distance within which a crowd is noticed [m]."""
 
 CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 3, ObjectClass.VEHICLES: 3})
-"""Least number of objects in a crowd."""
+"""Minimum number of objects in a crowd."""
 
 MORE_THAN_USUAL: Final = 1.5
-"""Least number of objects by which a crowd exceeds the usual number."""
+"""Minimum number of objects by which a crowd exceeds the usual number."""
 
 USUAL_TIME: Final = 30.0
 """Time over which the usual number of objects is averaged [s]."""
@@ -159,7 +159,7 @@ def notice(
         objects: objects in sight.
         rng: random generator of the decision.
         chance: probability that a noticed condition is mentioned.
-        handled: parameters whose beginning the agent reacts to elsewhere.
+        handled: parameters whose onset the agent reacts to elsewhere.
 
     Returns: The remark, or None, and the noticed conditions.
     """
@@ -179,7 +179,7 @@ def notice(
 
 
 def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tuple[W, bool]]:
-    """Yields the parameters that have become conspicuous (True), or are so no more (False), since they were noted."""
+    """Yields the parameters that have become conspicuous (True), or are no longer (False), since they were noted."""
     now = {parameter: weather(observation, parameter) for parameter in W}
     for parameter, measure in CONSPICUOUS.items():
         value = measure(now)

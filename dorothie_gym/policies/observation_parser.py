@@ -85,7 +85,7 @@ def nearest_landmark(
 
 @dataclass(frozen=True, kw_only=True)
 class SeenSubgoal:
-    """Subgoal with its present status; `landmark` is a row of the landmarks."""
+    """Subgoal with its current status; `landmark` is a row of the landmarks."""
 
     index: int
     live: bool
@@ -123,7 +123,7 @@ class SeenObject:
 
 
 def street_of(observation: ObservationMapping, town: Town, lane: int) -> StreetName:
-    """Returns the name of the street that a lane belongs to; UNKNOWN where it has none."""
+    """Returns the name of the street that a lane belongs to; UNKNOWN if it has none."""
     street = town.lanes[lane].street
     names = observation["street_names"]
     return StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN
@@ -231,7 +231,7 @@ def scalar(observation: ObservationMapping, name: str) -> float:
 def place_on_lanes(
     town: Town, lanes: Sequence[int], x: float, y: float, width: float = 2.0
 ) -> tuple[int, float] | None:
-    """Returns the first of some lanes on which a point lies, and the distance along it; None if it lies on none.
+    """Returns the first of the given lanes on which a point lies, and the distance along it; None if it lies on none.
 
     Args:
         town: the map.
@@ -272,13 +272,13 @@ class LaneLength(Protocol):
 
 
 def place_ahead(lanes: Rows[LaneLength], path: Rows[int], lane: int, ahead: float) -> tuple[int, float]:
-    """Returns lane and station of a place on a path; lane -1 beyond its end, and if the path does not begin here.
+    """Returns lane and station of a place on a path; the lane is -1 beyond its end, or if the path starts elsewhere.
 
     Args:
         lanes: lanes of the town.
-        path: 1 + number of each lane of the path, 0 behind its end.
+        path: 1 + index of each lane of the path, padded with 0.
         lane: lane of the car.
-        ahead: distance from the beginning of that lane [m].
+        ahead: distance from the start of that lane [m].
     """
     for k in range(len(path)):
         number = path[k] - 1

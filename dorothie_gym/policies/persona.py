@@ -19,18 +19,18 @@ _Style = TypeVar("_Style", bound=enum.StrEnum)
 
 
 class Directions(enum.StrEnum):
-    """How a participant gives directions."""
+    """Style in which a participant gives directions."""
 
     TURNS = "turns"
     """By turns, with ordinals and the names of streets."""
     LANDMARKS = "landmarks"
     """By visible objects along the route and at the goal."""
     VAGUE = "vague"
-    """Late and without details, so that the car has to ask."""
+    """Gives directions late and without details, so that the car must ask."""
 
 
 class Driving(enum.StrEnum):
-    """How a Co-Wizard drives."""
+    """Driving style of a Co-Wizard."""
 
     GENTLE = "gentle"
     """Slowly, and slower before turns and places."""
@@ -52,7 +52,7 @@ class Persona:
         attention: attention to weather, crowds and the route; below `INATTENTIVE`, the speaker makes no remarks on
             them.
         humour: amount of small talk.
-        directions: way of giving directions (participant).
+        directions: style of giving directions (participant).
         driving: driving style (Co-Wizard).
         pace: speaking rate relative to the average.
         gap: median of the time before a reply [s].
@@ -76,7 +76,7 @@ class Persona:
 
     @property
     def ignores(self) -> bool:
-        """Whether the speaker remarks on nothing around the car."""
+        """Whether the speaker makes no remarks on the surroundings of the car."""
         return self.attention < INATTENTIVE
 
     @property
@@ -109,8 +109,8 @@ class Persona:
         """Draws a persona.
 
         Args:
-            rng: source of randomness; the same numbers are drawn whatever is given.
-            given: values of some traits, or ranges of them.
+            rng: source of randomness; the same numbers are drawn regardless of the arguments.
+            given: values or ranges of the traits that are given.
         """
         drawn = {name: float(rng.random()) for name in SHARES}
         directions = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})
@@ -137,7 +137,7 @@ REACTION_SPREAD: Final = 0.25
 """Standard deviation of the logarithm of one speaker's reaction times; set by hand."""
 
 INATTENTIVE: Final = 0.08
-"""Attention below which a speaker remarks on nothing around the car."""
+"""Attention below which a speaker makes no remarks on the surroundings of the car."""
 
 SHARES: Final = ("talkativeness", "patience", "politeness", "certainty", "knowledge", "attention", "humour")
 """Traits in [0, 1]."""
@@ -158,7 +158,7 @@ _TIMES: Final[Mapping[str, tuple[float, float, float, float]]] = MappingProxyTyp
         "reaction": (0.75, 0.2, 0.5, 1.4),
     }
 )
-"""Median, spread of the logarithm between speakers, least and greatest value of the traits with a unit."""
+"""Median, spread of the logarithm between speakers, minimum and maximum of the traits with a unit."""
 
 _NAMED: Final[Mapping[str, type[enum.StrEnum]]] = MappingProxyType({"directions": Directions, "driving": Driving})
 
@@ -202,7 +202,7 @@ def _range(name: str, text: str) -> tuple[float, float]:
 
 
 def within(low: float, high: float, trait: float, rng: np.random.Generator) -> float:
-    """Returns a value of a range at the place of a trait, three quarters of it; the rest is the speaker's own."""
+    """Returns a value in a range, determined to three quarters by a trait and otherwise by the individual speaker."""
     return low + (high - low) * (0.75 * trait + 0.25 * float(rng.random()))
 
 

@@ -1,10 +1,10 @@
 """Contract of a policy: a stateless object whose memory is passed in and handed back, so that replay is exact.
 
-A policy plays one role. Whoever plays a session (`evaluation/rollout/play.py`, the console, a user's loop) asks each
-role's policy for an action at each decision and gives all three to the engine. Scripted, learned and language-model
-policies fill the same contract; `policies/policy_loader.py` finds them by name.
+A policy plays one role. The code that runs a session (`evaluation/rollout/play.py`, the console, a user's loop) asks
+each role's policy for an action at each decision and gives all three to the engine. Scripted, learned and
+language-model policies fulfil the same contract; `policies/policy_loader.py` finds them by name.
 
-Last of the five files that explain the package. The ways in docs/architecture.md lead on from here.
+Last of the five files that explain the package. docs/architecture.md continues with paths through the code.
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ class Policy(ABC, Generic[State]):
         """
 
     def persona_of(self, state: State) -> Mapping[str, float | str] | None:
-        """Returns the traits of the persona that a state belongs to, in JSON types, for the record; None for none."""
+        """Returns the traits of the persona of a state, in JSON types, for the record; None if it has no persona."""
         return None
 
     def usage_of(self, state: State) -> Mapping[str, object] | None:
-        """Returns the costs of a session so far (calls, tokens), in JSON types, for the recording; None for nothing."""
+        """Returns the costs of a session so far (calls, tokens), in JSON types, for the record; None without costs."""
         return None
 
     @abstractmethod
@@ -136,7 +136,7 @@ class RoleObservations(Protocol):
     """Observations of the roles at one decision."""
 
     def of(self, roles: Sequence[Role]) -> Mapping[str, ObservationMapping]:
-        """Returns the observations of some roles by agent."""
+        """Returns the observations of the given roles by agent."""
         ...
 
 
@@ -145,16 +145,16 @@ class ObservedSession(Protocol):
 
     @property
     def observations(self) -> RoleObservations:
-        """Observations at the present decision."""
+        """Observations at the current decision."""
         ...
 
     def mask(self, role: Role) -> Mapping[str, object]:
-        """Returns the mask of a role's action space at the present decision."""
+        """Returns the mask of a role's action space at the current decision."""
         ...
 
 
 def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) -> dict[Role, ObservationMapping]:
-    """Returns the inputs of policies at the present decision: the observation of each role, and its mask if it is read.
+    """Returns the inputs of policies at the current decision: the observation of each role, and its mask if it is read.
 
     Observations and masks that no policy reads are not computed.
 

@@ -1,7 +1,7 @@
-"""Policies by name, shipped trained policies among them, and trained policies from files.
+"""Policies by name, including shipped trained policies, and trained policies from files.
 
-The module of a policy is imported when the policy is made (by the lazy faces of `policies` and its packages): who asks
-for the names needs none of them.
+The module of a policy is imported when the policy is made (through the lazy packages below `policies`), so that listing
+the names imports none of them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WITH_TRAITS: Final = "scripted:"
 """Beginning of the name of a scripted policy whose personas have given traits."""
 
 LANGUAGE_MODEL: Final = "llm:"
-"""Beginning of the name of a policy that asks a language model; the name of the model follows."""
+"""Prefix of the name of a policy that calls a language model; the name of the model follows."""
 
 LANE_FOLLOW = "lane-follow"
 """Name of the Co-Wizard's policy that drives and never talks."""
@@ -51,7 +51,7 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     Args:
         name: "scripted", "silent" (does nothing) or "random" (samples the action space); for participant and Co-Wizard
             also "scripted:" with traits of the persona ("scripted:talkativeness=0.8..1", see
-            `dorothie_gym.policies.persona`); for the Co-Wizard also "lane-follow" (drives on, never talks), or a
+            `dorothie_gym.policies.persona`); for the Co-Wizard also "lane-follow" (follows its lane, never talks), or a
             shipped model such as "pretrained:maskable-ppo"; "llm:" with the name of a language model at the endpoint
             `OPENAI_BASE_URL`.
         role: role of the policy.
@@ -117,7 +117,7 @@ def register_loader(kind: str, loader: Loader) -> None:
 
     Args:
         kind: suffix of the files (".safetensors"), or the field "kind" of their JSON ("ppo").
-        loader: function that reads them; it raises `ValueError` where it cannot.
+        loader: function that reads them; it raises `ValueError` if it cannot.
 
     Raises:
         ValueError: another loader has the kind.
@@ -134,7 +134,7 @@ def loadable_kinds() -> tuple[str, ...]:
 
 
 def _loader_of(kind: str) -> Loader | None:
-    """Returns the loader of a kind of files, None for none; imports the loader of a model of the package."""
+    """Returns the loader of a kind of files, None if there is none; imports the loader of a model of the package."""
     if kind not in MODEL_LOADERS:
         return _LOADERS.get(kind)
     module, _, name = MODEL_LOADERS[kind].partition(":")
@@ -199,7 +199,7 @@ def find_player(given: str, role: Role, language_model: LanguageModelConfig | No
             ones (`LanguageModelConfig.usual`).
 
     Raises:
-        PolicyLoadError: there is no such policy for the role, no such file, or none that can be played.
+        PolicyLoadError: there is no such policy for the role, no such file, or a file without a playable policy.
     """
     if _gives_traits(given, role):
         try:
@@ -268,7 +268,7 @@ def _cost(value: object) -> float | None:
 
 
 def _description(path: Path) -> Mapping[str, object]:
-    """Returns the JSON of a file, or of a folder's description; empty where there is none."""
+    """Returns the JSON of a file, or of a folder's description; empty if there is none."""
     file = path / DESCRIPTION if path.is_dir() else path
     if file.suffix != ".json" or not file.exists():
         return {}

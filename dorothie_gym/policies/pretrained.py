@@ -91,7 +91,7 @@ def is_pretrained(name: str) -> bool:
 
 
 def pretrained_folder(name: str) -> Path:
-    """Returns the model folder of a shipped model, which can be given wherever a model folder is accepted.
+    """Returns the model folder of a shipped model, which is valid in every place that accepts a model folder.
 
     Args:
         name: name of the model; the prefix may be omitted.

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.route_tables import RouteTables
 
 PASSED = 3.0
-"""Distance behind the car from which on a goal has been passed [m]."""
+"""Distance behind the car at which a goal counts as passed [m]."""
 
 SWITCH_ROOM = 16.0
-"""Least distance to the end of a lane for a lane switch [m]."""
+"""Minimum distance to the end of a lane for a lane switch [m]."""
 
 END_ROOM = 6.0
 """Distance to the end of a lane within which a car waits there and no longer turns round [m]."""
@@ -31,12 +31,12 @@ RIGHT_BEHIND = 70.0
 """Distance from a junction to a goal within which there may be no room to change lanes [m]."""
 
 MANOEUVRE_OVERDUE_DISTANCE = 18.0
-"""Distance behind its planned place from which on a lane change or U-turn is given up [m]."""
+"""Distance past its planned place at which a lane change or U-turn is given up [m]."""
 
 
 @compiled
 def find_leg(tables: RouteTables, legs: RecordArray[LegRecord], count: int, leg: int, lane: int, station: float) -> int:
-    """Returns the leg that a car is on, the present one or one ahead; -1 if it is off the route.
+    """Returns the leg that a car is on, the current one or one ahead; -1 if it is off the route.
 
     A car that has passed the end of a leg, where it had to change lanes, turn round or stop, is not on that leg.
     """
@@ -62,7 +62,7 @@ def _is_overdue(tables: RouteTables, legs: RecordArray[LegRecord], count: int, l
 
 @compiled
 def distance_left(legs: RecordArray[LegRecord], count: int, leg: int, station: float) -> float:
-    """Returns the distance to the goal along the route [m]; negative just behind the goal."""
+    """Returns the distance to the goal along the route [m]; negative just past the goal."""
     if leg + 1 == count:
         return float(legs[leg].end - station)
     rest = 0.0
@@ -81,7 +81,7 @@ def find_crossing(
         tables: lanes and exits.
         legs: legs of the route.
         count: number of legs.
-        leg: the present leg.
+        leg: the current leg.
         station: place of the car on it [m].
         first: first leg whose end counts, to find more than one junction.
 
@@ -120,10 +120,10 @@ def needs_switch(
     blocked: RecordArray[PlaceRecord],
     places: int,
 ) -> bool:
-    """Returns whether a lane change before a junction has to be commanded apart from the turn.
+    """Returns whether a lane change before a junction must be commanded apart from the turn.
 
     Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its own
-    lane and end up next to a goal right behind the junction.
+    lane and end up next to a goal right after the junction.
 
     Args:
         tables: lanes and exits.

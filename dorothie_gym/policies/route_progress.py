@@ -103,7 +103,7 @@ def stopping_distance(speed: float) -> float:
 
 
 def direction_of(way: Exit) -> Direction:
-    """Returns the direction of an exit as it is said."""
+    """Returns the direction of an exit in spoken form."""
     return _DIRECTIONS[way.type]
 
 
@@ -126,7 +126,7 @@ def default_lane_distance(town: Town, here: Place, place: Place, distance: float
 
 
 def default_lane_place(town: Town, here: Place, distance: float) -> Place:
-    """Returns the place some way ahead [m] on the default lanes; the end of the last lane before a junction."""
+    """Returns the place at a distance ahead [m] on the default lanes, or the end of the last lane before a junction."""
     lane, station = here
     lanes, left = lanes_ahead(town, lane, station, distance), station + distance
     for passed in lanes[:-1]:
@@ -244,11 +244,11 @@ class RouteProgress:
 
     @property
     def legs(self) -> tuple[Leg, ...]:
-        """Remaining legs of the route, the present one first."""
+        """Remaining legs of the route, the current one first."""
         return self.route.legs[self.leg :] if self.route is not None else ()
 
     def followed(self, town: Town, lane: int, station: float) -> RouteProgress:
-        """Advances the present leg to the place of the car; `astray` counts up if the car is off the route."""
+        """Advances the current leg to the place of the car; `astray` counts up if the car is off the route."""
         leg = find_leg(route_tables(town), *self._legs, lane, station) if self.legs else -1
         return replace(self, astray=self.astray + 1) if leg < 0 else replace(self, leg=leg, astray=0)
 
@@ -257,12 +257,12 @@ class RouteProgress:
         return self.astray >= ASTRAY or self.left(station) < -PASSED
 
     def left(self, station: float) -> float:
-        """Returns the distance to the goal along the route [m]; negative just behind the goal."""
+        """Returns the distance to the goal along the route [m]; negative just past the goal."""
         return distance_left(*self._legs, station) if self.legs else math.inf
 
     @property
     def _legs(self) -> tuple[RecordArray[LegRecord], int, int]:
-        """Arguments of the compiled functions: legs as records, their number, and the present one."""
+        """Arguments of the compiled functions: legs as records, their number, and the current one."""
         return self._planned.records, len(self._planned.legs), self.leg
 
     @property
@@ -319,10 +319,10 @@ class RouteProgress:
         return None
 
     def needs_switch(self, town: Town, lane: int, station: float, crossing: RouteJunction) -> bool:
-        """Returns whether a lane change before a junction has to be commanded apart from the turn.
+        """Returns whether a lane change before a junction must be commanded apart from the turn.
 
         Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its
-        own lane and end up next to a goal right behind the junction.
+        own lane and end up next to a goal right after the junction.
         """
         tables = route_tables(town)
         wanted = int(tables.rows[crossing.lane]) + town.exits(crossing.lane).index(crossing.exit)
@@ -344,7 +344,7 @@ class RouteProgress:
 
 
 MOST_AVOIDED = 3
-"""Largest number of places that are excluded after misses; more would close a road of several lanes altogether."""
+"""Maximum number of places that are excluded after misses; more could close all lanes of a road."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -353,7 +353,7 @@ class RouteState:
 
     Attributes:
         progress: route to the goal and the progress on it; None without a place to go to.
-        blocked: places behind roadblocks.
+        blocked: places beyond roadblocks.
         avoided: places excluded because the car missed the goal after passing them, the latest last.
         misses: number of times that the car has driven past the goal.
     """
@@ -365,7 +365,7 @@ class RouteState:
 
     @property
     def to_goal(self) -> RouteProgress:
-        """Progress on the route, for what is done on a route only; raises `PolicyStateError` without one."""
+        """Progress on the route, for code that requires a route; raises `PolicyStateError` without one."""
         if self.progress is None:
             raise PolicyStateError("the agent has no route: it was given no place to go to, or gave it up")
         return self.progress
@@ -388,11 +388,11 @@ class RouteState:
         return replace(self, progress=self.to_goal.replanned(town, start, self.closed))
 
     def has_missed(self, before: float, station: float) -> bool:
-        """Returns whether the goal, `before` metres ahead on the former route, now needs a long detour."""
+        """Returns whether the goal, `before` metres ahead on the previous route, now needs a long detour."""
         return before < NEAR_MISS and self.to_goal.left(station) > before + WAY_ROUND
 
     def after_miss(self, town: Town, start: Place, former: RouteProgress) -> RouteState:
-        """Counts a drive past the goal; from the second one on, avoids the last lane change of the former route."""
+        """Counts a drive past the goal; after the second one, avoids the last lane change of the previous route."""
         counted = replace(self, misses=self.misses + 1)
         way_in = former.way_in()
         return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted
@@ -406,7 +406,7 @@ class RouteState:
         return any(lane == place[0] and abs(station - place[1]) < SAME_ROADBLOCK for lane, station in self.blocked)
 
     def with_roadblock(self, town: Town, place: Place) -> RouteState:
-        """Adds a roadblock: its cell and the one behind it, because the car's own cell counts as free."""
+        """Adds a roadblock: its cell and the next one, because the car's own cell counts as free."""
         behind = place[0], min(place[1] + CELL_BEHIND, town.lanes[place[0]].length)
         return replace(self, blocked=(*self.blocked, place, behind))
 
@@ -414,12 +414,12 @@ class RouteState:
 def first_new_street(
     observation: ObservationMapping, town: Town, lane: int, progress: RouteProgress | None
 ) -> StreetName | None:
-    """Returns the first named street of a route other than that of the present lane; None if there is none.
+    """Returns the first named street of a route other than that of the current lane; None if there is none.
 
     Args:
         observation: observation with the names of the streets.
         town: the map.
-        lane: the present lane.
+        lane: the current lane.
         progress: the route, or None.
     """
     here = street_of(observation, town, lane)
@@ -428,5 +428,5 @@ def first_new_street(
 
 
 def streets_named(street_names: Iterable[int], name: StreetName) -> frozenset[int]:
-    """Returns the indices of the streets of a name."""
+    """Returns the indices of the streets with a name."""
     return frozenset(k for k, value in enumerate(street_names) if int(value) == name.value)

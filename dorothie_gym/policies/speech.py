@@ -28,7 +28,7 @@ from dorothie_gym.policies.speech_timing import Delivery
 from dorothie_gym.session.spaces.actions import Speech
 
 LONGEST_BREATH = 3
-"""Largest number of acts that are worded together."""
+"""Maximum number of acts that are worded together."""
 
 MEMORY = 6
 """Number of the latest remarks that are remembered."""
@@ -43,7 +43,7 @@ _WANTS_ANSWER = frozenset(
 
 @dataclass(frozen=True, kw_only=True)
 class Remark:
-    """Dialogue act that is to be said.
+    """Dialogue act to be spoken.
 
     Attributes:
         act: move and slots.
@@ -72,7 +72,7 @@ def remark(
     urgent: bool = False,
     expires: float = math.inf,
 ) -> Remark:
-    """Returns a remark with a move and its slot values; other arguments as of `Remark`."""
+    """Returns a remark with a move and its slot values; other arguments as in `Remark`."""
     return Remark(
         act=DialogueAct.of(move, *values),
         wording=wording if wording is not None else Wording(),
@@ -96,14 +96,14 @@ def intend(
 
     Args:
         function: communicative function of the content.
-        content: proposition that is stated, asked, requested or answered; None where there is no content.
+        content: proposition that is stated, asked, requested or answered; None without content.
         also: further contents of the same span: "forget KFC, go to Ikea".
         elided: arguments of the contents that are left out of the words.
         wording: further particulars for the words; where no topic is given it is the predicate of the content, with
             "not_" in front if it is negated.
-        joined: as of `Remark`.
-        urgent: as of `Remark`.
-        expires: as of `Remark`.
+        joined: as in `Remark`.
+        urgent: as in `Remark`.
+        expires: as in `Remark`.
     """
     intention = Intention(function=function, content=content, elided=frozenset(elided))
     particulars = Wording() if wording is None else wording
@@ -189,7 +189,7 @@ class SpeechState:
         return replace(self, queue=(*remarks, *self.queue))
 
     def with_second(self, item: Remark) -> SpeechState:
-        """Inserts a remark behind the first one."""
+        """Inserts a remark after the first one."""
         return replace(self, queue=(self.queue[0], item, *self.queue[1:]))
 
     def led_by(self, item: Remark) -> SpeechState:
@@ -209,7 +209,7 @@ class SpeechState:
         )
 
     def without_statements(self, predicates: Collection[Predicate]) -> SpeechState:
-        """Drops the queued remarks about some predicates; keeps remarks joined to them."""
+        """Drops the queued remarks about the given predicates; keeps remarks joined to them."""
         return self._without(lambda item: any(said.predicate in predicates for said in item.meaning))
 
     def _without(self, drops: Callable[[Remark], bool]) -> SpeechState:
@@ -233,8 +233,8 @@ class SpeechState:
         Args:
             now: time [s].
             acts: acts of the utterance.
-            rng: source of the gap before a reply; None for none.
-            late: time for which the utterance has been over, as far as is known [s].
+            rng: generator of the gap before a reply; None for no gap.
+            late: time since the utterance ended, if known [s].
         """
         gap = self.delivery.draw_gap(rng) if rng is not None else 0.0
         values = frozenset(value for act in acts for value in act.slots)
@@ -301,7 +301,7 @@ class SpeechState:
         return (self.asked_back if self.has_just_spoken(now, IN_A_ROW) else 0) + 1
 
     def _punctuated(self, queue: Sequence[Remark], continues: bool) -> str:
-        """Returns the words of the next remark with the capital and the comma that its neighbours want."""
+        """Returns the words of the next remark with the capital and the comma that its neighbours require."""
         text = queue[0].text
         begins = not continues or (self.last is not None and self.last.text.endswith((".", "?")))
         if begins and self.style is not None and self.style.proper:

@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND, speech_seconds
 from dorothie_gym.support import portable_math as pm
 
 FULL_TURN = 7
-"""Words from which on a turn is spoken at the speaker's full rate; shorter ones are slower (Yuan et al., 2006)."""
+"""Number of words of a turn that is spoken at the speaker's full rate; shorter turns are slower (Yuan et al., 2006)."""
 
 SHORT_TURN = 0.8
 """Rate of a turn of one word, relative to the full rate; set by hand."""
@@ -21,13 +21,13 @@ SPREAD = 0.7
 
 @dataclass(frozen=True, kw_only=True)
 class Delivery:
-    """How a speaker times its speech. Without arguments: at once, always alike.
+    """Timing of a speaker's speech. Without arguments: immediate and constant.
 
     Attributes:
         pace: speaking rate relative to `WORDS_PER_SECOND`.
         gap: median of the time between the other's last word and the speaker's first one [s]; 0 replies at once.
         pause: median of the silence between two utterances of the speaker [s].
-        patience: silence after a move that wants an answer [s].
+        patience: silence after a move that requires an answer [s].
     """
 
     pace: float = 1.0

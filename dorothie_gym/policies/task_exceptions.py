@@ -28,12 +28,12 @@ EARLIEST = 5.0
 
 @lru_cache(maxsize=64)
 def plays_every_exception(story: str) -> bool:
-    """Returns whether every exception of a story is played, as of those that are not shipped."""
+    """Returns whether all exceptions of a story are played, as for storyboards that are not shipped."""
     return bool(story) and not is_shipped_story(story)
 
 
 def story_exception(observation: ObservationMapping, town: Town, now: float, due: bool) -> AdWizardAction | None:
-    """Returns an exception that the storyboard marks and that is possible now; None for none.
+    """Returns an exception that the storyboard marks and that is possible now; None if there is none.
 
     A subgoal is changed before it is deleted. An exception that will soon be impossible is not postponed: the car is
     close to the place, or (for a trigger) to any place of an open subgoal, or no subgoal is open.
@@ -63,7 +63,7 @@ def story_exception(observation: ObservationMapping, town: Town, now: float, due
 
 
 def _options(subgoals: Sequence[SeenSubgoal]) -> Iterator[tuple[ExceptionKind, SeenSubgoal]]:
-    """Yields the task exceptions that are possible now; those that exclude others come last."""
+    """Yields the task exceptions that are possible now, those that exclude others last."""
     yield from ((ExceptionKind.TASK_CHANGE, subgoal) for subgoal in subgoals if subgoal.can_change)
     yield from ((ExceptionKind.TASK_TRIGGER, subgoal) for subgoal in subgoals if subgoal.can_trigger)
     deletable = (subgoal for subgoal in subgoals if subgoal.can_delete and not subgoal.can_change)
@@ -91,7 +91,7 @@ _FIELDS: Mapping[ExceptionKind, str] = {
 def task_message(observation: ObservationMapping, kind: ExceptionKind, subgoal: int) -> str:
     """Returns a message to the participant about a change of its tasks.
 
-    It is the message that the storyboard gives, or else what the storyboard says about the task, with its reason if it
+    It is the message in the storyboard, or else the storyboard's description of the task, with its reason if it
     gives one: "New on your list: Buy milk at Ikea, because the shop next door is closed".
 
     Args:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # Of 408 times in 20 of these sessions, 83 % are right within a factor of 1.5, with a median ratio of 0.96.
 _PACE: Final = 10.3  # speed between junctions [m/s]
 _APPROACH: Final = 1.2  # time lost before a junction [s]
-_CROSSING, _CROSSING_PACE = 2.3, 20.6  # time in a junction [s], and what its length adds [m/s]
+_CROSSING, _CROSSING_PACE = 2.3, 20.6  # constant time in a junction [s], and speed for its length [m/s]
 _TURNING_ROUND: Final = 8.0  # time lost in a U-turn [s]
 _DELAYS: Final = (0.8, 0.9, 1.0, 1.1, 1.2)  # factors on the time of driving, equally probable
 _SETTING_OFF: Final = 2.0  # from a standstill, also before a light that turns green [s]
@@ -28,7 +28,7 @@ _LONGEST_RED: Final = 120.0  # [s]
 def travel_time(town: Town, progress: RouteProgress, station: float, now: float, speed: float) -> float:
     """Returns the expected time until the car stops at the goal of a route [s]; infinity without a route.
 
-    The car waits at the lights that are red when it reaches them: navigation systems are told of their programmes. As
+    The car waits at the lights that are red when it reaches them: navigation systems know their programmes. As
     it may just miss a green light, or just catch it, the time is the mean of those of quicker and slower drives.
 
     Args:
@@ -36,7 +36,7 @@ def travel_time(town: Town, progress: RouteProgress, station: float, now: float,
         progress: route and progress on it.
         station: distance of the car along its lane [m].
         now: time [s].
-        speed: present speed [m/s].
+        speed: current speed [m/s].
     """
     if not progress.legs:
         return math.inf
@@ -58,7 +58,7 @@ def _arrival(town: Town, progress: RouteProgress, station: float, begun: float, 
 
 
 def _seconds_on(town: Town, leg: Leg, start: float) -> float:
-    """Returns the time on a leg from a place on [s]; the whole leg from minus infinity, with the U-turn into it."""
+    """Returns the time for a leg after a place [s]; for minus infinity, of the whole leg with the U-turn into it."""
     length = max(leg.end - max(leg.start, start), 0.0)
     if town.lanes[leg.lane].in_junction:
         return _CROSSING + length / _CROSSING_PACE

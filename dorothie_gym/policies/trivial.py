@@ -56,7 +56,7 @@ class RandomPolicy(Policy[DrawCount]):
         self._space = deepcopy(action_space(role, self.limits))
 
     def initial_state(self, seed: int, town: Town) -> DrawCount:
-        """Returns the beginning of the stream of draws."""
+        """Returns the state before the first draw."""
         return DrawCount(seed=seed)
 
     def step(self, observation: ObservationMapping, state: DrawCount) -> tuple[ActionDict, DrawCount]:

@@ -1,4 +1,4 @@
-"""Turn lanes: lanes that end at a junction with a single exit, while the lanes beside them lead other ways.
+"""Turn lanes: lanes that end at a junction with a single exit, while the lanes beside them lead elsewhere.
 
 A lane before a junction offers a choice where it has several exits. On roads with turn lanes, the lane decides, so that
 "turn left" refers to such a junction as well.
@@ -59,7 +59,7 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
     Args:
         progress: the route.
         town: the map.
-        station: place of the car on the present leg [m].
+        station: place of the car on the current leg [m].
     """
     crossing, legs, distance = progress.next_crossing(town, station), progress.legs, 0.0
     for k, leg in enumerate(legs[:-1]):
@@ -68,7 +68,7 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
         if crossing is not None and leg.lane == crossing.lane and following.lane == crossing.exit.connector:
             return replace(crossing, distance=max(distance + leg.end - begin, crossing.distance))
         if following.entry in (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT):
-            distance += max(following.start - begin, 0.0)  # the stations of lanes side by side are much the same
+            distance += max(following.start - begin, 0.0)  # the stations of adjacent lanes are almost equal
             continue
         distance += max(leg.end - begin, 0.0)
         if following.entry is LaneEntry.FOLLOW and leg.lane in turn_lanes(town):

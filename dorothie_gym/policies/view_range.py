@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from dorothie_gym.session.spaces.observations import ObservationMapping
 
 FAR_SIGHT: Final = 60.0
-"""Range of sight from which on an agent sees far enough [m]: it stops in time from 45 km/h."""
+"""Minimum range of sight that is far enough for an agent [m]: it can stop in time from 45 km/h."""
 
 DENSE: Final = 30.0
 """Range of sight below which fog is dense [m]."""
 
 LOSS: Final = 0.85
-"""Share of the sight in the present weather below which the camera is at fault."""
+"""Share of the sight in the current weather below which the camera is at fault."""
 
 REACTION: Final = 2.5
 """Time until a driver brakes [s] (AASHTO, Green Book, stopping sight distance)."""
@@ -50,7 +50,7 @@ def sight(observation: ObservationMapping) -> float:
 
 
 def sight_in_weather(observation: ObservationMapping) -> float:
-    """Returns the range of sight that weather, light and head lights leave a sound camera [m]."""
+    """Returns the range of sight that weather, light and headlights leave a sound camera [m]."""
     return _sight_of(tuple(observation["weather"].tolist()), bool(observation["lights"]))
 
 
@@ -63,7 +63,7 @@ def camera_fault(observation: ObservationMapping) -> Sensor | None:
 
 
 def limit_of(observation: ObservationMapping) -> Limit | None:
-    """Returns the cause of a limited view; None if nothing does."""
+    """Returns the cause of a limited view; None if the view is not limited."""
     if camera_fault(observation) is not None:
         return Limit.CAMERA
     if is_foggy(observation):

@@ -88,7 +88,7 @@ def refined(before: PlaceEstimate | None, mark: PlaceEstimate, drift: float = 0.
 
 
 def about(before: PlaceEstimate | None, points: Array, sigma: float) -> PlaceEstimate:
-    """Returns the estimate after the statement that the place is near one of several points.
+    """Returns the estimate after the statement that the place is near one of the given points.
 
     Each point updates the estimate to a Gaussian, weighted by the likelihood of the point under the estimate. The
     mixture is replaced by one Gaussian of the same mean and covariance (moment matching).
@@ -147,7 +147,7 @@ class MapNames:
         self.landmarks = {name: np.array(found) for name, found in places.items()}
 
     def street(self, name: StreetName) -> Array:
-        """Returns points on the streets of a name, every 10 m of each lane (n, 2) [m]; (0, 2) for an unknown name."""
+        """Returns points on the streets with a name, every 10 m of each lane (n, 2) [m]; (0, 2) for an unknown name."""
         points = [
             lane.position(float(station))
             for lane in self._town.lanes

@@ -34,7 +34,7 @@ class CameraMount:
     """Place of the camera on the car.
 
     Attributes:
-        forward: distance in front of the middle of the car [m].
+        forward: distance in front of the centre of the car [m].
         up: above the road [m].
         pitch: upwards [degrees].
 
@@ -122,7 +122,7 @@ class PerceptionModel(enum.StrEnum):
     """All bodies around the car that are near enough for the weather."""
 
     CAMERA = "camera"
-    """Those that the picture of the camera on the car shows: in front of it, and not hidden."""
+    """Objects visible in the picture of the camera on the car: in front of it, and not hidden."""
 
 
 class ChannelKind(enum.StrEnum):
@@ -150,8 +150,8 @@ class EnvConfig:
             reads from its transcript. The Ad-Wizard observes the spoken words.
         world: settings of traffic, pedestrians and sensing.
         rewards: weights of the reward terms.
-        camera: first-person camera on the car, whose pictures the participant and the Co-Wizard observe; None for none.
-            It affects nothing else in a session.
+        camera: first-person camera on the car, observed by the participant and the Co-Wizard; None for no camera.
+            It has no other effect on a session.
         perception: perception model of the participant and the Co-Wizard. With `PerceptionModel.CAMERA` they observe
             the objects that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The
             car's own safety functions are not affected.
@@ -201,7 +201,7 @@ class EnvConfig:
     def record(self) -> dict[str, object]:
         """Returns the settings in JSON types, for records.
 
-        They lack the camera, which changes nothing in a session, and the usual perception and channel, so that records
+        They lack the camera, which has no effect on a session, and the usual perception and channel, so that records
         are equal to those of versions without a choice.
         """
         settings = asdict(self)
@@ -228,7 +228,7 @@ class RenderView(enum.StrEnum):
 
 
 def checked_view(name: str) -> RenderView:
-    """Returns the view of a name.
+    """Returns the view with a name.
 
     Raises:
         ValueError: there is no such view; lists them.

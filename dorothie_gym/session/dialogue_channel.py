@@ -38,7 +38,7 @@ SpanRecord: TypeAlias = dict[str, object]
 
 @dataclass(frozen=True, kw_only=True)
 class DeliveredUtterance:
-    """Utterance that is over, as the engine delivers it to observations, beliefs and the record.
+    """Utterance that has ended, as the engine delivers it to observations, beliefs and the record.
 
     A policy reads it back from its observation as a `HeardUtterance`.
 
@@ -60,7 +60,7 @@ class DialogueChannel:
     """Dialogue of a session.
 
     Attributes:
-        said: all utterances that are over, as they were spoken.
+        said: all utterances that have ended, as spoken.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class DialogueChannel:
         Args:
             scenario: scenario of the session.
             config: settings of the session.
-            spans: largest number of acts in an utterance.
+            spans: maximum number of acts in an utterance.
             words: seed of the wording of acts without words.
             ears: seed of the recognition errors.
             styles: seed of the speakers' styles.
@@ -154,7 +154,7 @@ class DialogueChannel:
         self._annotator.note(landmark, status)
 
     def deliver(self, now: float, cabin: Callable[[], CabinState]) -> list[DeliveredUtterance]:
-        """Returns the utterances that are over at a time [s], in the order in which they started.
+        """Returns the utterances that have ended at a time [s], in the order of their starts.
 
         Args:
             now: the time [s].
@@ -246,7 +246,7 @@ Royal Society A 231, 1955)."""
 
 
 _STRONGEST_WIND: Final = 15.0
-"""Velocity of the wind at 100 percent [m/s], a gale's beginning."""
+"""Velocity of the wind at 100 percent [m/s], the lower limit of a gale."""
 
 
 _RAIN: Final = 60.0
@@ -298,7 +298,7 @@ class CabinState:
 
 
 def cabin_of(world: World) -> CabinState:
-    """Returns what makes noise in the car of a world now."""
+    """Returns the current sources of noise in the car of a world."""
     weather = world.weather.values
     return CabinState(
         speed=abs(float(world.car.speed)),

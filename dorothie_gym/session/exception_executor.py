@@ -27,31 +27,31 @@ if TYPE_CHECKING:
     from dorothie_gym.tasks.storyboard import TaskState
 
 PROP_FROM_START = 30.0
-"""Least distance of a prop from the start of its lane [m]; it leaves room for a U-turn in front of the prop."""
+"""Minimum distance of a prop from the start of its lane [m]; it leaves room for a U-turn in front of the prop."""
 
 PROP_FROM_END = 8.0
-"""Least distance of a prop from the end of its lane [m]."""
+"""Minimum distance of a prop from the end of its lane [m]."""
 
 FROM_SITE = 25.0
-"""Least distance of a prop from a waypoint along the lane [m]; the ego must be able to stop at the waypoint."""
+"""Minimum distance of a prop from a waypoint along the lane [m]; the ego must be able to stop at the waypoint."""
 
 FROM_CAR = 25.0
-"""Least distance of anything new from the ego, beyond its stopping distance [m]; it leaves room for a U-turn."""
+"""Minimum distance of new bodies from the ego, beyond its stopping distance [m]; it leaves room for a U-turn."""
 
 FROM_VEHICLE = 6.0
-"""Least distance of a new prop from the centre of a vehicle [m]."""
+"""Minimum distance of a new prop from the centre of a vehicle [m]."""
 
 PROP_GAP = 0.5
-"""Least gap between two props [m]."""
+"""Minimum gap between two props [m]."""
 
 FROM_WAYPOINT = 8.0
-"""Least distance of a new vehicle from a waypoint along the lane [m]."""
+"""Minimum distance of a new vehicle from a waypoint along the lane [m]."""
 
 SPAWN_STEP = 3.5
 """Distance between the candidate places of new actors along a lane [m]."""
 
 MAX_POPULATION = 30
-"""Largest number of vehicles, and of pedestrians, up to which spawning fills a town."""
+"""Maximum number of vehicles, and of pedestrians, up to which spawning fills a town."""
 
 
 class ExceptionExecutor:
@@ -60,7 +60,7 @@ class ExceptionExecutor:
     Args:
         world: simulated world.
         task: progress in the storyboard.
-        max_props: largest number of props.
+        max_props: maximum number of props.
     """
 
     def __init__(self, world: World, task: TaskState, max_props: int) -> None:
@@ -202,11 +202,11 @@ class ExceptionExecutor:
         return None
 
     def _stopping_distance(self) -> float:
-        """Returns the stopping distance of the ego at the present wetness of the road [m]."""
+        """Returns the stopping distance of the ego at the current wetness of the road [m]."""
         return self._world.weather.braking_distance(float(self._world.car.speed), PLANNED_BRAKING)
 
     def _unsafe(self, action: AdWizardAction, kind: PropKind, *, without: Prop | None) -> str | None:
-        """Returns the reason why a prop must not stand at a place, or None.
+        """Returns the reason why a prop must not be placed somewhere, or None.
 
         The checks cover every site of the town, not only those of the live subgoals: a refusal must not reveal hidden
         landmarks. Every reachable site stays reachable.

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 
 class StepBegun(NamedTuple):
-    """State from the beginning of a decision that its end needs.
+    """State from the start of a decision that is needed at its end.
 
     Attributes:
         message: message of the Ad-Wizard.
@@ -78,7 +78,7 @@ class LiveSession:
         trail: positions of the ego [m], one for each decision.
         decisions: decisions played so far.
         over: whether the session is closed.
-        dialogue: speech between participant and Co-Wizard: what was said, and what is being said.
+        dialogue: past and current utterances of participant and Co-Wizard.
         log: events and refusals of the last decision, infractions and counts so far.
         observer: observations, masks and pictures of the roles.
     """
@@ -143,7 +143,7 @@ class LiveSession:
         return StepBegun(message, spoken, collisions, reached)
 
     def end_step(self, begun: StepBegun, events: Sequence[WorldEvent]) -> dict[Role, RewardTerms]:
-        """Draws the consequences of a step of the world, which had these events; returns the reward terms."""
+        """Processes the events of a step of the world; returns the reward terms."""
         for event in events:
             self.log.add_world_event(event)
         self.note_arrivals()
@@ -160,12 +160,12 @@ class LiveSession:
         )
 
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Builds the observations of some roles, by agent; what several of them need is computed once."""
+        """Builds the observations of the given roles, by agent; shared values are computed once."""
         return self.observer.observations(roles, self.decisions)
 
     @property
     def picture(self) -> CameraFrame | None:
-        """Picture of the camera on the car at the present decision, boxes included; None without a camera."""
+        """Picture of the camera on the car at the current decision, boxes included; None without a camera."""
         return self.observer.picture(self.decisions)
 
     def end(self, reason: str) -> None:
@@ -262,12 +262,12 @@ class LiveSession:
         self.trail.append(self._ego_position())
 
     def note_arrivals(self) -> None:
-        """Completes the subgoals whose waypoint the ego has reached, if it stands."""
+        """Completes the subgoals at whose waypoint the ego has stopped."""
         if self.world.car.speed <= EGO_STANDING:
             self._subgoals.note_arrivals(*self._ego_position())
 
     def _deliver(self, message: str) -> DeliveredMessages:
-        """Delivers the utterances that are over and logs their acts; `message` is that of the Ad-Wizard."""
+        """Delivers the utterances that have ended and logs their acts; `message` is that of the Ad-Wizard."""
         said: dict[Role, Utterance] = {}
         heard: dict[Role, Utterance] = {}
         now = self.world.time

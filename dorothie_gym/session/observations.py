@@ -97,7 +97,7 @@ class ActionMasks(CachedViews):
         return mask
 
     def mask(self, role: Role) -> RoleMask:
-        """Returns the mask of a role's action space at the present decision; the caller owns it."""
+        """Returns the mask of a role's action space at the current decision; the caller owns it."""
         if role is Role.CO_WIZARD:
             self._views.find_feasible()
         elif role is Role.AD_WIZARD:
@@ -150,7 +150,7 @@ class DeliveredMessages:
 
 
 class ObservationBuilder(CachedViews):
-    """Builds the observations of a session, for the roles that are asked for.
+    """Builds the observations of a session for the requested roles.
 
     Compiled code writes values that change at every decision (`view_steps`). Constant values are written once, and
     rarely changing ones when they change.
@@ -182,7 +182,7 @@ class ObservationBuilder(CachedViews):
         return self._views.tables()
 
     def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
-        """Builds the observations of some roles, by agent, each in its observation space.
+        """Builds the observations of the given roles, by agent, each in its observation space.
 
         Args:
             delivered: speech and messages of the last decision.
@@ -255,7 +255,7 @@ class ObservationBuilder(CachedViews):
             table[name.value] = (1.0, *guess.mean, xx, yy, xy)
 
     def _write_props(self) -> None:
-        """Writes the props, if there are or were any."""
+        """Writes the props, if there are any or have been."""
         if not (self._props or self._world.actors.has_props):
             return
         props, table = self._world.actors.props, self._tables[Role.AD_WIZARD]["props"]
@@ -312,7 +312,7 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
 
     Args:
         table: table, all rows of which are written.
-        task: present state of the task.
+        task: current state of the task.
         permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
     """
     table[:] = 0.0
@@ -337,13 +337,13 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
 
 
 class SessionObserver:
-    """Observations, masks and pictures of a session at the present decision.
+    """Observations, masks and pictures of a session at the current decision.
 
-    Rows and masks are made when they are first used: not all sessions are observed by dicts, or asked for masks.
+    Rows and masks are made when they are first used: not all sessions are observed by dicts or need masks.
 
     Attributes:
         delivered: speech and messages of the last decision; the session replaces it.
-        camera_perception: what the picture shows, if the roles see by the camera.
+        camera_perception: content of the picture, if the roles perceive by the camera.
     """
 
     def __init__(
@@ -384,7 +384,7 @@ class SessionObserver:
         self.write()
 
     def write(self) -> None:
-        """Writes all of the observations and masks that the compiled code does not, and what it reads."""
+        """Writes the parts of observations and masks that the compiled code leaves out, and its inputs."""
         self._world.write_weather()
         self._builder.write(self.delivered)
         self.masks.write()
@@ -401,7 +401,7 @@ class SessionObserver:
             self._beliefs.recognised = self.camera_perception.recognised
 
     def observations(self, roles: Sequence[Role], decision: int) -> dict[str, Observation]:
-        """Builds the observations of some roles at the decision of a number, by agent."""
+        """Builds the observations of the given roles at the decision of a given number, by agent."""
         observations = self._builder.build(self.delivered, roles)
         if self.camera_perception is not None:
             self.camera_perception.add_to(observations)
@@ -425,7 +425,7 @@ class Observable(Protocol):
     decisions: int
 
     def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
-        """Builds the observations of some roles at the present decision, by agent."""
+        """Builds the observations of the given roles at the current decision, by agent."""
         ...
 
 
@@ -433,7 +433,7 @@ class LazyObservations(Mapping[str, Observation]):
     """Observations of the roles at one decision, each built when it is first read.
 
     A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
-    read in time is asked for afterwards.
+    read in time is requested afterwards.
     """
 
     def __init__(self, session: Observable) -> None:
@@ -450,7 +450,7 @@ class LazyObservations(Mapping[str, Observation]):
         return len(_AGENTS)
 
     def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Returns the observations of some roles by agent; those that are missing are built together."""
+        """Returns the observations of the given roles by agent; missing ones are built together."""
         missing = [role for role in roles if role not in self._built] if self._built else roles
         if not missing:
             return {_NAMES[role]: self._built[role] for role in roles}

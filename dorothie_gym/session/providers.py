@@ -41,10 +41,10 @@ class Pictures(Protocol):
     """Pictures of the camera on the car of a session (`camera.session_pictures`)."""
 
     def frame(self, decision: int) -> CameraFrame:
-        """Returns the picture at the present decision, of this number."""
+        """Returns the picture at the current decision with this number."""
 
     def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
-        """Adds the pictures of the present decision to the observations of the roles that see them."""
+        """Adds the pictures of the current decision to the observations of the roles that see them."""
 
 
 class VisiblePerception(Protocol):
@@ -52,14 +52,14 @@ class VisiblePerception(Protocol):
 
     @property
     def in_view(self) -> tuple[int, ...]:
-        """Indices of the landmarks that are recognised at the present decision, ascending."""
+        """Indices of the landmarks that are recognised at the current decision, ascending."""
 
     @property
     def recognised(self) -> tuple[int, ...]:
         """Indices of the landmarks that have been recognised so far, in the order of the first time."""
 
     def look(self) -> None:
-        """Looks at the present decision."""
+        """Updates to the current decision."""
 
     def pixels(self, key: int) -> int:
         """Returns the number of visible pixels of a body, by its key."""
@@ -103,7 +103,7 @@ def draw_pictures(world: World, scenario: Scenario, config: CameraConfig) -> Pic
 
 
 def see_by_camera(world: World, scenario: Scenario) -> VisiblePerception:
-    """Returns the perception by the pictures of a session, after the first look."""
+    """Returns the perception by the pictures of a session, initialised with the first picture."""
     perception: VisiblePerception = _make(PERCEPTION, world, scenario)
     return perception
 
@@ -114,7 +114,7 @@ def speak_aloud(seed: np.random.SeedSequence, *, words_per_second: float, classi
     Args:
         seed: seed of voices and noise.
         words_per_second: speaking rate of the session [words/s].
-        classify: as of `dialogue.Recogniser`.
+        classify: as in `dialogue.Recogniser`.
 
     Raises:
         SpeechError: the extra `speech` is not installed.

@@ -92,7 +92,7 @@ class LightStates:
 
 
 def _remaining(programme: LightProgramme, time: float) -> float:
-    """Returns the remaining time of the present phase [s]."""
+    """Returns the remaining time of the current phase [s]."""
     now = (time - programme.offset) % programme.cycle
     ends = itertools.accumulate(phase.duration for phase in programme.phases)
     return next((end - now for end in ends if now < end), 0.0)

@@ -1,4 +1,4 @@
-"""All rewards: what each environment rewards, the names of the terms, and their weights.
+"""All rewards: the rewards of each environment, the names of the terms, and their weights.
 
 | environment | terms | weights |
 |---|---|---|
@@ -9,7 +9,7 @@
 
 The reward of a decision is the sum of its terms (the mean for predictions); `info["reward_terms"]` has each of them.
 `Town-v0` is an environment of highway-env without roles: its two terms are in `TownEnv._rewards`, where highway-env
-asks for them.
+requests them.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class NavigationWeights:
 
     Attributes:
         progress: reward for each metre by which the cost to go decreases. The cost to go is that of the route to the
-            present goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng,
+            current goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng,
             Harada and Russell 1999).
         subgoal: reward for each subgoal reached.
         success: reward at the end, if every live subgoal was reached without a collision caused by the ego.

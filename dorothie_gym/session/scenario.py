@@ -96,7 +96,7 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
         seed: any integer >= 0.
 
     Raises:
-        StoryboardError: the template does not fit the town.
+        StoryboardError: the template cannot be bound to the town.
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     if template is None:

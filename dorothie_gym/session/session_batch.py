@@ -103,7 +103,7 @@ class SessionBatch(CachedViews):
         self.views = taken(values, "views", RoleArrays)
 
     def begin(self, row: int, seed: int | None, scenario: Scenario | None) -> None:
-        """Begins a session, see `SessionEngine.reset`; `observe` is to follow."""
+        """Begins a session, see `SessionEngine.reset`; `observe` must follow."""
         engine = self.engines[row]
         engine.reset(seed, scenario=scenario)
         self._worlds.put(row, engine.session.world)
@@ -112,7 +112,7 @@ class SessionBatch(CachedViews):
     # --- A decision -------------------------------------------------------------------------------------------------
 
     def decode(self, actions: Mapping[int, Mapping[str, ActionMapping]]) -> dict[int, dict[Role, RoleAction]]:
-        """Returns the actions of some sessions, decoded.
+        """Returns the actions of the given sessions, decoded.
 
         Args:
             actions: actions by row of the session and agent.
@@ -129,7 +129,7 @@ class SessionBatch(CachedViews):
         return decoded
 
     def step(self, actions: Mapping[int, Mapping[Role, RoleAction]]) -> dict[int, StepOutcome]:
-        """Plays a decision in some sessions; `observe` is to follow.
+        """Steps the given sessions by one decision; `observe` must follow.
 
         Args:
             actions: decoded actions by row of the session.
@@ -145,7 +145,7 @@ class SessionBatch(CachedViews):
         }
 
     def observe(self, rows: Sequence[int] | None = None) -> None:
-        """Writes the observations and masks of some sessions, or of all that have begun."""
+        """Writes the observations and masks of the given sessions, or of all that have begun."""
         if rows is not None:
             for row in rows:
                 self.engines[row].session.observer.observe()
@@ -159,7 +159,7 @@ class SessionBatch(CachedViews):
         self._draw([row for row, engine in enumerate(self.engines) if engine.has_begun])
 
     def _draw(self, rows: Sequence[int]) -> None:
-        """Draws the pictures of some sessions, if they have cameras."""
+        """Draws the pictures of the given sessions, if they have cameras."""
         if not self.pictures or not rows:
             return
         self._show(rows[0])  # here: threads would compile one after another
@@ -180,7 +180,7 @@ class SessionBatch(CachedViews):
 
     @property
     def infractions(self) -> NDArray[np.int64]:
-        """Numbers of infractions so far (sessions, 5), in the order of `INFRACTION_KINDS`, to be copied."""
+        """Numbers of infractions so far (sessions, 5), in the order of `INFRACTION_KINDS`; callers must copy them."""
         counts: NDArray[np.int64] = plain(self._worlds.arrays.watch)[:, 0]["counts"]
         return counts
 

@@ -1,7 +1,7 @@
 """Sessions of a town, one after the other: decoding of actions, seeds, and the end of a session.
 
-`SessionEngine.step` plays one decision: it decodes the actions of the three roles, lets the session carry them out
-(`begin_step`), steps the world by half a second of physics, and lets the session draw the consequences (`end_step`).
+`SessionEngine.step` runs one decision: it decodes the actions of the three roles, lets the session carry them out
+(`begin_step`), steps the world by half a second of physics, and lets the session process the results (`end_step`).
 Environments (`envs/`), rollouts (`evaluation/rollout/play.py`) and the console (`lab/console/room.py`) call it.
 
 Second of the five files that explain the package. Next: `session/live_session.py`.
@@ -64,9 +64,9 @@ class SessionEngine(Restorable):
     Args:
         town: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
         storyboard: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one in each reset.
-        config: settings of the sessions, or a mapping of them, as the JSON of `env.spec` has it.
+        config: settings of the sessions, also as a mapping, like that in the JSON of `env.spec`.
         max_cycles: decisions until truncation, instead of `config.max_seconds`.
-        limits: sizes of the spaces, if they are to be larger than the town needs.
+        limits: sizes of the spaces, to make them larger than the town needs.
 
     Attributes:
         town: the map.
@@ -111,7 +111,7 @@ class SessionEngine(Restorable):
 
     @property
     def engine(self) -> SessionEngine:
-        """This engine: an engine is played like an environment that has one."""
+        """This engine: code that accepts an environment with an engine also accepts an engine."""
         return self
 
     def reset(self, seed: int | None = None, *, scenario: Scenario | None = None) -> LazyObservations:
@@ -134,14 +134,14 @@ class SessionEngine(Restorable):
         return self.observations
 
     def step(self, actions: Mapping[str, ActionMapping]) -> StepOutcome:
-        """Plays one decision: the actions of all roles, then the physics until the next decision.
+        """Runs one decision: the actions of all roles, then the physics until the next decision.
 
         Args:
             actions: an action for each agent, see `dorothie_gym.session.spaces.action_space`.
 
         Raises:
             ValueError: an action is missing or malformed; the message names the agent and the field.
-            RuntimeError: no session has begun, or it is over.
+            RuntimeError: no session has begun, or it has ended.
         """
         decoded = self.decode(actions)
         begun = self.begin_step(decoded)
@@ -161,12 +161,12 @@ class SessionEngine(Restorable):
         return decoded
 
     def begin_step(self, actions: Mapping[Role, RoleAction]) -> StepBegun:
-        """Carries out the actions of a decision; the world is to be stepped next, and then the step to be ended."""
+        """Carries out the actions of a decision; callers then step the world and end the step."""
         self._observations = None
         return self.session.begin_step(actions)
 
     def end_step(self, begun: StepBegun, events: Sequence[WorldEvent]) -> StepOutcome:
-        """Ends a decision after the step of the world, which had these events."""
+        """Ends a decision after the step of the world, with the events of the step."""
         session = self.session
         terms = session.end_step(begun, events)
         terminated = session.task.done
@@ -182,7 +182,7 @@ class SessionEngine(Restorable):
 
         Raises:
             ValueError: the reason is one of the engine itself.
-            RuntimeError: no session has begun, or it is over.
+            RuntimeError: no session has begun, or it has ended.
         """
         if not reason.breaks_off:
             allowed = ", ".join(each.value for each in EndReason if each.breaks_off)
@@ -198,7 +198,7 @@ class SessionEngine(Restorable):
             return session.decisions >= self.max_cycles
         return session.world.time >= self.config.max_seconds - 1e-9
 
-    # --- the present decision ---------------------------------------------------------------------------------------
+    # --- the current decision ---------------------------------------------------------------------------------------
 
     @property
     def over(self) -> bool:
@@ -218,7 +218,7 @@ class SessionEngine(Restorable):
         return self._session
 
     def observation_space(self, role: Role) -> spaces.Dict:
-        """Returns the observation space of a role, with the fields of camera and perception if there are any."""
+        """Returns the observation space of a role, including fields of camera and perception if they are configured."""
         space, config = observation_space(role, self.limits, self.config.observe_acts), self.config
         if role not in OBSERVERS:
             return space
@@ -232,17 +232,17 @@ class SessionEngine(Restorable):
 
     @property
     def observations(self) -> LazyObservations:
-        """Observations at the present decision, the same object until the next step."""
+        """Observations at the current decision, the same object until the next step."""
         if self._observations is None:
             self._observations = LazyObservations(self.session)
         return self._observations
 
     def mask(self, role: Role) -> RoleMask:
-        """Returns the mask of a role's action space at the present decision."""
+        """Returns the mask of a role's action space at the current decision."""
         return self.session.observer.masks.mask(role)
 
     def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:
-        """Returns the info dictionary of a role, always with the same keys; the caller owns everything in it.
+        """Returns the info dictionary of a role, always with the same keys; the caller owns its contents.
 
         Args:
             role: the role.
@@ -271,7 +271,7 @@ class SessionEngine(Restorable):
 
     @property
     def last_recordings(self) -> Mapping[str, Samples]:
-        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""
+        """Audio of the spans that had ended at the last decision, at 16 kHz, by file name; empty without speech."""
         return self.session.dialogue.recordings
 
     @property

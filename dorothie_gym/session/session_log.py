@@ -55,9 +55,9 @@ class SessionCounts(TypedDict):
 
 
 class SessionSummary(SessionCounts):
-    """State of a session; `reason` is there when it is over ("arrived", "out of time" and the like).
+    """State of a session; `reason` is set when it has ended ("arrived", "out of time" and the like).
 
-    `usage` is there for played sessions in which policies have cost something (calls, tokens), by role.
+    `usage` is set for sessions with policies that have a cost (calls, tokens), by role.
     """
 
     success: bool
@@ -115,7 +115,7 @@ class EventLog:
         flagged: bool = False,
         frame: int | None = None,
     ) -> None:
-        """Logs an event; its frame is the present one unless another is given."""
+        """Logs an event; its frame is the current one unless another is given."""
         at = self._world.frame if frame is None else frame
         self.events.append(Event(frame=at, type=kind, source=source, flagged=flagged, data=dict(data)))
 

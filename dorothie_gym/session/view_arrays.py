@@ -109,7 +109,7 @@ def _named(kind: type[_Named], arrays: Arrays) -> _Named:
 
 
 class RoleArrays(CachedViews):
-    """Observations and action masks of some sessions, by role: arrays with a row for each session, and their texts.
+    """Observations and action masks of sessions, by role: arrays with a row for each session, and their texts.
 
     Attributes:
         observations: buffers of the numbers in the observations.
@@ -165,7 +165,7 @@ class RoleArrays(CachedViews):
         return observed
 
     def clear(self, row: int) -> None:
-        """Forgets a session: its observations are zeros and empty texts."""
+        """Clears a session: its observations become zeros and empty texts."""
         for role, buffer in self.observations.items():
             buffer.clear(row)
             for texts in self.texts[role].values():
@@ -193,7 +193,7 @@ def _mask_shape(space: AnySpace) -> Shape | None:
 @by_reference
 @shared
 class TurnOptions(NamedTuple):
-    """Exits behind each lane of a town.
+    """Exits after each lane of a town.
 
     Attributes:
         first: (lanes + 1,) int32 first row of each lane's exits, and the one after the last.

@@ -1,4 +1,4 @@
-"""Observations and action masks of many sessions at once (compiled), as far as they change at every decision."""
+"""Parts of observations and action masks that change at every decision, for many sessions at once (compiled)."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def observe_share(
         turns: numbers of the sessions, see `threads.take`; shared by all threads that work on them.
         home: number of the block that is this thread's own.
         town: arrays of the town.
-        options: exits behind its lanes.
+        options: exits after its lanes.
         worlds: arrays of the worlds of all sessions.
         participants: observations, written.
         co_wizards: observations, written.
@@ -111,7 +111,7 @@ def observe_share(
 
 @compiled
 def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
-    """Writes the bodies that the ego perceives as rows of `ObjectColumn`, zeros behind them.
+    """Writes the bodies that the ego perceives as rows of `ObjectColumn`, zeros after them.
 
     Args:
         world: arrays of the world.
@@ -143,7 +143,7 @@ def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
 
 @compiled
 def write_lanes(course: RecordArray[CoursePointRecord], count: int, here: int, table: NDArray[np.int64]) -> None:
-    """Writes the lanes of a path from a point on, in order and without repetition, as 1 + lane number; then zeros."""
+    """Writes the lanes of a path after a point, in order without repetition, as 1 + lane index, padded with zeros."""
     row, last = 0, -1
     for k in range(here, count):
         if row == len(table):
@@ -209,7 +209,7 @@ def observe_as_co_wizard(
 
     Args:
         town: arrays of the town.
-        options: exits behind its lanes.
+        options: exits after its lanes.
         world: arrays of the world.
         views: observations, one row of which is written.
         number: the row.
@@ -275,7 +275,7 @@ def write_masks(
 
     Args:
         town: arrays of the town.
-        options: exits behind its lanes.
+        options: exits after its lanes.
         world: arrays of the world.
         physical: (n,) mask that is written; actions that are always possible are left as they are.
         angle: (360,) mask that is written.
@@ -331,7 +331,7 @@ class SessionViews(CachedViews):
 
     @property
     def most_props(self) -> int:
-        """Largest number of props."""
+        """Maximum number of props."""
         return len(self.arrays.observations[Role.AD_WIZARD].arrays["props"][self.row])
 
     def observe(self, roles: Sequence[Role]) -> None:

@@ -1,6 +1,6 @@
 """Compilation of the simulation ahead of its use, in two processes where there are two processors.
 
-Half of the work is the loop over substeps (`sim.step.step_share`), which a second process compiles meanwhile:
+Half of the work is the loop over substeps (`sim.step.step_share`), which a second process compiles at the same time:
 it leaves the machine code in the cache, where the first one finds it.
 """
 
@@ -46,7 +46,7 @@ TOWN: Final = "brookside"
 """Town of the short session that is played; machine code is the same for all towns."""
 
 Progress: TypeAlias = Callable[[str, int, int], None]
-"""Called with the name of the function that is being compiled, and how many functions are begun of how many in all."""
+"""Called with the name of the function that is being compiled, and the numbers of functions begun and in total."""
 
 _HELPER: Final = """
 import os, sys, threading
@@ -157,7 +157,7 @@ def _compiled_functions() -> set[str]:
 
 @contextmanager
 def reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
-    """Calls `progress` for each function that this process begins to compile; yields a function that does so, too."""
+    """Calls `progress` for each function that this process begins to compile; also yields a function for such calls."""
     if progress is None:
         yield lambda name: None
         return
@@ -172,7 +172,7 @@ def _helper(report: Callable[[str], None]) -> Iterator[Callable[[], None]]:
     if is_warm() or available_processors() < 2:
         yield lambda: None
         return
-    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the package may lie anywhere on it
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the package may be anywhere on it
     with starting_process():
         process = subprocess.Popen(
             [sys.executable, "-c", _HELPER],
@@ -185,7 +185,7 @@ def _helper(report: Callable[[str], None]) -> Iterator[Callable[[], None]]:
     reader = threading.Thread(target=_forward, args=(process, report), daemon=True)
     reader.start()
     try:
-        yield reader.join  # if the process failed, this one compiles itself what is missing
+        yield reader.join  # if the process failed, this one compiles the missing functions
     finally:
         assert process.stdin is not None
         process.kill()

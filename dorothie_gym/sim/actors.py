@@ -64,7 +64,7 @@ class Actors(CachedViews):
 
     @property
     def vehicles(self) -> list[TrafficVehicle]:
-        """Traffic, cyclists among it."""
+        """Traffic, including cyclists."""
         return self._bodies.vehicles()
 
     @property
@@ -74,7 +74,7 @@ class Actors(CachedViews):
 
     @property
     def props(self) -> list[Prop]:
-        """Things placed by the Ad-Wizard, in the order in which they came."""
+        """Props placed by the Ad-Wizard, in order of placement."""
         if not self.has_props:
             return []
         return sorted(self._bodies.props(), key=lambda prop: int(prop.key))
@@ -113,7 +113,7 @@ class Actors(CachedViews):
 
         Args:
             kind: kind of the prop.
-            lane: it stands on.
+            lane: lane of the prop.
             station: distance along the lane [m].
         """
         self._make_room(props=1)
@@ -129,7 +129,7 @@ class Actors(CachedViews):
         remove_prop(self.town_arrays, self.arrays, prop.row)
 
     def _make_room(self, *, vehicles: int = 0, pedestrians: int = 0, props: int = 0) -> None:
-        """Replaces the arrays by bigger ones if so many more actors do not fit."""
+        """Replaces the arrays by larger ones if they have no room for this many more actors."""
         state = self.arrays
         free = (
             int((state.vehicles["kind"] == Kind.EMPTY).sum()),

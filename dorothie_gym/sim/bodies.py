@@ -63,7 +63,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         height: height of the road under it [m].
         lane_id: closest lane, its id in the town; `station` [m] along it.
         target_speed: desired speed [m/s].
-        standing: duration of its stand, its light not being red [s].
+        standing: time for which it has stood while its light was not red [s].
         odometer: distance driven [m].
     """
 
@@ -156,12 +156,12 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
                 rest.pop(0)
             onward = network.along_route(network.successors(here), rest)
             if not onward:
-                break  # drawn at random from here on, as highway-env does where a route does not fit the road
+                break  # the rest is drawn at random, as highway-env does where a route does not fit the road
             lanes.append(network.lane_id(onward[0]))
         self._plan(lanes)
 
     def _plan(self, lanes: Sequence[int]) -> None:
-        """Follows some lanes, each a continuation of the one before, and plans on from there."""
+        """Follows the given lanes, each a continuation of the previous one, and extends the plan from the last."""
         town, record = town_arrays(self.road.network), self.record
         moves_on = lanes[0] != record.plan[0]
         record.plan[: len(lanes)] = lanes
@@ -179,7 +179,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
 
     @property
     def destination_direction(self) -> Array:
-        """Direction to its destination (2,) of length 1, or zeros where it is there."""
+        """Unit vector to its destination (2,), or zeros at the destination."""
         away = self.destination - self.position
         far = pm.hypot(*away)
         return away / far if far > 0.0 else np.zeros(2)
@@ -190,7 +190,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
 
     @property
     def action(self) -> dict[str, float]:
-        """Present action: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
+        """Current action: `acceleration` [m/s^2] and `steering`, the angle of its front wheels [rad]."""
         record = self.record
         return {"acceleration": float(record.acceleration), "steering": float(steering_angle(record.slip))}
 
@@ -211,7 +211,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         self.action = action
 
     def on_state_update(self) -> None:
-        """Finds the closest lane, and the place on the lane that it follows; to be called after it was moved."""
+        """Finds the closest lane, and the place on the lane that it follows; must be called after a move."""
         update_lane(town_arrays(self.road.network), self.record)
         if self.road.record_history:
             self.remember()
@@ -294,7 +294,7 @@ class Prop(_Thing[PropRecord], Obstacle):
     Attributes:
         key: identifies the body.
         height: height of the road under it [m].
-        lane_id: lane that it stands on; `station` [m] along it.
+        lane_id: lane of the body; `station` [m] along it.
         crashed: highway-env's mark of a collision; the compiled loops keep none for props.
     """
 

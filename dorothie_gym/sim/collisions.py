@@ -47,16 +47,16 @@ def overlap(
     """Returns whether two rectangles touch: no axis of either separates them (Gottschalk, Lin and Manocha 1996).
 
     Args:
-        dx: from the middle of the first to that of the second [m], `dy` likewise.
-        dy: [m].
-        cos: direction of the first, `sin` likewise.
-        sin: see there.
-        length: length of the first along its direction [m], `width` across it.
-        width: [m].
-        other_cos: direction of the second, and its size.
-        other_sin: see there.
-        other_length: [m].
-        other_width: [m].
+        dx: offset of the centre of the second from that of the first along x [m].
+        dy: the same along y [m].
+        cos: cosine of the direction of the first.
+        sin: its sine.
+        length: length of the first along its direction [m].
+        width: its width across that [m].
+        other_cos: cosine of the direction of the second.
+        other_sin: its sine.
+        other_length: length of the second [m].
+        other_width: width of the second [m].
     """
     parallel = abs(cos * other_cos + sin * other_sin)
     square = abs(cos * other_sin - sin * other_cos)
@@ -151,7 +151,7 @@ def _meet(world: WorldArrays, one: int, other: int, vehicles: int, walkers: int)
             walker.crashed = True
             clock.run_over += 1
             if vehicle.kind == Kind.EGO:
-                vehicle.crashed = True  # traffic drives on; the mark is for vehicles that are driven from outside
+                vehicle.crashed = True  # traffic drives on; only externally driven vehicles are marked
     else:
         prop = world.props[other - vehicles - walkers]
         if _touch(vehicle, prop, prop.radius, prop.length, prop.width):
@@ -169,7 +169,7 @@ def _touch_by_car(world: WorldArrays, other: int, vehicles: int, walkers: int) -
         if second.touched or not _touch(vehicle, second, second.radius, second.length, second.width):
             return
         second.touched = second.crashed = True
-        second.speed = 0.0  # else it would go on through the car
+        second.speed = 0.0  # else it would continue through the car
         _book(world, VEHICLES, int(second.key), other, second.x, second.y)
     elif other < vehicles + walkers:
         walker = world.pedestrians[other - vehicles]
@@ -214,7 +214,7 @@ def _touch(vehicle: VehicleRecord, other: PlacedBody, radius: float, length: flo
 
 
 class OrientedBox(NamedTuple):
-    """Outline of a body on the ground: its middle [m], heading [rad], length along it and width across it [m]."""
+    """Outline of a body on the ground: its centre [m], heading [rad], length along it and width across it [m]."""
 
     x: float
     y: float

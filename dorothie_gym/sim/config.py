@@ -22,7 +22,7 @@ class WorldConfig:
         vehicles: background vehicles, about one in eight a cyclist, as many as fit.
         pedestrians: pedestrians, as many as fit.
         cruise_speed: cruise speed of the ego at the start [km/h], a multiple of 5 in 5..90.
-        collisions_stop: duration of the ego's stand after a collision [s].
+        collisions_stop: duration of the ego's standstill after a collision [s].
     """
 
     vehicles: int = 10

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.network.network import TownNetwork
 
 STREET_WAY_REACH = 1.0
-"""Distance to the way beside a street within which a pedestrian is placed on it [m]."""
+"""Distance to the footway beside a street within which a pedestrian is placed on it [m]."""
 
 PROP_LEVEL = 2.0
 """Difference of height up to which a prop is on a lane [m]."""
@@ -173,7 +173,7 @@ def add_street_walker(
         station: along it [m].
 
     Returns:
-        Its row; None if there is no way, if a pedestrian or the ego is there already, or if all rows are taken.
+        Its row; None if there is no footway, if a pedestrian or the ego is there already, or if all rows are taken.
     """
     beside = network.town.lanes[rightmost(network.town, lane)]
     station = min(station, beside.length)
@@ -330,8 +330,8 @@ def populate(
         town: its arrays.
         world: arrays of the world; the ego, if there is one, is the first of its vehicles.
         seed: seed of the places and the desired speeds.
-        vehicles: how many, cyclists included.
-        pedestrians: how many; on pavements, or in a town without them beside the streets.
+        vehicles: number of vehicles, cyclists included.
+        pedestrians: number of pedestrians; on pavements, or in a town without them beside the streets.
         cyclists: share of the vehicles; they ride to the right on slow roads.
     """
     rng = np.random.default_rng(seed)
@@ -367,7 +367,7 @@ def _fill_lanes(
     town: TownArrays, world: WorldArrays, lanes: NDArray[np.int64], stations: Array, rideable: NDArray[np.bool_],
     cycles: NDArray[np.bool_], shares: Array, pool: NDArray[np.int64],
 ) -> int:  # fmt: skip
-    """Adds vehicles at the first free ones of some places; returns how many.
+    """Adds vehicles at the first free places among the given ones; returns their number.
 
     Args:
         town: arrays of the town.
@@ -409,7 +409,7 @@ def _add_people(
 
 @lru_cache(maxsize=16)
 def _footways(network: TownNetwork) -> Array:
-    """Returns the shares of the footways on which pedestrians begin, cumulated; (0,) where there are none."""
+    """Returns the shares of the footways on which pedestrians begin, cumulated; (0,) if there are none."""
     walks = plain(town_arrays(network).walks)
     for kind in (Footway.PAVEMENT, Footway.STREET):
         lengths = np.where(walks["kind"] == kind, walks["length"], 0.0)
@@ -435,8 +435,8 @@ def _fill_footways(
         town: arrays of the town.
         world: arrays of the world.
         walks: (n,) footways that are tried.
-        shares: (n + room,) in [0, 1): of the way's length, and after each free place of the range of the speeds.
-        room: how many at most.
+        shares: (n + room,) in [0, 1): of the footway's length; after each free place, of the range of the speeds.
+        room: maximum number of pedestrians.
         place: (1,) scratch.
         pool: see `randomness.seed_of`.
     """

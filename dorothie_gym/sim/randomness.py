@@ -1,8 +1,8 @@
-"""Random numbers whose state lies in records, the same in every process.
+"""Random numbers whose state is kept in records, the same in every process.
 
 - xorshift32 (Marsaglia, 2003) for the choices of traffic and pedestrians, one stream a body.
 - PCG64 (O'Neill, 2014) with the ziggurat of Marsaglia and Tsang (2000) for normal numbers: those of
-  `numpy.random.Generator.standard_normal`, from the state of a generator on.
+  `numpy.random.Generator.standard_normal`, continuing from the state of a generator.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def seed_of(first: int, second: int, pool: NDArray[np.int64]) -> int:
 
     Args:
         first: number in 0..2^32 - 1.
-        second: likewise.
+        second: number in 0..2^32 - 1.
         pool: (4,) scratch.
     """
     _fill_pool(first, second, pool)

@@ -92,7 +92,7 @@ class TownRoad(CachedViews, Road):
         return float(thing.lane.height_at(thing.lane.local_coordinates(thing.position)[0]))
 
     def at_one_level(self, one: RoadObject, other: RoadObject) -> bool:
-        """Returns whether two things can meet: at most `LEVEL_HEIGHT` apart in height, as far as that is known."""
+        """Returns whether two bodies can meet: at most `LEVEL_HEIGHT` apart in height, if their heights are known."""
         low, high = self.network.height_range
         own_heights = getattr(one, "height", None) is not None or getattr(other, "height", None) is not None
         if high - low <= LEVEL_HEIGHT and not own_heights:
@@ -100,9 +100,9 @@ class TownRoad(CachedViews, Road):
         return not abs(self.height_of(one) - self.height_of(other)) > LEVEL_HEIGHT
 
     def step(self, dt: float) -> None:
-        """Moves everything by `dt` [s] and checks for collisions.
+        """Moves all bodies by `dt` [s] and checks for collisions.
 
-        Same as highway-env's for things at one height; pairs that its own first check would dismiss are not visited.
+        Equals highway-env's step for bodies at one height; pairs that its own first check would dismiss are skipped.
         """
         self.time += dt
         for vehicle in self.vehicles:
@@ -138,7 +138,7 @@ class TownRoad(CachedViews, Road):
         Args:
             vehicle: the observer.
             distance: largest distance [m].
-            count: largest number; all by default.
+            count: maximum number of results; all by default.
             see_behind: whether vehicles behind are seen; objects there never are.
             sort: whether they are sorted by their distance along the vehicle's lane.
             vehicles_only: whether objects are left out.
@@ -165,7 +165,7 @@ class TownRoad(CachedViews, Road):
 
         Args:
             vehicle: vehicle whose neighbours are searched.
-            lane_index: lane to look on, by default its own; on another one its place is the closest on that lane.
+            lane_index: lane to look on, by default its own; on another lane, the closest place counts as its own.
 
         Returns:
             Vehicles or objects (not landmarks), or None.
@@ -231,7 +231,7 @@ class TownRoad(CachedViews, Road):
 
 @functools.lru_cache(maxsize=64)
 def _is_landmark(kind: type) -> bool:
-    # asked for all pairs at every step: highway-env's classes are abstract base classes, whose checks are slow
+    # called for all pairs at every step: highway-env's classes are abstract base classes, whose checks are slow
     return issubclass(kind, Landmark)
 
 
@@ -244,7 +244,7 @@ class CompiledRoad(TownRoad):
     `vehicles` and `objects` are plain lists, as everywhere in highway-env. A view that is removed from them leaves the
     arrays; a vehicle of highway-env that is added to them, a guest, is seen by all others, which yield to it and
     collide with it. Guests decide and move as their class does; all others do so in one call a substep. Objects of
-    highway-env's own matter to guests alone. A guest with a `height` [m] begins on a lane of it.
+    highway-env's own matter to guests alone. A guest with a `height` [m] starts on a lane at that height.
 
     Attributes:
         arrays: state of all bodies; replaced by bigger ones where guests find no room.
@@ -282,7 +282,7 @@ class CompiledRoad(TownRoad):
         return town_arrays(self.network)
 
     def show(self) -> None:
-        """Lists all bodies of the arrays, guests first; to be called after bodies were added to the arrays."""
+        """Lists all bodies of the arrays, guests first; must be called after bodies were added to the arrays."""
         self._note_changes()
         self.vehicles[:] = [*self._guests, *self._bodies.vehicles()]
         self.objects[:] = [*self._things, *self._bodies.pedestrians(), *self._bodies.props()]

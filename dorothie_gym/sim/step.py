@@ -38,13 +38,13 @@ def step(
 ) -> int:
     """Steps a world; then localizes the ego that follows a path, if there is one, and watches over its driving.
 
-    As on a highway-env road, all bodies decide on the state at the beginning of a substep, then all move. The path of
+    As on a highway-env road, all bodies decide by the state at the start of a substep, then all move. The path of
     an ego with a plan is lengthened before.
 
     Args:
         town: arrays of the town.
         world: arrays of the world, changed in place.
-        substeps: how many.
+        substeps: number of substeps.
         dt: time of each [s].
         acceleration: acceleration of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
@@ -97,11 +97,11 @@ def step_share(
         home: number of the block that is this thread's own.
         town: arrays of the town.
         batch: arrays of all worlds.
-        substeps: how many.
+        substeps: number of substeps.
         dt: time of each [s].
         acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
         steering: (worlds,) angle of their front wheels, positive to the right [rad].
-        answers: (worlds,) `Refusal.NO_SPACE` of those that are to be stepped; replaced by the answers of `step`.
+        answers: (worlds,) `Refusal.NO_SPACE` for worlds that must be stepped; replaced by the answers of `step`.
     """
     number = take(turns, home)
     while number >= 0:
@@ -162,8 +162,8 @@ def _go_on(town: TownArrays, vehicle: VehicleRecord, dt: float) -> None:
 def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[np.int64], poses: Array) -> None:
     """Steps a world by one substep in which vehicles of the kind `Kind.EGO` are moved from outside.
 
-    As in `step`, all bodies decide on the state before. Once one of those vehicles has crashed nothing is respawned, so
-    that the bodies it touched are found where it happened.
+    As in `step`, all bodies decide by the previous state. Once one of those vehicles has crashed, no body is
+    respawned, so that the bodies it touched are found where it happened.
 
     Args:
         town: arrays of the town.

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array
 
 ROUNDS = 8
-"""Largest number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
+"""Maximum number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
 
 SEEDS = 2**31
 """Upper bound of the seeds of a world's random numbers."""
@@ -181,7 +181,7 @@ class OccupancyGrid(OccupancyGridObservation):
         """
         spacing, network, place = np.amin(self.grid_step), self.env.road.network, self.observer_vehicle.position
         reach = float(np.linalg.norm(np.abs(self.grid_size).max(axis=1)))
-        boxes = network.table.boxes  # (n, 4): least x, least y, greatest x, greatest y
+        boxes = network.table.boxes  # (n, 4): minimum x, minimum y, maximum x, maximum y
         near = (boxes[:, :2] <= place + reach).all(axis=1) & (boxes[:, 2:] >= place - reach).all(axis=1)
         lanes = network.lanes_list()
         for row in np.flatnonzero(near).tolist():
@@ -212,7 +212,7 @@ def parts_of(kind: ObservationType) -> list[ObservationType]:
 
 
 class Grayscale(CachedViews, GrayscaleObservation):
-    """highway-env's `GrayscaleObservation`, whose viewer is made again in copies."""
+    """highway-env's `GrayscaleObservation`, whose viewer is recreated in copies."""
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("viewer",)
 
@@ -283,7 +283,7 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
     ## Action Space
     Set by `config["action"]` (default: highway-env's `DiscreteMetaAction`); all types work. There is no action mask,
     neither in the infos nor as `action_masks()`: an action without effect, such as a lane change on the outer lane, is
-    ignored. sb3-contrib's MaskablePPO refuses the environment therefore, unless a wrapper makes a mask of highway-env's
+    ignored. Therefore sb3-contrib's MaskablePPO refuses the environment, unless a wrapper makes a mask of highway-env's
     `get_available_actions()` ([example](../integrations.md#sb3-contrib)).
 
     ## Rewards
@@ -473,7 +473,7 @@ _CONSTANT = frozenset({
 
 
 def check_action(name: str, action: object, space: spaces.Space[object]) -> None:
-    """Raises `ValueError` for an action of another form than those of a space; numbers of a `Box` are to be finite."""
+    """Raises `ValueError` for an action of another form than those of a space; numbers of a `Box` must be finite."""
     if isinstance(space, spaces.Discrete):
         whole_number(name, action, int(space.start), int(space.start + space.n) - 1)
     elif isinstance(space, spaces.Box):

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 AGAINST = pm.cos(math.radians(120.0))
-"""Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
+"""Cosine of the angle to a lane above which the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
 
 NEARBY = 10.0
 """Range around the car for the nearest lane [m]: more than half of any lane's width."""
@@ -43,7 +43,7 @@ BREACH_PAUSE = FRAME_RATE
 """Time without being off the road, or against the traffic, after which it counts as a new breach [frames]."""
 
 FORGET = 12.0
-"""Distance from a stop line at which a stand there is forgotten [m]."""
+"""Distance from a stop line at which a stop there is forgotten [m]."""
 
 X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
 """Columns of poses."""
@@ -53,7 +53,7 @@ X, Y, HEADING, SPEED, HEIGHT, TURNING = range(len(POSE))
 def watch(town: TownArrays, world: WorldArrays) -> None:
     """Watches the ego over the last call of `sim.step.step`: counts its breaches, and lists all but collisions.
 
-    A car that stood all the time breaks no rule; a breach in progress continues.
+    A car that stood all the time breaks no rule; an infraction in progress continues.
 
     Args:
         town: arrays of the town.
@@ -102,13 +102,13 @@ def _list(world: WorldArrays, k: int, frame: int, kind: int, lane: int, station:
 
 @inlined
 def _lines_near(town: TownArrays, world: WorldArrays, last: int) -> int:
-    """Lists the lines that may have been passed, and forgets stands at all others; returns the number of lines."""
+    """Lists the lines that may have been passed, and forgets stops at all others; returns the number of lines."""
     lines, marks, poses, length = town.lines, world.marks, world.poses, world.vehicles[0].length
     x, y, extent2 = poses[0, X], poses[0, Y], 0.0
     for k in range(1, last + 1):
         dx, dy = poses[k, X] - x, poses[k, Y] - y
         extent2 = max(extent2, dx * dx + dy * dy)
-    # the front is no farther beyond a passed line than its way since the pose before
+    # the front is no farther beyond a passed line than the distance since the previous pose
     reach = 3.0 * math.sqrt(extent2) + 2.0 * length + FORGET
     near = 0
     for j in range(len(lines)):
@@ -124,7 +124,7 @@ def _lines_near(town: TownArrays, world: WorldArrays, last: int) -> int:
 
 @inlined
 def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, near: int) -> None:
-    """Records a stand at pose k - 1, and the line that the front has passed since."""
+    """Records a stop at pose k - 1, and the line that the front has passed since."""
     poses, half = world.poses, 0.5 * world.vehicles[0].length
     c, s = pm.cos(poses[k - 1, HEADING]), pm.sin(poses[k - 1, HEADING])
     before_x, before_y = poses[k - 1, X] + half * c, poses[k - 1, Y] + half * s
@@ -144,7 +144,7 @@ def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, nea
         if turning or (x - line.x) * line.cos + (y - line.y) * line.sin <= 0.0:
             continue
         across = abs((y - line.y) * line.cos - (x - line.x) * line.sin)
-        # on the border of two lanes the one with the nearer middle counts
+        # on the border of two lanes the one with the nearer centre counts
         if across < best and _is_on(line, x, y, cos, sin, poses[k, HEIGHT]):
             passed, best = j, across
     if passed == NOBODY:
@@ -163,7 +163,7 @@ def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, nea
 
 @inlined
 def _is_on(line: StopLineRecord, x: float, y: float, cos: float, sin: float, height: float) -> bool:
-    """Returns whether a place is on the lane of a line, before or behind it, and heads its way."""
+    """Returns whether a pose is on the lane of a line, before or beyond it, and in the direction of the lane."""
     across = (y - line.y) * line.cos - (x - line.x) * line.sin
     facing = cos * line.cos + sin * line.sin
     return bool(facing > 0.5 and abs(across) <= line.half_width and abs(height - line.height) <= LEVEL_HEIGHT)
@@ -171,7 +171,7 @@ def _is_on(line: StopLineRecord, x: float, y: float, cos: float, sin: float, hei
 
 @inlined
 def _forget(town: TownArrays, world: WorldArrays, k: int, near: int) -> None:
-    """Forgets stands at lines that the front is far from."""
+    """Forgets stops at lines that are far from the front."""
     poses, half = world.poses, 0.5 * world.vehicles[0].length
     x = poses[k, X] + half * pm.cos(poses[k, HEADING])
     y = poses[k, Y] + half * pm.sin(poses[k, HEADING])
@@ -210,7 +210,7 @@ def _list_lasting(town: TownArrays, world: WorldArrays, k: int, frame: int, kind
 def _state(town: TownArrays, poses: Array, k: int) -> tuple[bool, bool]:
     """Returns whether the car is off the road, and whether it is against the traffic.
 
-    A place that is at most `OFF_ROAD_MARGIN` outside of a lane is no farther from its middle than half its width and
+    A place that is at most `OFF_ROAD_MARGIN` outside of a lane is no farther from its centre than half its width and
     twice `OFF_ROAD_MARGIN`. Cells list all lanes that close, except very wide ones.
     """
     if town.wide:
@@ -300,9 +300,9 @@ class WorldEventKind(enum.StrEnum):
     STOP_SIGN = "stop_sign"
     """It passes the end of a lane with a stop sign and has not stood there with its front within `AT_LINE`."""
     OFF_ROAD = "off_road"
-    """Its middle is farther than `OFF_ROAD_MARGIN` outside of every lane's area, and it is not turning round."""
+    """Its centre is farther than `OFF_ROAD_MARGIN` outside of every lane's area, and it is not turning round."""
     WRONG_WAY = "wrong_way"
-    """Its middle is on lanes that all run against it, outside junctions, and it is not turning round."""
+    """Its centre is on lanes that all run against it, outside junctions, and it is not turning round."""
 
 
 INFRACTION_KINDS = (

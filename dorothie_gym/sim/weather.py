@@ -1,7 +1,7 @@
 """Weather and light: the ten parameters, and their effects on grip, sight and side wind.
 
 Cloudiness and the sun's altitude dim the light, fog and precipitation dim the air (`visibility`), water on the road
-takes grip, wind pushes the car (`wind`). The sun's azimuth only turns shadows. On a clear noon nothing has any effect.
+takes grip, wind pushes the car (`wind`). The sun's azimuth only turns shadows. On a clear noon there is no effect.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PUDDLES = 5.0
 """Depth of the puddles of precipitation deposits 100 % [mm]."""
 
 _TEXTURE, _DRAINAGE, _SLOPE = 0.5, 5.0, 0.02
-"""Depth of the road's texture [mm], way of the water to the kerb [m] and crossfall, for the film that rain makes."""
+"""Depth of the road's texture [mm], length of the water's path to the kerb [m] and crossfall, for the film of rain."""
 
 
 class Weather:
@@ -77,7 +77,7 @@ class Weather:
         """Returns the visibility in this weather.
 
         Args:
-            lights: whether the car's head lights are on.
+            lights: whether the car's headlights are on.
             clarity: share of the signal that the view itself leaves.
         """
         found = self._views.get((lights, clarity))
@@ -187,7 +187,7 @@ class Wind:
         return GALE * strength * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
 
     def drift(self, strength: float, time: float, *, heading: float, speed: float) -> float:
-        """Returns the angle of a car's course to its heading, positive right [rad]; 0 without wind and for a stand.
+        """Returns the angle of a car's course to its heading, positive right [rad]; 0 without wind or at standstill.
 
         Args:
             strength: strength of the wind in [0, 1].

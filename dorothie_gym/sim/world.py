@@ -236,7 +236,7 @@ class World(CachedViews, Restorable):
 
     @property
     def visibility(self) -> Visibility:
-        """Present visibility, by weather, light and faults of the view."""
+        """Current visibility, by weather, light and faults of the view."""
         clarity = 1.0
         if self.faults:
             clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
@@ -259,7 +259,7 @@ class World(CachedViews, Restorable):
 
     @property
     def sensing_arrays(self) -> WorldArrays:
-        """Arrays of the world, with the present visibility."""
+        """Arrays of the world, with the current visibility."""
         self.write_weather()
         return self.actors.arrays
 

@@ -136,7 +136,7 @@ def _name_at(words: Sequence[str], place: int) -> tuple[tuple[str, ...], tuple[t
 
 @functools.cache
 def known_words() -> frozenset[str]:
-    """Returns the spoken words of the lexicon and of the storyboards, names of people among them."""
+    """Returns the spoken words of the lexicon and of the storyboards, including names of people."""
     texts = [phrase for forms in load_lexicon().phrases.values() for listed in forms.values() for phrase in listed]
     for template in map(load_template, template_names()):
         for subgoal in template.subgoals:

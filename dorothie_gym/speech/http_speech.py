@@ -62,11 +62,11 @@ class HttpSynthesizer:
         url: address before the route, such as "http://localhost:8000/v1".
         model: name of the model.
         voices: names of the voices of the server; the first is the default.
-        key: secret for the header `Authorization`; empty for none.
+        key: secret for the header `Authorization`; empty if there is none.
         timeout: time for an answer [s].
 
     Raises:
-        ValueError: `url` is no address, or there are no voices.
+        ValueError: `url` is not an address, or there are no voices.
         SpeechError: httpx is not installed.
     """
 
@@ -106,7 +106,7 @@ class HttpRecognizer:
     Args:
         url: address before the route, such as "http://localhost:8000/v1".
         model: name of the model.
-        key: secret for the header `Authorization`; empty for none.
+        key: secret for the header `Authorization`; empty if there is none.
         timeout: time for an answer [s].
 
     Raises:

@@ -65,11 +65,11 @@ def weighted_sentences() -> Iterator[tuple[list[str], float]]:
 
 
 def build_language(dictionary: Path, phonemes: Callable[[str], str]) -> SpokenLanguage:
-    """Returns the language model and dictionary; takes some seconds.
+    """Returns the language model and dictionary; takes a few seconds.
 
     Args:
         dictionary: CMU's dictionary.
-        phonemes: phonemes of a text, as of `HibariSynthesizer.phonemes`.
+        phonemes: phonemes of a text, as in `HibariSynthesizer.phonemes`.
     """
     sentences = [(words, weight) for words, weight in weighted_sentences() if words]
     vocabulary = {word for words, _ in sentences for word in words} | known_words()

@@ -49,7 +49,7 @@ def pronunciations(
     Args:
         words: spoken words in lower case.
         dictionary: pronunciations by word.
-        phonemes: phonemes of a text, as of `HibariSynthesizer.phonemes`.
+        phonemes: phonemes of a text, as in `HibariSynthesizer.phonemes`.
     """
     found = {}
     for word in words:
@@ -61,7 +61,7 @@ def pronunciations(
 
 
 def dictionary_text(words: Mapping[str, Sequence[str]]) -> str:
-    """Returns pronunciations in the format of the recogniser: variants of a word are numbered from 2 on."""
+    """Returns pronunciations in the format of the recogniser: the variants of a word are numbered 2, 3, and so on."""
     lines = []
     for word in sorted(words):
         for number, phonemes in enumerate(words[word], start=1):

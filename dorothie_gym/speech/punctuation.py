@@ -21,10 +21,10 @@ _BETWEEN: Final = ("", ",", ".", "?")
 _BEHIND: Final = (".", "?")
 
 _OPEN: Final = frozenset({"a", "an", "hang", "make", "my", "take", "the", "your"})
-"""Words that no mark follows, as their object does: "take right" lacks its article and does not ask for agreement."""
+"""Words followed by their object, not by a mark: "take right" lacks an article and does not ask for agreement."""
 
 _PRIOR: Final = 0.5
-"""Weight of the share of questions among all sentences in that of sentences with a certain beginning [sentences]."""
+"""Weight of the overall share of questions in that of sentences with a given beginning [sentences]."""
 
 _Path = tuple[float, tuple[str, ...]]
 
@@ -71,7 +71,7 @@ class PunctuationModel:
         return cls(Trigrams.from_arpa(texts["arpa"]), found, share)
 
     def restore(self, words: Sequence[str]) -> list[str]:
-        """Returns words with the most probable marks between and behind them.
+        """Returns words with the most probable marks between and after them.
 
         Args:
             words: spoken words in lower case.
@@ -100,7 +100,7 @@ class PunctuationModel:
     def _extend(
         self, following: dict[tuple[str, str], _Path], ends: tuple[str, str], path: _Path, added: Sequence[str]
     ) -> None:
-        """Adds a path that is continued by some tokens, if it is the best one to its last two tokens."""
+        """Adds a path continued by the given tokens, if it is the best path that ends in its last two tokens."""
         (first, second), (score, tokens) = ends, path
         for token in added:
             score += self.trigrams.log_probability(first, second, token)
@@ -110,7 +110,7 @@ class PunctuationModel:
             following[first, second] = score, (*tokens, *added)
 
     def _asks(self, tokens: Sequence[str], mark: str) -> float:
-        """Returns the logarithm of how much the beginning of the last clause speaks for a mark behind it."""
+        """Returns the log ratio by which the beginning of the last clause favours a mark after it."""
         found = [self.questions[start] for start in _openings(tokens) if start in self.questions]
         share = found[-1] if found else self.share
         return pm.log(share / self.share) if mark == "?" else pm.log((1 - share) / (1 - self.share))

@@ -23,7 +23,7 @@ FRAMES_PER_SECOND: Final = 100
 """Frames of the recogniser per second."""
 
 PADDING: Final = 0.12
-"""Silence around the audio [s]; the decoder needs some to begin and end with, but much of it spoils the normalisation
+"""Silence around the audio [s]; the decoder needs some at both ends, but too much spoils the normalisation
 of noisy audio. On 400 spans in the noise of the car, the word error rate is 3.9 % with 0.25 s and 3.2 % with 0.12 s."""
 
 LEVEL: Final = 0.08
@@ -76,7 +76,7 @@ class SphinxRecognizer:
                     # 120 spans in the noise of the car, the word error rate is 5.1 % with it and 4.8 % without
                     fwdflat=False,
                 )
-            except RuntimeError as error:  # it does not tell which file
+            except RuntimeError as error:  # it does not report which file
                 raise SpeechError(_NO_MODEL.format(path=models / "en-us")) from error
 
     def recognize(self, samples: Samples, sample_rate: int, *, hints: Sequence[str] = ()) -> Recognition:
@@ -96,7 +96,7 @@ class SphinxRecognizer:
 
     def _decode(self, audio: Samples) -> None:
         decoder = self._decoder
-        decoder.reinit_feat()  # forgets the mean of the audio before
+        decoder.reinit_feat()  # clears the mean of the previous audio
         decoder.start_utt()
         decoder.process_raw(to_pcm(audio).astype("<i2").tobytes(), full_utt=True)
         decoder.end_utt()

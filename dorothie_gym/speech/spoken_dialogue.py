@@ -34,13 +34,13 @@ PITCHES: Final = {Role.PARTICIPANT: (0.86, 0.97), Role.CO_WIZARD: (0.92, 0.96)}
 """Ranges from which the pitch of a speaker without a voice of its own is drawn; set by hand, see `policies.persona`."""
 
 DISTINCT: Final = 0.03
-"""Least difference in pitch between the two speakers; set by hand. Smaller ones are hard to hear between utterances."""
+"""Minimum difference in pitch between the speakers, set by hand. Smaller ones are hard to hear between utterances."""
 
 CROSSTALK: Final = -15.0
 """Level of the other speaker's voice at a speaker's microphone, where both talk [dB]; set by hand."""
 
 MARGIN: Final = 0.2
-"""Time before and behind a span in which the recogniser hears noise only [s]."""
+"""Time before and after a span in which the recogniser hears only noise [s]."""
 
 
 @shared
@@ -70,7 +70,7 @@ class SpokenDialogue:
         Args:
             seed: seed of voices and noise.
             words_per_second: speaking rate of the session [words/s].
-            classify: as of `dialogue.Recogniser`.
+            classify: as in `dialogue.Recogniser`.
 
         Raises:
             SpeechError: the extra `speech` is not installed.
@@ -103,7 +103,7 @@ class SpokenDialogue:
             self._voices[Role.CO_WIZARD] = Voice(pitch=round(moved, 2))
 
     def speak(self, role: Role, text: str, pace: float) -> Samples:
-        """Returns a text spoken by a role, at 16 kHz, with silence behind it up to `SHORTEST_SPAN`.
+        """Returns a text spoken by a role, at 16 kHz, padded with silence to `SHORTEST_SPAN`.
 
         Args:
             role: the speaker.
@@ -176,7 +176,7 @@ class SpokenDialogue:
 
 
 def _add(target: Samples, samples: Samples, offset: int) -> None:
-    """Adds samples to others from an offset on, which may be negative or beyond the end."""
+    """Adds samples to others at an offset, which may be negative or beyond the end."""
     first, last = max(offset, 0), min(offset + len(samples), len(target))
     if first < last:
         target[first:last] += samples[first - offset : last - offset]

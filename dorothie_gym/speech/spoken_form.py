@@ -72,7 +72,7 @@ def _number_words(token: str) -> list[str]:
 
 
 def written_form(tokens: Sequence[str]) -> str:
-    """Returns spoken tokens as a text: names as they are written, "I" as a capital, marks behind their words."""
+    """Returns spoken tokens as a text: names in their written form, "I" as a capital, marks after their words."""
     forms, longest = _written_names()
     parts: list[str] = []
     place = 0
@@ -97,7 +97,7 @@ def written_form(tokens: Sequence[str]) -> str:
 
 @functools.cache
 def _written_names() -> tuple[Mapping[tuple[str, ...], str], int]:
-    """Returns the written form of names by their spoken words, and the largest number of words of a name."""
+    """Returns the written form of names by their spoken words, and the maximum number of words of a name."""
     found: dict[tuple[str, ...], str] = {}
     for value, forms in load_lexicon().phrases.items():
         if value.slot not in (Slot.LANDMARK, Slot.STREET):

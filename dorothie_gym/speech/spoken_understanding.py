@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 DOUBTFUL: Final = 0.2
 """Confidence of a word below which it is probably wrong. Of the 256 shortest of 400 spans in the noise of the car, 9
-are marked by it, of which 6 are wrong; two lost a value: one is marked, and of the other nothing is recognised."""
+are marked by it, of which 6 are wrong; two lost a value: one is marked, and the other is not recognised at all."""
 
 SHORT: Final = 2
 """Number of words up to which every uncertain word matters, because there is no context to compensate for it."""
@@ -70,7 +70,7 @@ def audible(recognition: Recognition) -> str:
 
     They may if the best hypotheses name different values, if most words are doubtful, or if the speech is short. Short
     speech without a command is inaudible, however sure, if another hypothesis is a stop ("great", "brake"), which must
-    not be missed; of 110 short spans other than a stop, none was mistaken for one. Systems of spoken dialogue likewise
+    not be missed; of 110 short spans other than a stop, none was mistaken for one. Spoken dialogue systems also
     reject uncertain input, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     short = len(recognition.words) <= SHORT

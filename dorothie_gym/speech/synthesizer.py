@@ -122,10 +122,10 @@ def say(
 
     Args:
         synthesizer: the synthesiser.
-        text: as of `Synthesizer.synthesize`.
+        text: as in `Synthesizer.synthesize`.
         voice: the voice; the default one if None.
         rate: further factor on the rate; the product is limited to `SLOWEST` to `FASTEST`.
-        seed: as of `Synthesizer.synthesize`.
+        seed: as in `Synthesizer.synthesize`.
         sample_rate: rate of the result [Hz].
 
     Returns:

@@ -11,7 +11,7 @@ from typing import Final
 from dorothie_gym.support import portable_math as pm
 
 START, END = "<s>", "</s>"
-"""Tokens before and behind each sentence."""
+"""Tokens before and after each sentence."""
 
 DISCOUNT: Final = 0.75
 """Absolute discount of counts; estimates for bigrams and trigrams of English lie between 0.6 and 0.9 (Chen and Goodman,
@@ -42,7 +42,7 @@ class Trigrams:
     backoff2: Mapping[tuple[str, str], float]
 
     def log_probability(self, first: str, second: str, word: str) -> float:
-        """Returns the natural logarithm of the probability of a word after two; unknown words get the least one."""
+        """Returns the natural logarithm of the probability of a word after two words, the lowest if it is unknown."""
         found = self.trigrams.get((first, second, word))
         if found is None:
             found = self.bigrams.get((second, word))
@@ -66,7 +66,7 @@ class Trigrams:
 
     @classmethod
     def from_arpa(cls, text: str) -> Trigrams:
-        """Returns the model that `arpa` has written; numbers are rounded to five digits behind the point."""
+        """Returns the model that `arpa` has written; numbers are rounded to five decimal places."""
         orders: dict[str, list[list[str]]] = {}
         for line in text.splitlines():
             if line.startswith("\\") and line.endswith("-grams:"):

@@ -15,7 +15,7 @@ def as_array(name: str, value: object) -> NDArray[Any]:
     """Returns a value as a plain array.
 
     Raises:
-        ValueError: NumPy makes no array of it; the message names the field.
+        ValueError: NumPy cannot convert it to an array; the message names the field.
     """
     if type(value) is np.ndarray:
         return value

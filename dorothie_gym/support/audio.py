@@ -95,7 +95,7 @@ def resample(samples: Samples, sample_rate: int, wanted: int = SAMPLE_RATE) -> S
     Args:
         samples: (n,) float32.
         sample_rate: their rate [Hz].
-        wanted: rate of the result [Hz].
+        wanted: sample rate of the result [Hz].
     """
     if sample_rate == wanted:
         return samples
@@ -137,7 +137,7 @@ def _without_frames(flac: bytes) -> bytes:
 
 
 def _has_no_frames(content: bytes) -> bool:
-    """Returns whether a FLAC file states no number of samples and ends behind its last block of metadata."""
+    """Returns whether a FLAC file states no number of samples and ends after its last block of metadata."""
     if content[:4] != b"fLaC" or len(content) < _STREAM_INFO or content[21] & 0x0F or any(content[22:26]):
         return False
     place, last = 4, False

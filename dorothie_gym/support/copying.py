@@ -64,7 +64,7 @@ class CachedViews:
 class State:
     """Changing values of an environment, an engine or a world at one moment: an opaque, immutable value.
 
-    It refers to the things that do not change, such as the town.
+    It refers to immutable objects, such as the town.
 
     Attributes:
         nbytes: memory of the values, without shared objects [bytes].
@@ -186,7 +186,7 @@ class Restorable:
     """Attributes that hold changing values."""
 
     def clone_state(self) -> State:
-        """Returns the present state, for `restore_state`: an opaque value that later steps do not change.
+        """Returns the current state, for `restore_state`: an opaque value that later steps do not change.
 
         The states of generators are part of it; those of the spaces (`sample()`) and rendered pictures are not.
         """

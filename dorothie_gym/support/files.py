@@ -32,7 +32,7 @@ def sync(path: Path) -> None:
     is_folder = path.is_dir()
     if is_folder and not (hasattr(os, "O_DIRECTORY") and os.access(path, os.R_OK)):
         return  # Windows syncs no folders, and a folder may be closed to its readers
-    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)  # Windows syncs only what can be written
+    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)  # Windows syncs only writable files
     try:
         os.fsync(descriptor)
     except OSError as error:
@@ -43,7 +43,7 @@ def sync(path: Path) -> None:
 
 
 def make_folder(folder: Path, *, parents: bool = False) -> None:
-    """Creates a folder unless it exists, also its parents if wanted; it is then on the disk. Errors as `Path.mkdir`."""
+    """Creates a folder, and its parents if requested, unless it exists, and syncs it. Errors as in `Path.mkdir`."""
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=parents, exist_ok=True)
     for each in made:
@@ -61,7 +61,7 @@ def replacing(path: Path, *, shared: bool = False, synced: bool = True) -> Itera
         path: the file.
         shared: whether several processes may write the file at once: the name of the part is then unique. Otherwise it
             is `path` with the ending `PART`, so that a later write removes the remains of a killed process.
-        synced: whether the file is on the disk when the block is left; not needed for data that can be made again.
+        synced: whether the file is on the disk when the block is left; not needed for data that can be recreated.
 
     Raises:
         OSError: the file cannot be written, or a pipe or device is there, which a file must not replace; the error
@@ -94,13 +94,13 @@ def replacing(path: Path, *, shared: bool = False, synced: bool = True) -> Itera
 def write_atomically(
     path: Path, content: str | bytes, *, shared: bool = False, mode: int | None = None, synced: bool = True
 ) -> None:
-    """Writes a file whole or not at all; a text in UTF-8. Errors as of `replacing`.
+    """Writes a file whole or not at all; a text in UTF-8. Errors as in `replacing`.
 
     Args:
         path: the file.
         content: text or bytes.
         shared: see `replacing`.
-        mode: permissions of the file from its creation on; those of the process if None.
+        mode: permissions with which the file is created; those of the process if None.
         synced: see `replacing`.
     """
     with replacing(path, shared=shared, synced=synced) as part:
@@ -111,7 +111,7 @@ def write_atomically(
 
 @contextmanager
 def new_folder(folder: Path, *, hidden: bool = False) -> Iterator[Path]:
-    """Yields an empty folder beside `folder` to fill, which gets its name when the block is left.
+    """Yields an empty folder beside `folder` to fill, which is renamed to it when the block is left.
 
     If the block fails, or `folder` exists and is not empty, the new folder is removed.
 

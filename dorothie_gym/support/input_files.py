@@ -44,7 +44,7 @@ MAX_OPENDRIVE: Final = 64 * MIB
 """Largest OpenDRIVE file [bytes]; CARLA's towns have up to 20 MB."""
 
 MAX_XML_ELEMENTS: Final = 2_000_000
-"""Most elements of an OpenDRIVE file; each takes some 200 bytes of memory."""
+"""Maximum number of elements of an OpenDRIVE file; each takes some 200 bytes of memory."""
 
 MAX_SESSION_TEXT: Final = 64 * MIB
 """Largest JSON or CSV file of a session or corpus [bytes]; a session of 15 minutes takes 2 MB."""
@@ -62,10 +62,10 @@ MAX_DEPTH: Final = 40
 """Deepest nesting of JSON."""
 
 MAX_DIGITS: Final = 40
-"""Most digits of a whole number in JSON; a seed of 128 bits has 39."""
+"""Maximum number of digits of a whole number in JSON; a seed of 128 bits has 39."""
 
 MAX_VALUES: Final = 5_000_000
-"""Most values of a JSON file; each takes up to some 100 bytes of memory."""
+"""Maximum number of values of a JSON file; each takes up to some 100 bytes of memory."""
 
 
 @contextmanager
@@ -237,7 +237,7 @@ def _within_depth(value: object) -> bool:
 
 
 def read_json(path: Path, limit: int, *, unique: bool = True) -> JsonValue:
-    """Returns the JSON value of a file; arguments and errors as of `read_text` and `parse_json`."""
+    """Returns the JSON value of a file; arguments and errors as in `read_text` and `parse_json`."""
     return parse_json(read_text(path, limit), path, unique=unique)
 
 
@@ -249,7 +249,7 @@ def checked(value: object, kind: type[_T], where: object) -> _T:
 
     Args:
         value: the value.
-        kind: the type; fields of dataclasses that the value lacks get their defaults.
+        kind: the type; missing fields of dataclasses take their defaults.
         where: file (and place) that messages begin with.
 
     Raises:
@@ -321,7 +321,7 @@ class ParquetLimits:
 
     Attributes:
         file: largest size of the file [bytes].
-        rows: most rows.
+        rows: maximum number of rows.
         values: most values of one column, counting those in lists.
         content: largest size of all values without compression, and of all texts without a dictionary [bytes].
     """
@@ -335,8 +335,8 @@ class ParquetLimits:
 def read_parquet(path: Path, limits: ParquetLimits, columns: Sequence[str] | None = None) -> pa.Table:
     """Returns the table of a Parquet file; texts that the file holds are dictionary-encoded.
 
-    The limits are checked in the footer before anything else is read. Texts are read with their dictionary, so that a
-    small file cannot stand for texts of many gigabytes.
+    The limits are checked in the footer before any other part is read. Texts are read with their dictionary, so that a
+    small file cannot expand to texts of many gigabytes.
 
     Args:
         path: the file.

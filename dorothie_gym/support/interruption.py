@@ -57,7 +57,7 @@ def exit_code() -> int:
 
 
 def message() -> str:
-    """Returns a line on the last signal, for commands that have nothing to add."""
+    """Returns a line on the last signal, for commands without a message of their own."""
     return "Terminated." if _State.received == signal.SIGTERM else "Interrupted."
 
 
@@ -83,8 +83,8 @@ def _in_import(frame: FrameType | None) -> bool:
 def starting_process() -> Iterator[None]:
     """Protects the start of a process inside the block from both signals.
 
-    The new process inherits the blocked SIGINT: Ctrl-C, which reaches the whole process group, is the affair of this
-    process from the first instruction of the new one on. Signals to this process are delivered when the block is left;
+    The new process inherits the blocked SIGINT: Ctrl-C, which reaches the whole process group, is handled by this
+    process as soon as the new one starts. Signals to this process are delivered when the block is left;
     an interrupted start would leave a process without its data.
     """
     _State.processes = True

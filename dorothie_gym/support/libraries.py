@@ -1,6 +1,6 @@
-"""Libraries that most runs do not need: each is imported when something of it is first used.
+"""Libraries that most runs do not need: each is imported on first use.
 
-`lazy_loader.load` would enter them into `sys.modules` at once, where other packages look for what has been imported.
+`lazy_loader.load` would enter them into `sys.modules` at once, where other packages look for imported modules.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 
 class Library:
-    """Stands for a module until something of it is used.
+    """Placeholder for a module until its first use.
 
     Args:
         name: name of the module.
@@ -20,7 +20,7 @@ class Library:
         self._name = name
 
     def __getattr__(self, name: str) -> object:
-        """Returns something of the module, which is imported for it; raises `ImportError` if that is not possible."""
+        """Returns an attribute of the module, which is imported on first use; raises `ImportError` if that fails."""
         value = getattr(importlib.import_module(self._name), name)
         self.__dict__[name] = value  # so that this method is not called for it again
         return value

@@ -62,7 +62,7 @@ _ROUND: Final = 6755399441055744.0
 LARGEST_ANGLE: Final = 1e6
 """Larger angles [rad] are first reduced by the double next to 2 pi: equal everywhere, but less exact."""
 
-# atan(k / 16) for k = 0..16, and what the doubles lack.
+# atan(k / 16) for k = 0..16, and the remainders of the doubles.
 _ATAN: Final = (
     0.0, 0.06241880999595735, 0.12435499454676144, 0.18534794999569476, 0.24497866312686414, 0.3028848683749714,
     0.35877067027057225, 0.4124104415973873, 0.4636476090008061, 0.5123894603107377, 0.5585993153435624,

@@ -19,7 +19,7 @@ class TimeLimited(ABC):
     """Part of an environment; its `spec.max_episode_steps` is the number of decisions until it truncates an episode.
 
     The number follows from the arguments. The ids are registered without one, because `gymnasium.make` would then
-    add a `TimeLimit` of the default arguments and cut episodes that are to last longer.
+    add a `TimeLimit` of the default arguments and truncate longer episodes.
     """
 
     _spec: EnvSpec | None = None
@@ -46,7 +46,7 @@ class TimeLimitedEnv(TimeLimited, gym.Env[ObsType, ActType]):
 
 
 def steps_until(seconds: float, step: float) -> int:
-    """Returns after how many steps a clock that adds up steps of equal length [s] has reached a time [s]."""
+    """Returns the number of steps of equal length [s] after which a clock reaches a time [s]."""
     return next(number for number, time in enumerate(accumulate(repeat(step)), start=1) if time >= seconds)
 
 

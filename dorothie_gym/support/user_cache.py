@@ -1,8 +1,8 @@
 """Cache folder of the user: compiled towns, feature columns and generated corpora are kept here between runs.
 
 The folder is private. Only content that this user has written is read: a folder or file that another user owns or can
-write is ignored with a warning, and entries carry a signature by a key that lies in the folder and only its user reads.
-An entry that is damaged, or that lies under the name of another one, is removed and made again.
+write is ignored with a warning, and entries carry a signature by a key in the folder that only its user can read.
+An entry that is damaged, or stored under the name of another one, is removed and recreated.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def remove_least_used(folder: Path, most: int, used: Collection[str]) -> None:
     """
     entries = []
     for entry in folder.iterdir():
-        with contextlib.suppress(FileNotFoundError):  # another process removes entries, too
+        with contextlib.suppress(FileNotFoundError):  # another process may also remove entries
             if entry.is_dir() and not entry.is_symlink():
                 entries.append((entry.stat().st_mtime, sum(file.stat().st_size for file in entry.iterdir()), entry))
     total = sum(size for _, size, _ in entries)
@@ -153,14 +153,14 @@ def write_signed(path: Path, content: bytes, keys: Path | None = None) -> None:
     if path.is_dir():
         discard(path, "it is a folder, not a file")
     signature = sign(content, path.parent.parent if keys is None else keys, path.name)
-    # A file that a power failure has emptied does not fit its signature: it need not be synced.
+    # A file that a power failure has emptied does not match its signature: it need not be synced.
     write_atomically(path, content + signature, shared=True, mode=0o600, synced=False)
 
 
 def read_signed(path: Path, keys: Path | None = None) -> bytes | None:
     """Returns the content of a file that `write_signed` has written under its name.
 
-    A file that holds anything else is removed (`discard`), so that it can be written again.
+    A file with other content is removed (`discard`), so that it can be rewritten.
 
     Args:
         path: file in a folder of the cache folder.
@@ -266,7 +266,7 @@ def _key(cache: Path) -> bytes:
 
 
 def seal(folder: Path, name: str, keys: Path) -> None:
-    """Writes a signed list of the hashes of all files in a folder that is to become an entry of the cache.
+    """Writes a signed list of the hashes of all files in a folder that will become an entry of the cache.
 
     Args:
         folder: folder with all of its files, under any name.

@@ -18,7 +18,7 @@ def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> Sequence[in
     """Returns a seed for each of `count` environments.
 
     Args:
-        seed: seed of the first environment, the others have the numbers that follow; or one for each; None for none.
+        seed: seed of the first environment, of which the others count up; or a seed for each; None for no seeds.
         count: number of environments.
 
     Raises:
@@ -34,7 +34,7 @@ def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> Sequence[in
 
 
 def mask_of(mask: object, count: int) -> NDArray[np.bool_]:
-    """Returns the option `reset_mask` of a reset, (count,); None stands for all environments.
+    """Returns the option `reset_mask` of a reset, (count,); None for all environments.
 
     Raises:
         ValueError: it is of another shape or type.

@@ -62,7 +62,7 @@ def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -
 def _roles(
     variables: tuple[Variable, ...], dependents: tuple[Dependent, ...], story: str
 ) -> tuple[tuple[LandmarkKind, ...], ...]:
-    """Returns the kinds that each variable of a storyboard of a name may stand for.
+    """Returns the kinds that each variable of a storyboard with a name may stand for.
 
     Raises:
         StoryboardError: the ontology has none for one of them.
@@ -172,7 +172,7 @@ def bind(
     """Samples landmarks, values and sites for a template.
 
     All ten landmark kinds are placed, together with the additional houses and people that the story needs; landmarks of
-    the story get the sites with the widest spread.
+    the story are assigned the sites with the widest spread.
 
     Args:
         template: the template.
@@ -247,7 +247,7 @@ def _place(
     places: Sequence[LandmarkSite],
     rng: np.random.Generator,
 ) -> tuple[Landmark, ...]:
-    """Assigns landmarks to sites; those with an index in `first` come first."""
+    """Assigns landmarks to sites, those with an index in `first` first."""
     order = [*first, *(index for index in range(len(names)) if index not in first)]
     sites = dict(zip(order, spread_places(places, len(names), rng), strict=True))
     landmarks = []

@@ -1,6 +1,6 @@
 """Designs of the landmarks' buildings: forms and colours, as the camera draws them and speakers describe them.
 
-All houses are alike, and all persons: nothing shows which of them is a goal. The designs are our own.
+All houses are alike, and all persons: their looks do not show which of them is a goal. The designs are our own.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def features_of(name: LandmarkName) -> tuple[str, ...]:
     if design is None:
         return ()
     seen = (_top_feature(design), f"a big {colour_name(design.fascia)} billboard")
-    if design.top is Top.CANOPY:  # of the building behind it, little is seen
+    if design.top is Top.CANOPY:  # little of the building behind it is visible
         return seen
     return (f"{_with_article(colour_name(design.wall))} facade", *seen)
 

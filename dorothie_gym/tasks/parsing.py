@@ -29,7 +29,7 @@ from dorothie_gym.tasks.storyboard import (
 )
 
 MAX_LIVE_SUBGOALS = 6
-"""Largest number of subgoals without a trigger: two to six landmarks to visit (paper, "Task Configuration")."""
+"""Maximum number of subgoals without a trigger: two to six landmarks to visit (paper, "Task Configuration")."""
 
 
 def check(template: StoryboardTemplate) -> None:
@@ -127,7 +127,7 @@ def _check_order(template: StoryboardTemplate) -> None:
 
 
 def _check_messages(template: StoryboardTemplate) -> None:
-    """Checks that messages belong to exceptions of their subgoals, and that they fit whatever the names stand for."""
+    """Checks that messages belong to exceptions of their subgoals, and are valid for all values of the names."""
     longest = longest_values(template)
     for index, subgoal in enumerate(template.subgoals):
         permitted = {"trigger": subgoal.trigger, "delete": subgoal.delete, "change": subgoal.change is not None}
@@ -311,7 +311,7 @@ def _shipped_stories() -> re.Pattern[str]:
 
 
 def _pattern(story: str) -> str:
-    """Returns a pattern of a story that matches it with other accents and typographic marks, and cut off."""
+    """Returns a pattern of a story that also matches it with other accents or typographic marks, or truncated."""
     words = (".+" if references(part) or not part.isascii() else re.escape(part) for part in story.split())
     return " ".join(words)
 

@@ -50,10 +50,10 @@ class ReadMessage:
     """Message to the participant about its tasks.
 
     Attributes:
-        sender: person or device it comes from, in the words of the participant; None if unknown.
-        channel: way in which it came; None if unknown.
+        sender: person or device that sent it, in the words of the participant; None if unknown.
+        channel: medium of the message; None if unknown.
         text: words of the sender.
-        reason: clause as it follows "because"; None if the text gives none that the participant can repeat.
+        reason: clause to follow "because"; None if the text gives none that the participant can repeat.
     """
 
     sender: str | None
@@ -110,7 +110,7 @@ def read_message(message: str, people: Collection[str] = ()) -> ReadMessage:
 
     Args:
         message: the message.
-        people: known names, as `read_people` gives them (hashable); names not among them are recognised by their form.
+        people: known names, as `read_people` returns them (hashable); other names are recognised by their form.
     """
     text = " ".join(message.split())
     sender: str | None = None
@@ -129,7 +129,7 @@ def read_message(message: str, people: Collection[str] = ()) -> ReadMessage:
 
 
 def find_items(text: str) -> tuple[str, ...]:
-    """Returns the things of the catalogue that a text mentions, in order: "a newspaper", "three chicken wraps"."""
+    """Returns the items of the catalogue that a text mentions, in order: "a newspaper", "three chicken wraps"."""
     return tuple(dict.fromkeys(found[0].lower() for found in _items().finditer(text)))
 
 
@@ -137,7 +137,7 @@ def read_people(*texts: str) -> tuple[str, ...]:
     """Returns the names of people and animals in texts, with their titles, in order: "Mateo", "Dr. Okafor".
 
     A capitalised word in the middle of a sentence is a name, unless it is a landmark, a street, a day, or the place in
-    "from Kyoto"; at the beginning of a sentence it is one if it is so elsewhere, or in "Priya's train".
+    "from Kyoto"; at the beginning of a sentence it is a name if it is one elsewhere, or in "Priya's train".
     """
     joined = "\n".join(texts)
     sure = {found["name"] for found in _names().finditer(joined) if _is_name(joined, found)}
@@ -181,7 +181,7 @@ _FIRST_PERSON = tuple(
         (r"\b(are|Are) you\b", "am I"),
         (r"\b(have|do|did|can|will|would|should|could) you\b", r"\1 I"),
         (r"\bYou\b", "I"),
-        # an object: behind a preposition, or where no verb can follow
+        # an object: after a preposition, or where no verb can follow
         (r"\b(without|for|with|to|from|of|at|see|sees|let|lets|tell|tells|give|gives|meet|join|joins) you\b", r"\1 me"),
         (r"\byou\b(?=$|[.,;:!?])", "me"),
         (r"\byou\b", "I"),
@@ -222,7 +222,7 @@ def _tidy(clause: str) -> str:
 
 
 def _imperative(clause: str) -> str | None:
-    """Returns the clause from its verb on, "buy a newspaper at Ikea"; None if it is not an instruction."""
+    """Returns the clause starting at its verb, "buy a newspaper at Ikea"; None if it is not an instruction."""
     text = _tidy(clause)
     while found := _LEADS.match(text):
         text = text[found.end() :]
@@ -296,7 +296,7 @@ def _after_motion(rest: str) -> str | None:
     return None if found is None else _imperative(found["rest"])
 
 
-# --- people and things ------------------------------------------------------------------------------------------------
+# --- people and items -------------------------------------------------------------------------------------------------
 
 _FOR = re.compile(r"\b(?:for|with|to) (?P<person>(?:(?!for |with |to |at |from |and |over )[\w.'-]+ ?){1,5})$")
 _WHOM = re.compile(
@@ -315,7 +315,7 @@ def _person(action: str) -> str | None:
 
 
 def _human(phrase: str) -> str | None:
-    """Returns the phrase if it is one of a person, without "house" or an item behind a possessive."""
+    """Returns the phrase if it is one of a person, without "house" or an item after a possessive."""
     words = phrase.split()
     if not words or phrase.lower() in _places() or find_items(phrase):
         return None
@@ -334,7 +334,7 @@ _GETTING = re.compile(
 
 
 def _object(action: str | None) -> tuple[str, ...]:
-    """Returns the thing that an instruction is about, where the catalogue does not have it: "the spare key"."""
+    """Returns the item that an instruction is about if it is not in the catalogue: "the spare key"."""
     found = None if action is None else _GETTING.match(action)
     if found is None:
         return ()

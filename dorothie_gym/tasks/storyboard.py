@@ -53,8 +53,8 @@ class TaskMessage:
     """Message to the participant about a change of its tasks.
 
     Attributes:
-        sender: person or device that the message comes from, e.g. "Priya", "your sister", "the dashboard".
-        channel: way in which it reaches the participant.
+        sender: person or device that sent the message, e.g. "Priya", "your sister", "the dashboard".
+        channel: medium by which it reaches the participant.
         text: words of the sender, with the reason for the change.
     """
 
@@ -73,7 +73,7 @@ class TaskMessage:
 
 @dataclass(frozen=True, kw_only=True)
 class TaskMessages:
-    """Messages of a subgoal, by the task exception that they come with; None where the storyboard gives none."""
+    """Messages of a subgoal, by the task exception that they accompany; None where the storyboard has none."""
 
     trigger: TaskMessage | None = None
     delete: TaskMessage | None = None

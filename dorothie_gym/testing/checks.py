@@ -47,7 +47,7 @@ def check_policy(
         policy: policy of any role.
         town: name, file or `Town` to play in.
         seed: seed of the session; the second session has the next seed.
-        decisions: decisions played at most.
+        decisions: maximum number of decisions.
         config: config of the environment.
 
     Raises:
@@ -84,7 +84,7 @@ class _Run:
         }
 
     def play(self, decisions: int) -> list[ActionDict]:
-        """Plays some decisions; returns the actions of the checked policy."""
+        """Plays a number of decisions; returns the actions of the checked policy."""
         actions_of_policy: list[ActionDict] = []
         for _ in range(decisions):
             if not self._env.agents:
@@ -135,8 +135,8 @@ def check_session(
 
     Args:
         session: a session, or its folder.
-        town: the town that it was played in, where that is not shipped with the package.
-        storyboard: its storyboard's template, where that is not shipped.
+        town: the town of the session if it is not shipped with the package.
+        storyboard: its storyboard's template, if that is not shipped.
         replay: whether to play it again; sessions whose actions were not recorded cannot be.
 
     Raises:
@@ -171,7 +171,7 @@ def check_town(town: str | Path | Town, *, sessions: int = 3, decisions: int = 4
     Raises:
         AssertionError: the linter found faults (ten are listed), or the lane graph does not match the lanes.
         TownError: the file cannot be read.
-        StoryboardError: no storyboard fits, for example for want of sites.
+        StoryboardError: no storyboard can be bound, for example for lack of sites.
     """
     if not isinstance(town, Town):
         town = load_town(town)

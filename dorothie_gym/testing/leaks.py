@@ -1,4 +1,4 @@
-"""Check that a role observes nothing that it must not know."""
+"""Check that a role observes no hidden information."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     """Checks that the Co-Wizard observes neither hidden landmarks nor the participant's tasks.
 
     A session is played with random and with scripted actions. The same actions are then played in two altered
-    scenarios: hidden landmarks stand at other sites; the story and the order of the tasks differ. Observation,
-    action mask and refusals of the Co-Wizard must be equal to the bit at every decision (with other tasks: up to the
+    scenarios: hidden landmarks are at other sites; the story and the order of the tasks differ. Observation,
+    action mask and refusals of the Co-Wizard must be bit-identical at every decision (with other tasks: up to the
     first arrival, which all roles may notice, and with an idle Ad-Wizard, because its refusals depend on the task). The
-    participant's observation must differ, or the check would prove nothing.
+    participant's observation must differ, or the check would be meaningless.
 
     Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
-    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera, all
-    is compared until the first decision at which one is in view: the Co-Wizard, and the car, may know it from then on.
+    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,
+    everything is compared until one is in view for the first time; afterwards, the Co-Wizard and the car may know it.
 
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
             `reset(options={"scenario": ...})`. It is reset several times.
-        seed: seed of the first session; the first seed from here on whose scenario has a hidden landmark is used.
+        seed: first candidate for the seed of the session; it counts up until a scenario has a hidden landmark.
         decisions: decisions played in each session, at 2 Hz by default.
 
     Raises:
@@ -73,7 +73,7 @@ class Compared(NamedTuple):
     """Numbers of decisions of a pair of sessions.
 
     Attributes:
-        decisions: played.
+        decisions: number of decisions.
         in_view: decisions at which a hidden landmark was in view in either session.
         pictures: decisions at which pictures, if there are any, were compared.
     """
@@ -104,7 +104,7 @@ def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decision
     views = list(map(bool.__or__, in_view, in_view_again))
     for k, (decision, (observations, infos)) in enumerate(zip(played, again, strict=False)):
         if by_camera and any(views[: k + 1]):
-            break  # what the Co-Wizard has seen may change where the car stops
+            break  # the Co-Wizard's knowledge may affect where the car stops
         if not views[k]:
             _check_pictures(where, k, decision.observations, observations)
         one, other = (_without_pictures(part) for part in (decision.observations, observations))
@@ -138,7 +138,7 @@ def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[
 def _cameras(config: EnvConfig) -> list[CameraConfig]:
     """Returns cameras whose pixels are the samples of the pictures that the roles see, or see by.
 
-    RGB has several samples in a pixel; labels have one, in the middle, which is none of these.
+    RGB has several samples in a pixel; labels have one, in the centre, which is none of these.
     """
     cameras = [] if config.camera is None else [config.camera]
     if config.perception is PerceptionModel.CAMERA:

@@ -38,7 +38,7 @@ class Decision:
 
 
 def play_random(env: ParallelSession, *, seed: int, decisions: int) -> Iterator[Decision]:
-    """Plays a session with actions sampled from the action masks, from the reset on."""
+    """Plays a session with actions sampled from the action masks, starting with the reset."""
     for k, agent in enumerate(env.possible_agents):
         env.action_space(agent).seed(seed + k)
     observations, infos = env.reset(seed=seed)
@@ -52,7 +52,7 @@ def play_random(env: ParallelSession, *, seed: int, decisions: int) -> Iterator[
 
 
 def play_scripted(env: ParallelSession, *, seed: int, decisions: int) -> Iterator[Decision]:
-    """Plays a session with the scripted policies, from the reset on."""
+    """Plays a session with the scripted policies, starting with the reset."""
     observations, infos = env.reset(seed=seed)
     policies = {role: make_policy("scripted", role, env.unwrapped.limits) for role in AGENT_ROLES}
     states = {role: policy.initial_state(seed, env.unwrapped.town) for role, policy in policies.items()}
@@ -70,7 +70,7 @@ def play_scripted(env: ParallelSession, *, seed: int, decisions: int) -> Iterato
 def play_again(
     env: ParallelSession, scenario: Scenario, actions: Sequence[Mapping[str, ActionMapping]]
 ) -> Iterator[tuple[ByAgent, ByAgent]]:
-    """Plays a scenario with given actions; yields observations and infos, from the reset on."""
+    """Plays a scenario with given actions; yields observations and infos, starting with those of the reset."""
     yield env.reset(options={"scenario": scenario})
     for action in actions:
         if not env.agents:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.spaces.fields import SpaceLimits
 
 MAX_SILENT_SESSIONS = 20
-"""Largest number of consecutive sessions without a point of the task before an error is raised."""
+"""Maximum number of consecutive sessions without a point of the task before an error is raised."""
 
 
 SNAPSHOTS: Final = 4

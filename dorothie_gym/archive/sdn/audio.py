@@ -84,7 +84,7 @@ class AudioFiles:
 
 def _flac_duration(head: bytes) -> float | None:
     """Returns the duration of a FLAC file [s]; None if its header does not give one."""
-    if head[:3] == b"ID3" and len(head) >= 10:  # a tag that some programs put before; its size has 7 bits per byte
+    if head[:3] == b"ID3" and len(head) >= 10:  # a tag that some programs put in front; its size has 7 bits per byte
         size = sum(byte << shift for byte, shift in zip(head[6:10], (21, 14, 7, 0), strict=True))
         head = head[10 + size :]
     if head[:4] != b"fLaC" or head[4:5] not in (b"\x00", b"\x80") or len(head) < 4 + _STREAM_INFO:

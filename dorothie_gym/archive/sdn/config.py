@@ -267,7 +267,7 @@ _SUBGOAL_FIELDS: Final = ("description", "trigger", "delete", "change", "after")
 
 
 def _after(value: object, own: int, numbers: dict[int, int], report: ReadReport) -> list[int]:
-    """Returns the subgoals that come before, in the numbers of those that are kept."""
+    """Returns the preceding subgoals, numbered among those that are kept."""
     after = set()
     for item in value if isinstance(value, list) else [] if value is None else [value]:
         number = None if isinstance(item, bool) else whole_of(item)

@@ -139,7 +139,7 @@ class ActionReader:
 
 
 def _argument(val: JsonObject) -> tuple[object, object]:
-    """Returns type and value of the argument of an action, which some files put into an object."""
+    """Returns type and value of the argument of an action, which some files wrap in an object."""
     slot_type, value = val.get("slot_type"), val.get("slot_val")
     if not isinstance(value, Mapping):
         return slot_type, value

@@ -28,7 +28,7 @@ _FIELDS: Final = ("asset", "name", "landmark")
 
 
 def landmark_name(value: object) -> LandmarkName:
-    """Returns the landmark of a name, an asset ("static.prop.kfc"), or an object with such fields.
+    """Returns the landmark for a name, an asset ("static.prop.kfc"), or an object with such fields.
 
     The asset of an object decides, as in the published loader; its name is read only where the asset names none.
 
@@ -56,7 +56,7 @@ def asset_of(name: str) -> str:
 
 
 def _parse(text: str) -> LandmarkName:
-    """Returns the landmark of a name or an asset; raises `OntologyError` for others."""
+    """Returns the landmark for a name or an asset; raises `OntologyError` for unknown ones."""
     asset = text.strip().rpartition("/")[2].casefold()
     if asset.startswith(_WALKER):
         return LandmarkName.PERSON

@@ -216,7 +216,7 @@ def read_speech(
 
 
 def _move_of(value: object) -> DialogueMove:
-    """Returns the move of a name, or of its number in SDN; raises `OntologyError` for others."""
+    """Returns the move for a name or for its number in SDN; raises `OntologyError` for unknown ones."""
     number = None if isinstance(value, str | bool) else whole_of(value)
     if number is not None and number in DialogueMove._value2member_map_:
         return DialogueMove(number)

@@ -70,7 +70,7 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
     Args:
         path: the folder.
         maps: folder with the towns' maps (`Town01.xodr`, ...), for lanes and for angles of turns into a road.
-        sign: vote on the sign of angles; None takes the vote of the session alone (see `settle_sign`).
+        sign: vote on the sign of angles; None uses the vote of this session alone (see `settle_sign`).
 
     Raises:
         SessionError: there is no SDN session, or a file of it cannot be read; the message names file and place.
@@ -109,7 +109,7 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
 
 
 def raw_session(folder: Path, maps: Path | None) -> RawSession:
-    """Returns the content of the files of a session; see `read_sdn`."""
+    """Returns the contents of the files of a session; see `read_sdn`."""
     layout = detect_layout(folder)
     if layout is None:
         raise SessionError(f"{folder}: no SDN session here (none of its logs is there)")

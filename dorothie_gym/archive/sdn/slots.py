@@ -18,7 +18,7 @@ from dorothie_gym.session.recording.validation import ReadReport
 
 _ACT: Final = "act"
 _OWN_VALUE: Final = ("asset", "name", "val", "value")
-"""Fields of an object that hold the value of the slot it stands in."""
+"""Fields of an object that contain the value of its slot."""
 
 _BETWEEN: Final = re.compile(r"[,;|/]")
 
@@ -146,7 +146,7 @@ class SlotReader:
 
 
 def _slot_of(name: object) -> Slot | None:
-    """Returns the slot of a name in a file; None for Null and for unknown names."""
+    """Returns the slot for a name in a file; None for Null and for unknown names."""
     try:
         slot = parse_slot(name) if isinstance(name, str) else Slot.NULL
     except OntologyError:

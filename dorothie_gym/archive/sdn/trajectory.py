@@ -178,7 +178,7 @@ MAX_COORDINATE: Final = 1e9
 """Largest magnitude of a valid coordinate or yaw [m, degrees]."""
 
 MIN_MOTION: Final = 0.2
-"""Distance between two frames from which on the motion gives the heading [m]."""
+"""Minimum distance between two frames for deriving the heading from the motion [m]."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class CarPoses:
     """Poses of the car.
 
     Attributes:
-        frames: (n,) int64, 10 Hz, rising.
+        frames: (n,) int64, 10 Hz, ascending.
         x: (n,) [m].
         y: (n,) [m].
         heading: (n,) [rad, clockwise].
@@ -206,7 +206,7 @@ def read_places(path: Path, report: ReadReport) -> CarPoses:
     """Returns the poses of the file.
 
     The file ends at a second header line. Rows with a missing number are left out, rows out of order are sorted, and
-    the first of several rows of a frame is taken.
+    if a frame has several rows, the first is used.
 
     Raises:
         SessionError: it lacks a header line or one of the first four columns, is too large, or is not UTF-8.

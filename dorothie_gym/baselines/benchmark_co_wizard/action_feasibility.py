@@ -1,4 +1,4 @@
-"""Feasibility of predicted navigation actions, as far as the Co-Wizard's observation shows it."""
+"""Feasibility of predicted navigation actions, judged from the Co-Wizard's observation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class FeasibleAction:
     """Action that the car can carry out now.
 
     Attributes:
-        physical: the action; None if the car does so anyway.
+        physical: the action; None if the car performs it anyway.
         direction: direction of the action, for its wording.
     """
 
@@ -72,7 +72,7 @@ def _follow(view: CoWizardView) -> FeasibleAction | None:
 
 
 def _at_end(view: CoWizardView) -> bool:
-    """Returns whether the car stands before a junction without a planned turn, so that it could only wait."""
+    """Returns whether the car stands before a junction without a planned turn and thus would have to wait."""
     near = view.choice is not None and view.choice.distance < AT_END
     return near and view.standing and view.manoeuvre is None
 

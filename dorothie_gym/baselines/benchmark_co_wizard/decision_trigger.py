@@ -45,9 +45,9 @@ class TriggerState:
         junction: lane before the junction of the last decision, -1 for none.
         waited: time of the last decision at a junction [s].
         drove: time of the last navigation decision [s].
-        hazard: time since which there has been a hazard [s], infinite for none.
+        hazard: start of the current hazard [s], infinite if there is none.
         at_place: whether the car would stop at the last-named place now.
-        owed: whether a navigation decision is postponed until a lane switch or U-turn is complete.
+        owed: whether a navigation decision is postponed until the end of a lane switch or U-turn.
     """
 
     junction: int = -1
@@ -63,7 +63,7 @@ class TriggerState:
         Args:
             view: the observation.
             heard: whether the participant has spoken.
-            place: distance along the way to the last-named place [m]; None if it is not near, or not known.
+            place: driving distance to the last-named place [m]; None if it is not near or unknown.
         """
         hazard = self._hazard(view)
         changed = math.isinf(hazard) is not math.isinf(self.hazard)

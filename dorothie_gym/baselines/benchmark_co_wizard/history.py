@@ -33,7 +33,7 @@ class History:
     """Observations, utterances and actions of a Co-Wizard; every change returns a new object.
 
     Attributes:
-        encoded: the part of them that a benchmark model can still be shown, as columns.
+        encoded: the part of them that inputs of a benchmark model may still contain, as columns.
         events: number of dialogue moves and physical actions so far.
         utterances: number of utterances so far.
         landmark: label of the landmark that was named last, by either speaker.
@@ -53,7 +53,7 @@ class History:
         Args:
             observation: first observation of the session: it has the streets and landmarks.
             town: the map.
-            sizes: how much of the history the model is shown.
+            sizes: extent of the history in the inputs of the model.
         """
         return cls(encoded=IncrementalColumns.begin(header_of(observation, town), town, sizes))
 
@@ -73,7 +73,7 @@ class History:
         return replace(self, encoded=self.encoded.observed(observed_frame(view, town)))
 
     def said(self, speaker: Role, spans: Sequence[Span], frame: int) -> Self:
-        """Returns the history with an utterance that was over at a frame."""
+        """Returns the history with an utterance that ended at a frame."""
         text = " ".join(span.text for span in spans)
         record = UtteranceRecord(
             number=self.utterances, speaker=speaker, text=text, start=frame / FRAME_RATE, end=frame / FRAME_RATE,
@@ -120,7 +120,7 @@ class History:
 
 
 def _last_landmark(utterances: Sequence[UtteranceRecord]) -> str | None:
-    """Returns the label of the landmark that was named last in utterances, None for none."""
+    """Returns the label of the landmark that was last named in utterances, None if there is none."""
     moves = (move for utterance in reversed(utterances) for move in reversed(utterance.moves))
     named = (move.act.slot_labels().get(Slot.LANDMARK.label) for move in moves)
     return next((labels[-1] for labels in named if labels), None)
@@ -140,7 +140,7 @@ class HistoryTracker:
         history: completed utterances and actions.
         air: spans of the Co-Wizard's utterance in progress.
         began: start of that utterance [s].
-        tried: physical action of the last decision, None for none.
+        tried: physical action of the last decision, None if there is none.
         before: observation of the last decision; None at first.
     """
 
@@ -156,8 +156,8 @@ class HistoryTracker:
         Args:
             speech: the utterance, with its words.
             physical: the physical action.
-            view: observation that the decision was taken on.
-            most_spans: largest number of acts in an utterance; further ones are refused.
+            view: observation on which the decision was based.
+            most_spans: maximum number of acts in an utterance; further ones are refused.
         """
         air, began = self.air, self.began
         if speech is not None and len(air) < most_spans:
@@ -171,7 +171,7 @@ class HistoryTracker:
         Args:
             view: the observation.
             town: the map.
-            heard: spans of the participant's utterance that is over, empty for none.
+            heard: spans of the participant's utterance that has ended, empty if there is none.
         """
         history = self.history
         if self.tried is not None and self.before is not None and carried_out(self.tried, self.before, view):
@@ -191,7 +191,7 @@ def carried_out(tried: Physical, before: CoWizardView, after: CoWizardView) -> b
 
     Args:
         tried: the action.
-        before: observation that the action was chosen on.
+        before: observation for which the action was chosen.
         after: observation one decision later.
     """
     action = tried.action
@@ -218,7 +218,7 @@ def _start(spans: tuple[Span, ...], end: float, period: float) -> float:
 
     Args:
         spans: spans of the utterance.
-        end: time at which it is over [s].
+        end: time at which it ends [s].
         period: time between decisions [s].
     """
     seconds = sum(speech_seconds(span.text) for span in spans)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 _TOWNS: Final = 4
-"""Largest number of towns that a model is kept ready for."""
+"""Maximum number of towns for which prepared models are kept."""
 
 _TEXTS: Final = 1 << 16
 
@@ -113,7 +113,7 @@ class TownModel:
             return model.predict(inputs, labels.task)
 
     def decisions(self, history: History, allowed: Sequence[bool]) -> Iterator[Predicted]:
-        """Yields the navigation decisions at the last NfD point of a history, the likeliest first (B = 1 each).
+        """Yields the navigation decisions at the last NfD point of a history, the most likely first (B = 1 each).
 
         Args:
             history: the history, which contains the point.

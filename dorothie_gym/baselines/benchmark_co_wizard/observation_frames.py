@@ -34,7 +34,7 @@ _SHORTEST_CAR: Final = 2.5
 def observed_frame(view: CoWizardView, town: Town) -> ObservedFrame:
     """Returns the frame of a view.
 
-    Headings of actors are not perceived: a vehicle gets that of the nearest lane, other actors that of the car.
+    Headings of actors are not perceived: a vehicle takes that of the nearest lane, other actors take that of the car.
     """
     x, y, heading = view.raw["pose"].tolist()
     return ObservedFrame(

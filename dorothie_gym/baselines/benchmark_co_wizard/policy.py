@@ -123,7 +123,7 @@ def _last_move(voice: SpeechState) -> DialogueMove | None:
 
 
 def _way_to_place(history: History, view: CoWizardView, town: Town) -> float | None:
-    """Returns the distance along the way to the last-named place [m]; None if it is not near, or not on the map."""
+    """Returns the driving distance to the last-named place [m]; None if it is not near, or not on the map."""
     name = history.landmark
     named = next((landmark for landmark in view.landmarks if landmark.name.label == name), None)
     return None if named is None else default_lane_distance(town, view.here, named.place, IN_VIEW)
@@ -147,7 +147,7 @@ def _answer(model: TownModel, history: History, voice: SpeechState, deed: Feasib
 
 
 def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> FeasibleAction:
-    """Returns the likeliest feasible action.
+    """Returns the most likely feasible action.
 
     Args:
         model: the model.
@@ -176,7 +176,7 @@ def _act(predicted: Predicted) -> DialogueAct:
 _CLAUSE_END: Final = re.compile(r"(?<=[,.?!]) ")
 
 _MAX_CLAUSES: Final = 8
-"""Largest number of clauses; the last one gets the rest of a longer utterance."""
+"""Maximum number of clauses; the last one contains the rest of a longer utterance."""
 
 
 def spans_of(text: str, acts: Sequence[DialogueAct] | None, after: DialogueMove | None = None) -> tuple[Span, ...]:
@@ -217,7 +217,7 @@ def _partings(clauses: Sequence[str], count: int) -> Iterator[tuple[str, ...]]:
 
 
 def _fit(pieces: Sequence[str], acts: Sequence[DialogueAct]) -> tuple[int, int]:
-    """Returns how many moves, and how many slot sets, the classifier predicts correctly."""
+    """Returns the numbers of moves and of slot sets that the classifier predicts correctly."""
     guessed = [_guess(piece) for piece in pieces]
     moves = sum(guess.move is act.move for guess, act in zip(guessed, acts, strict=True))
     return moves, sum(guess.slots == act.slots for guess, act in zip(guessed, acts, strict=True))

@@ -41,7 +41,7 @@ class BytePairs:
 
         Args:
             texts: texts of the training sessions only.
-            vocabulary: how many ids there are at most, padding and bytes included.
+            vocabulary: maximum number of ids, including padding and bytes.
 
         Raises:
             ValueError: the vocabulary is too small for the bytes.
@@ -80,7 +80,7 @@ class BytePairs:
         return tuple(piece for word in words(text) for piece in self._word(word))
 
     def table(self, texts: Sequence[str], length: int) -> NDArray[np.int32]:
-        """Returns the ids of texts (n, length), int32; filled up with 0, and cut off at the end where too long."""
+        """Returns the ids of texts (n, length), int32, padded with 0 and truncated."""
         table = np.zeros((len(texts), length), dtype=np.int32)
         for row, text in zip(table, texts, strict=True):
             ids = self.ids(text)[:length]
@@ -104,7 +104,7 @@ class BytePairs:
 
 
 def words(text: str) -> list[str]:
-    """Returns the words and signs of a text in small letters."""
+    """Returns the words and signs of a text in lower case."""
     return _WORD.findall(text.lower())
 
 

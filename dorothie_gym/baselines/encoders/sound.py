@@ -30,7 +30,7 @@ BANDS: Final = 32
 """Number of mel bands."""
 
 MEL_FRAMES: Final = 256
-"""Number of frames of a spectrum, 5.1 s; later sound is cut off."""
+"""Number of frames of a spectrum, 5.1 s; later sound is truncated."""
 
 _LOWEST, _HIGHEST = 60.0, 7600.0
 _FLOOR: Final = 1e-7
@@ -97,14 +97,14 @@ class SoundReader(nn.Module):
         """Returns vectors of sounds (n, width).
 
         Args:
-            spectra: (n, frames, 32), zeros behind the last frame.
+            spectra: (n, frames, 32), zeros after the last frame.
         """
         spectra = spectra.to(self.out.weight.dtype)
         lengths = (spectra != 0).any(-1).sum(1)  # (n,)
         seen = F.gelu(self.second(F.gelu(self.first(spectra.transpose(1, 2) / 2.0)))).transpose(1, 2)  # (n, T, 64)
         lengths = (lengths + 3).div(4, rounding_mode="floor").clamp(min=1)
         place = torch.arange(seen.shape[1], device=seen.device)  # (T,)
-        stretch = (place * _STRETCHES).div(lengths[:, None], rounding_mode="floor")  # (n, T); 4 or more behind
+        stretch = (place * _STRETCHES).div(lengths[:, None], rounding_mode="floor")  # (n, T); 4 or more after it
         parts = []
         for number in range(_STRETCHES):
             inside = (stretch == number).unsqueeze(-1)  # (n, T, 1)

@@ -30,7 +30,7 @@ _WAYS: Final = ({"left"}, {"right"}, {"straight", "ahead", "across", "forward"})
 
 
 def label_words(label: str) -> tuple[str, ...]:
-    """Returns the words of a label in small letters: "BurgerKing" is "burger", "king"."""
+    """Returns the words of a label in lower case: "BurgerKing" is "burger", "king"."""
     return tuple(part.lower() for part in _PARTS.findall(label))
 
 
@@ -117,7 +117,7 @@ def _freshness(now: Tensor, times: Tensor, mask: Tensor) -> Tensor:
 # --- Exits of the next junction, from the lane graph of a town --------------------------------------------------------
 
 EXITS: Final = 5
-"""Largest number of exits; a crossing has three."""
+"""Maximum number of exits; a crossing has three."""
 
 _HOPS: Final = 24
 _START_YAW, _END_YAW = FEATURES.index("start_yaw"), FEATURES.index("end_yaw")
@@ -132,7 +132,7 @@ class ExitTable:
 
     Attributes:
         angle: (L, X) angle of the turn to each exit [degrees, positive left].
-        lane: (L, X) lane that the car is on after the junction, -1 for none.
+        lane: (L, X) lane of the car after the junction, -1 for none.
         place: (L, X, 2) end of that lane [m].
         there: (L, X) whether the exit exists.
         distance: (L,) from the end of the lane to the junction along the lanes between [m].

@@ -37,7 +37,7 @@ LEARNING_RATE: Final = 1e-3
 BATCH_SIZE: Final = 64
 
 MAX_EPOCHS: Final = 60
-"""Largest number of passes over the decisions."""
+"""Maximum number of passes over the decisions."""
 
 PATIENCE: Final = 5
 """Number of passes without a better held-out likelihood after which cloning stops."""
@@ -151,7 +151,7 @@ def clone(
     """Maximises the likelihood of decisions; keeps the pass with the highest held-out likelihood.
 
     Args:
-        model: PPO, MaskablePPO or A2C; its actor learns, its critic does not.
+        model: PPO, MaskablePPO or A2C; only its actor is trained, not its critic.
         training: training decisions.
         held_out: decisions of other sessions, for early stopping.
         seed: seed of the order.

@@ -237,7 +237,7 @@ def refusing_misfits(path: Path) -> Iterator[None]:
 
 
 def set_parameters(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]) -> None:
-    """Sets the values returned by `parameters_of`; raises various errors if they do not fit (`refusing_misfits`)."""
+    """Sets the values returned by `parameters_of`; raises various errors if they do not match (`refusing_misfits`)."""
     variables = {name.split("/", 1)[1]: value for name, value in tensors.items() if name.startswith("variables/")}
     parameters = {
         name: _optimiser(name, page["optimisers"], tensors)
@@ -278,7 +278,7 @@ def _read_settings(page: Page, folder: Path) -> TrainingSettings:
         folder: folder of the model.
 
     Raises:
-        ModelFileError: a setting is missing, unknown, of another type or out of range, or asks for a network that is
+        ModelFileError: a setting is missing, unknown, of another type or out of range, or requires a network that is
             larger than the weights in the folder; or these are missing or damaged.
     """
     with raising(ModelFileError):

@@ -50,7 +50,7 @@ _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
 
 def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
-    """Makes an environment, of the first of several towns, whose observations are vectors or pictures.
+    """Makes an environment whose observations are vectors or pictures; of several towns, the first one is used.
 
     Environments with other spaces are flattened (`dorothie_gym.flatten`), and their observations squashed.
 
@@ -95,7 +95,7 @@ def _with_partners(name: str, settings: Arguments) -> Arguments:
 
 
 def each_town(settings: Arguments) -> list[Arguments]:
-    """Returns the arguments of an environment for each of its towns, which several environments take in turn.
+    """Returns the arguments of an environment for each of its towns, over which several environments cycle.
 
     Raises:
         SettingsError: the list of towns is empty.
@@ -127,7 +127,7 @@ def make_env_of_model(name: str, settings: Arguments | None, folder: Path) -> An
             f"{', '.join(sorted(ENVIRONMENTS_OF_MODELS))} can be opened"
         )
     others = {argument: value for argument, value in (settings or {}).items() if argument != PARTNERS}
-    return make_env(name, others)  # the partners of a training do not decide what its model observes and does
+    return make_env(name, others)  # the partners in training do not affect what the model observes and does
 
 
 def squashed(values: NDArray[np.generic]) -> Vector:
@@ -138,7 +138,7 @@ def squashed(values: NDArray[np.generic]) -> Vector:
 
 
 class SquashedObservation(gym.ObservationWrapper[Vector, object, dict[str, NDArray[np.generic]]]):
-    """Squashes the numbers of a flat observation: metres, ids and shares get similar magnitudes without statistics."""
+    """Squashes the numbers of a flat observation: metres, ids and shares get similar magnitudes."""
 
     def __init__(self, env: AnyEnv) -> None:
         super().__init__(env)
@@ -178,9 +178,9 @@ class EnvFactory:
 
 
 class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
-    """Records how the present episode began and the actions since then, with which another process can repeat it.
+    """Records the start of the current episode and its actions, with which another process can repeat it.
 
-    The beginning is the seed of the reset; for a reset without a seed, the state of the environment's random generator
+    The start is the seed of the reset; for a reset without a seed, the state of the environment's random generator
     before it. That is exact if the environment depends on its seed and the actions only, as Gymnasium demands.
     """
 
@@ -203,7 +203,7 @@ class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
         return self.env.step(action)
 
     def recorded_episode(self) -> tuple[Page, NDArray[np.generic]]:
-        """Returns the beginning of the present episode in JSON types, and its actions (n, ...)."""
+        """Returns the start of the current episode in JSON types, and its actions (n, ...)."""
         return self._start, np.array(self._actions)
 
     def repeat_episode(self, start: Page, actions: NDArray[np.generic]) -> Vector:

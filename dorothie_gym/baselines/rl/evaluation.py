@@ -27,7 +27,7 @@ PARALLEL_EPISODES: Final = 8
 """Number of episodes that single environments play in parallel: networks are faster on batches."""
 
 BATCHED_EPISODES: Final = 128
-"""Largest number of episodes that a batch plays in parallel."""
+"""Maximum number of episodes that a batch plays in parallel."""
 
 
 Action: TypeAlias = Any
@@ -82,7 +82,7 @@ class Episodes:
 
     @classmethod
     def joined(cls, parts: Sequence[Episodes]) -> Episodes:
-        """Returns the episodes of several parts."""
+        """Returns the episodes of several evaluations, concatenated."""
         return cls(
             np.concatenate([part.successes for part in parts]),
             np.concatenate([part.rewards for part in parts]),
@@ -104,7 +104,7 @@ class Episodes:
 
 
 def evaluate_settings(settings: TrainingSettings, act: Act, episodes: int, seed: int = FIRST_SEED) -> EpisodeStatistics:
-    """Plays episodes of the environment of a training, with consecutive seeds; of several towns, so many in each.
+    """Plays episodes of the environment of a training, with consecutive seeds; with several towns, this many in each.
 
     Args:
         settings: settings of the training.
@@ -135,7 +135,7 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
 
 
 def play_singles(make: MakeEnv, act: Act, episodes: int, seed: int) -> Episodes:
-    """Plays the episodes of `evaluate_policy` in some single environments."""
+    """Plays the episodes of `evaluate_policy` in single environments."""
     envs = [make() for _ in range(min(PARALLEL_EPISODES, episodes))]
     outcomes = Episodes.of(episodes)
     playing = dict(enumerate(range(len(envs))))  # environment: episode

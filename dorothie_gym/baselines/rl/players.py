@@ -89,7 +89,7 @@ class FlatPolicy(Policy[None]):
         """Returns nothing: the policy has no memory and no random numbers."""
 
     def step(self, observation: ObservationMapping, state: None) -> tuple[ActionDict, None]:
-        """Chooses the likeliest action."""
+        """Chooses the most likely action."""
         seen = {name: value for name, value in observation.items() if name != "action_mask"}
         vector, mask = squashed(self._observations.vector(seen)), self._actions.mask(observation["action_mask"])
         (chosen,) = self._act(vector[None], mask[None])

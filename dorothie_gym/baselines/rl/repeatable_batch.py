@@ -18,9 +18,9 @@ Episode: TypeAlias = tuple[Page, NDArray[Any]]
 
 
 class RepeatableVecEnv(NativeVecEnv):
-    """Batch that records how each present episode began and its actions; see `RepeatableEpisodes` for one environment.
+    """Batch that records the start and actions of each current episode; see `RepeatableEpisodes` for one environment.
 
-    The beginning is the seed of a reset; for a reset without a seed, the state of the environment's random generator
+    The start is the seed of a reset; for a reset without a seed, the state of the environment's random generator
     before it, which is its state after the reset before.
     """
 
@@ -43,7 +43,7 @@ class RepeatableVecEnv(NativeVecEnv):
         return observations
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Plays a decision in all environments."""
+        """Steps all environments by one decision."""
         actions = np.array(self._actions)  # a copy: the caller may use the array again
         observations, rewards, dones, infos = super().step_wait()
         for number in range(self.num_envs):
@@ -54,7 +54,7 @@ class RepeatableVecEnv(NativeVecEnv):
         return observations, rewards, dones, infos
 
     def recorded_episodes(self) -> list[Episode]:
-        """Returns the present episodes of all environments."""
+        """Returns the current episodes of all environments."""
         kind = self.action_space
         return [
             (start, np.array(taken, dtype=kind.dtype).reshape(-1, *(kind.shape or ())))

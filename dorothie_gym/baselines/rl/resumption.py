@@ -1,8 +1,8 @@
-"""Checkpoint of a run: one file with everything that the run needs to continue as if it had not been interrupted.
+"""Checkpoint of a run: one file with the full state from which the run continues as if uninterrupted.
 
 It is written between two rollouts and replaced in one step. It holds weights and optimisers, step counts, the states of
 all random generators, the rows of the learning curve, and a replay buffer if there is one. Environments are stored as
-the beginning of their episodes and the actions since then, which a resumed run repeats (`RepeatableEpisodes`).
+the starts of their episodes and the actions since then, which a resumed run repeats (`RepeatableEpisodes`).
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def restore_state(model: Model, checkpoint: Checkpoint) -> None:
     """Restores the state returned by `state_of` in a model with new environments and a logger.
 
     Raises:
-        ModelFileError: the checkpoint does not fit the model, or an environment does not repeat its episode exactly.
+        ModelFileError: the checkpoint does not match the model, or an environment does not repeat its episode exactly.
     """
     with raising(ModelFileError):
         own = {name: value for name, value in checkpoint.tensors.items() if name.split("/", 1)[0] not in _ARRAYS}

@@ -20,7 +20,7 @@ def sb3_vec_env(env: VectorEnv[Any, Any, Any]) -> VecEnv:
     """Returns a vector environment as a `VecEnv`, which steps all of its environments in one call.
 
     An info is empty except at the end of an episode, where it contains the last observation, whether the episode was
-    cut off by the time limit, and the environment's own information on the end, such as `is_success`. `env_method` and
+    truncated by the time limit, and the environment's information on the end, such as `is_success`. `env_method` and
     `get_attr` access the methods and attributes of the vector environment, such as `action_masks` for `MaskablePPO`.
 
     Args:
@@ -83,7 +83,7 @@ class NativeVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Plays a decision in all environments."""
+        """Steps all environments by one decision."""
         observations, rewards, terminated, truncated, all_infos = self.env.step(self._actions)
         over = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -104,14 +104,14 @@ class NativeVecEnv(VecEnv):
         return hasattr(self.env, attr_name)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Returns an attribute of the vector environment for each of some environments."""
+        """Returns an attribute of the vector environment for each of the given environments."""
         return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Sets an attribute of the vector environment, which all environments share.
 
         Raises:
-            ValueError: it is to be set for some environments only.
+            ValueError: it would be set in a part of the environments only.
         """
         if indices is not None and len(list(self._get_indices(indices))) != self.num_envs:
             raise ValueError(f"{attr_name} is one attribute of all {self.num_envs} environments; set it for all")
@@ -120,7 +120,7 @@ class NativeVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls a method of the vector environment once, and returns the results of some environments.
+        """Calls a method of the vector environment once, and returns the results of the given environments.
 
         The method has to return one result for each environment, as `action_masks` does.
         """
@@ -141,7 +141,7 @@ class NativeVecEnv(VecEnv):
 
 
 def unrelated_seeds(seed: int | None, count: int) -> list[int | None]:
-    """Returns the seeds of some environments of a run; runs with neighbouring seeds get different ones."""
+    """Returns the seeds of the given environments of a run; runs with neighbouring seeds get different ones."""
     return [int(number) for number in np.random.SeedSequence(seed).generate_state(count)]
 
 

@@ -46,16 +46,16 @@ FINAL_ENTROPY: Final = "final_ent_coef"
 """Additional parameter: the weight of the entropy falls linearly from `ent_coef` to this."""
 
 MAX_ENVIRONMENTS: Final = 4096
-"""Largest number of parallel environments."""
+"""Maximum number of parallel environments."""
 
 SHORTEST_ROLLOUT: Final = 8
-"""Least number of steps of each environment in a rollout."""
+"""Minimum number of steps of each environment in a rollout."""
 
 MAX_LAYERS, MAX_WIDTH = 16, 8192
-"""Largest number of hidden layers, and of numbers in a layer."""
+"""Maximum number of hidden layers, and of numbers in a layer."""
 
 MAX_CHANNELS: Final = 512
-"""Largest number of channels of a convolution."""
+"""Maximum number of channels of a convolution."""
 
 MAX_PARAMETER: Final = 1e8
 """Largest number among an algorithm's parameters, such as the size of a replay buffer."""
@@ -77,11 +77,11 @@ class TrainingSettings:
         episodes: number of episodes of an evaluation.
         network: widths of the hidden layers.
         parameters: parameters of the algorithm, as stable-baselines3 names them; see `FINAL_RATE` and `FINAL_ENTROPY`.
-        warm_start: folder of a corpus for behaviour cloning before the training; None for none.
+        warm_start: folder of a corpus for behaviour cloning before the training; None for no warm start.
         algorithm: one of `ALGORITHMS`.
         env: id of the environment.
         env_settings: arguments of the environment.
-        fine_inputs: whether networks get each input in two scales, see `FineInputs`.
+        fine_inputs: whether networks receive each input in two scales, see `FineInputs`.
         channels: channels of the convolutions for pictures, see `PictureFeatures`.
     """
 
@@ -197,7 +197,7 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
 
     Args:
         algorithm: one of `ALGORITHMS`.
-        env: id of the environment; an environment without tuned settings gets the default of the algorithm.
+        env: id of the environment; the defaults of the algorithm apply to environments without tuned settings.
         changes: fields of `TrainingSettings`; None leaves a field as it is, and so do the arguments of the environment
             that `env_settings` does not name.
 

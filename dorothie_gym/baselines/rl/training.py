@@ -128,7 +128,7 @@ class Training(Run):
                     callbacks.append(EntropySchedule(first, last))
                 if settings.warm_start is not None:
                     callbacks.append(CriticWarmUp())
-                # stable-baselines3 would count rollouts anew in a resumed run: they are logged by `_Evaluations`
+                # stable-baselines3 would restart the count of rollouts after a resume: `_Evaluations` logs them
                 interval = None if isinstance(model, OnPolicyAlgorithm) else LOGGED_EPISODES
                 model.learn(left, callback=callbacks, reset_num_timesteps=False, log_interval=interval)
                 self.checkpoint()

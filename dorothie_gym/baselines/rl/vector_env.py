@@ -100,7 +100,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return self._answers(range(len(self._shares)))
 
     def _ask_some(self, indices: VecEnvIndices, name: str, *arguments: object, **keywords: object) -> list[Answer]:
-        """Returns the answers of the environments with these indices, in their order; no other environment is asked."""
+        """Returns the answers of the environments with these indices, in their order; only these are called."""
         numbers = [range(self.num_envs)[k] for k in self._get_indices(indices)]
         parts = [[k for k in numbers if k in share] for share in self._shares]
         asked = []
@@ -114,7 +114,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return [by_number[k] for k in numbers]
 
     def _answers(self, workers: Iterable[int]) -> list[Answer]:
-        """Returns the answers of workers; waits for all of them before raising an error of any."""
+        """Returns the answers of workers; waits for all workers before raising the error of one."""
         received = [self._receive(worker) for worker in workers]
         for succeeded, answer in received:
             if not succeeded:
@@ -152,17 +152,17 @@ class WorkerVecEnv(VecEnv, ABC):
             self._end()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Answer]:
-        """Returns an attribute of some environments."""
+        """Returns an attribute of the given environments."""
         return self._ask_some(indices, "get_attr", attr_name)
 
     def set_attr(self, attr_name: str, value: object, indices: VecEnvIndices = None) -> None:
-        """Sets an attribute of some environments."""
+        """Sets an attribute of the given environments."""
         self._ask_some(indices, "set_attr", attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: object, indices: VecEnvIndices = None, **method_kwargs: object
     ) -> list[Answer]:
-        """Calls a method of some environments, and returns the results."""
+        """Calls a method of the given environments, and returns the results."""
         return self._ask_some(indices, "env_method", method_name, *method_args, **method_kwargs)
 
     def has_attr(self, attr_name: str) -> bool:
@@ -170,7 +170,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return all(self._ask("has_attr", attr_name))
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
-        """Returns whether some environments have a wrapper."""
+        """Returns whether each of the given environments has a wrapper."""
         return self._ask_some(indices, "env_is_wrapped", wrapper_class)
 
     def get_images(self) -> Sequence[None]:
@@ -343,7 +343,7 @@ class RayVecEnv(WorkerVecEnv):
 
 
 class _Actor:
-    """Ray actor that holds some environments."""
+    """Ray actor that holds a part of the environments."""
 
     def __init__(self, make: MakeEnv, count: int) -> None:
         self._vector = several(make, count)

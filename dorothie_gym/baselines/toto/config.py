@@ -93,7 +93,7 @@ _RANGES: Final = (
     ("weight_decay", 0.0, 10.0),
     ("clip", 0.0, 1e6),
 )
-"""Least and greatest values of numbers."""
+"""Minimum and maximum values of numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,20 +113,20 @@ class TOTOConfig(HistorySizes):
         clock: origin of a token's time: the start of the "session", as published, or back from the
             "point". Tokens known from the start then have the session's time: both carry the same information.
         text: "frozen" vectors of a text encoder, or a "trained" encoder.
-        text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not MiniLM.
+        text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, if it is not MiniLM.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
         lane_width: numbers of a lane's vector, a multiple of `map_heads`.
         map_heads: heads of the graph attention.
         id_width: numbers of the vector looked up for a road, and for a junction.
         roads, junctions: sizes of those tables; ids beyond them share rows.
-        image_width: numbers of a picture's vector at each token of the window; 0 where there is no camera.
-        sound_width: numbers of the vector of the current utterance's sound; 0 where there is no such vector.
+        image_width: numbers of a picture's vector at each token of the window; 0 if there is no camera.
+        sound_width: numbers of the vector of the current utterance's sound; 0 if there is no such vector.
         sound_frames: frames of its log-mel spectrum, which a small convolution reads that is trained with the model; 0
-            where there is no such spectrum.
+            if there is no such spectrum.
         detector: (queries, numbers each) of an object detector; None: objects come from the world's list.
         learning_rate, weight_decay, clip: of AdamW, and the largest norm of the gradient.
         batch_size: points of a step.
-        min_epochs, max_epochs: smallest and largest number of epochs.
+        min_epochs, max_epochs: minimum and maximum number of epochs.
         patience: epochs without a better validation loss after which training stops.
         loss: weights of its parts.
 
@@ -222,7 +222,7 @@ class TOTOConfig(HistorySizes):
         return BatchSpec(**{name: getattr(self, name) for name in HISTORY}, strict=self.strict)
 
     def without(self, *channels: Channel) -> Self:
-        """Returns the config without some inputs."""
+        """Returns the config without the given inputs."""
         return replace(self, channels=tuple(channel for channel in self.channels if channel not in channels))
 
     def only(self, channels: Iterable[Channel]) -> Self:

@@ -19,7 +19,7 @@ _LOWEST: Final = torch.iinfo(torch.int64).min
 
 
 def time_encoding(seconds: Tensor, width: int) -> Tensor:
-    """Returns the encoding of moments in all channels (..., width): sines in the first half, cosines in the second.
+    """Returns the encoding of times in all channels (..., width): sines in the first half, cosines in the second.
 
     Args:
         seconds: (...) of 0 or more [s].
@@ -137,7 +137,7 @@ class GraphAttention(nn.Module):
 
         Args:
             nodes: (L, inputs).
-            edges: (2, E) from and to.
+            edges: (2, E) sources and targets.
             edge_types: (E,).
         """
         count = len(nodes)
@@ -160,7 +160,7 @@ def segment_softmax(scores: Tensor, segment: Tensor, count: int) -> Tensor:
     Args:
         scores: (n, heads).
         segment: (n,) segment of each row, in any order.
-        count: how many segments there are.
+        count: number of segments.
     """
     highest = scores.new_full((count, scores.shape[1]), -math.inf)
     highest = highest.scatter_reduce(0, segment[:, None].expand_as(scores), scores.detach(), "amax")

@@ -48,7 +48,7 @@ _OBJECT_UNITS: Final = (30.0, ANGLE_UNIT, 30.0, 30.0, ANGLE_UNIT, 10.0, 5.0, 5.0
 
 
 class TOTO(Model):
-    """Transformer encoder over everything visible at a point, with a head for each prediction.
+    """Transformer encoder over all data visible at a point, with a head for each prediction.
 
     Args:
         config: sizes and inputs.
@@ -146,7 +146,7 @@ class TOTO(Model):
         return self.norm(tokens) + time_encoding(times, self.config.width), mask
 
     def token_count(self, inputs: Inputs) -> int:
-        """Returns how many tokens the longest of B points has."""
+        """Returns the number of tokens of the longest of B points."""
         return int(torch.cat([mask for _, mask, _ in self._channels(inputs)], dim=1).sum(1).max())
 
     def heads(self, last: Tensor) -> Outputs:
@@ -298,7 +298,7 @@ class TOTO(Model):
         heard, said = inputs["current_recognised"], inputs["current_text"]
         if self.config.sound_width or self.config.sound_frames:
             read, time = self.sound if self.config.sound_frames else self.speech, inputs["time"][:, None]
-            if "current_sound" not in inputs:  # of a session in progress, in which no utterance is to be predicted
+            if "current_sound" not in inputs:  # of a session in progress, in which no utterance must be predicted
                 return time.new_zeros(len(time), 1, self.config.width), torch.zeros_like(time, dtype=torch.bool), time
             return read(inputs["current_sound"])[:, None], (said >= 0)[:, None], time
         text = torch.where(heard >= 0, heard, said)[:, None]
@@ -322,8 +322,8 @@ class TOTO(Model):
 def gather_tokens(channels: list[Tokens]) -> tuple[Tensor, Tensor, Tensor]:
     """Returns the tokens of all channels (B, T, d), their times (B, T) and their mask (B, T).
 
-    Valid tokens come first, and T is the largest number of any point: missing tokens cost nothing, and results do not
-    depend on the padding. Attention does not know places, so that their order does not matter.
+    Valid tokens come first, and T is the largest number of tokens of a point: missing tokens cost nothing, and
+    results do not depend on the padding. Attention does not depend on the order of tokens.
     """
     tokens = torch.cat([part for part, _, _ in channels], dim=1)
     mask = torch.cat([part for _, part, _ in channels], dim=1)

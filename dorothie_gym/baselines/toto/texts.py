@@ -105,7 +105,7 @@ class SmallTextEncoder(nn.Module):
 
     Args:
         vocabulary: number of pieces.
-        length: largest number of pieces of a text.
+        length: maximum number of pieces of a text.
         width, layers: sizes of the encoder; each head is 32 wide, or as wide as a narrower encoder.
         dropout: share of values dropped.
     """

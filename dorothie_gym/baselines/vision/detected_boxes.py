@@ -1,6 +1,6 @@
 """Objects that a trained detector finds in the pictures of a recorded session, as rows of `ACTOR_DTYPE`.
 
-Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers start again in
+No data of the recorded actors are used: place, heading and size are those of the box in space, numbers restart in
 each picture, and no speed is known, because objects are not tracked from picture to picture.
 """
 
@@ -62,7 +62,7 @@ _ACTORS: Final = {
 class DetectedBoxes:
     """Objects that a trained detector finds, which reads the classes and depths that its SegFormer predicts.
 
-    Detections count from the score on that had the best F1 in the validation pictures. The detections in a session are
+    Detections count above the score that had the best F1 in the validation pictures. The detections in a session are
     stored in a folder next to the weights.
 
     Attributes:
@@ -107,7 +107,7 @@ class DetectedBoxes:
 
     @property
     def threshold(self) -> float:
-        """Least score of a detection."""
+        """Minimum score of a detection."""
         figures = self._about.get("figures")
         found = figures.get("threshold") if isinstance(figures, dict) else None
         if not isinstance(found, float):
@@ -138,7 +138,7 @@ class DetectedBoxes:
         """Returns the detections in pictures at those of the session's records of actors that are examined.
 
         That is the last record before each event, which models read at their points, and every fourth of the others,
-        for the window before a point. Records outside the frames of the car get no objects.
+        for the window before a point. Records outside the frames of the car have no objects.
 
         Raises:
             SessionError: the session has no frames of the car, or no surroundings.
@@ -156,7 +156,7 @@ class DetectedBoxes:
     def queries(self, session: Session, town: Town) -> tuple[NDArray[np.int64], NDArray[np.float16]]:
         """Returns the queries (m, q, d) at the last record before each event, and the frames of these records (m,).
 
-        They are 0 outside the frames of the car. Errors as of `actors`.
+        They are 0 outside the frames of the car. Errors as in `actors`.
         """
         frames = session.scene.actors.frames
         return frames[before_events(frames, _event_frames(session))], self._recall(session, town)[1]
@@ -179,7 +179,7 @@ class DetectedBoxes:
     def _look(
         self, session: Session, town: Town, queried: NDArray[np.int64]
     ) -> tuple[NDArray[np.void], NDArray[np.float16]]:
-        """Returns the detections in a session, and the queries at some of its records, in rising order."""
+        """Returns the detections in a session, and the queries at some of its records, in ascending order."""
         config = self._models[1].config
         camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
         pictures = RecordedPictures(session, town, camera)
@@ -188,7 +188,7 @@ class DetectedBoxes:
         inside = looks[(frames[looks] >= pictures.first_frame) & (frames[looks] <= pictures.last_frame)]
         found, queries = [np.empty(0, _KEPT_DTYPE)], np.zeros((len(queried), *self.query_shape), np.float16)
         threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # equal weights find equal objects, whatever the number of processors
+        torch.set_num_threads(1)  # equal weights find equal objects, regardless of the number of processors
         try:
             for records in np.array_split(inside, max(math.ceil(len(inside) / _AT_ONCE), 1)):
                 if len(records):
@@ -203,7 +203,7 @@ class DetectedBoxes:
     def _found_at(
         self, records: Sequence[int], pictures: RecordedPictures, frames: NDArray[np.int64]
     ) -> tuple[list[Rows], NDArray[np.float16]]:
-        """Returns the detections in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
+        """Returns the detections in the pictures of records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
         reader, detector = self._models
         drawn, views = [], []
         for record in records:
@@ -232,10 +232,10 @@ class DetectedBoxes:
 
 
 def before_events(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the places (n,) of the last records before the tenths of a second of events, rising.
+    """Returns the places (n,) of the last records before the tenths of a second of events, ascending.
 
     Args:
-        records: (k,) frames of the records, rising.
+        records: (k,) frames of the records, ascending.
         events: frames of the session's events.
     """
     last = np.searchsorted(records // FRAMES_PER_TENTH, events // FRAMES_PER_TENTH) - 1
@@ -243,7 +243,7 @@ def before_events(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDAr
 
 
 def looked_at(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the places (n,) of the records that are looked at, rising; arguments as of `before_events`."""
+    """Returns the ascending indices (n,) of the records that are examined; arguments as in `before_events`."""
     return np.union1d(before_events(records, events), np.arange(0, len(records), _SPACING)).astype(np.int64)
 
 
@@ -252,12 +252,12 @@ def _event_frames(session: Session) -> NDArray[np.int64]:
 
 
 def objects_in(boxes: NDArray[np.floating], scores: NDArray[np.floating], threshold: float) -> NDArray[np.int64]:
-    """Returns the queries (n,) that are objects in a picture, the surest first, each object once.
+    """Returns the queries (n,) that are objects in a picture, in order of confidence, each object once.
 
     Args:
-        boxes: (q, 4) middle x and y, width and height.
+        boxes: (q, 4) centre x and y, width and height.
         scores: (q, k) sureness of the kinds.
-        threshold: least score of an object.
+        threshold: minimum score of an object.
     """
     sure = np.flatnonzero(scores.max(axis=1) >= threshold)
     return sure[distinct_queries(boxes[sure], scores[sure])] if len(sure) else sure

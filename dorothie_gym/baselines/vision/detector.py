@@ -23,7 +23,7 @@ from dorothie_gym.baselines.vision.solids import SOLID, solid_loss, solids_from
 from dorothie_gym.ontology.slots import ObjectClass
 
 KINDS: Final = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
-"""Kinds of objects that are detected; the last stands for all props."""
+"""Kinds of objects that are detected; the last one covers all props."""
 
 _CHANNELS: Final = 4  # RGB and depth; the class is looked up
 _PRIOR: Final = 0.01  # sureness at first (Lin et al., 2017)
@@ -43,7 +43,7 @@ class DetectorConfig:
         size: numbers of a query.
         feed_forward: width of the feed-forward layers.
         heads: number of attention heads.
-        levels: resolutions of the backbone that are looked at, from 1/8 on.
+        levels: number of resolutions of the backbone that are used, the first of which is 1/8.
         encoded: channels into which the five are encoded.
         backbone_sizes: channels of the four stages of the backbone.
         backbone_depths: blocks of the stages.
@@ -57,7 +57,7 @@ class DetectorConfig:
         batch_size: pictures of a step.
         epochs: passes over the training pictures.
         zoom: share of a picture's width and height in the smallest part that training enlarges to a whole picture.
-        least_pixels: visible pixels from which on an object has to be found in training.
+        least_pixels: minimum number of visible pixels of an object that training requires to be found.
         solid_loss: weight of the loss of boxes in space.
     """
 
@@ -118,10 +118,10 @@ class DetectorConfig:
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Objects that have to be found in a picture.
+    """Objects that should be detected in a picture.
 
     Attributes:
-        boxes: (n, 4) as of `Detections`.
+        boxes: (n, 4) as in `Detections`.
         kinds: (n,) rows of `KINDS`.
         solids: (n, 8) boxes in space.
         known: (n,) bool, whether the solid is known.
@@ -146,7 +146,7 @@ class Detections:
     """Detections in B pictures.
 
     Attributes:
-        boxes: (B, q, 4) middle x and y, width and height, in widths and heights of the picture.
+        boxes: (B, q, 4) centre x and y, width and height, in widths and heights of the picture.
         scores: (B, q, k) sureness in 0..1.
         solids: (B, q, 8) boxes in space, see `solids`.
         queries: (B, q, d) vectors of the queries after the last layer.

@@ -43,7 +43,7 @@ TESTS: Final = {"seen": "test/seen", "unseen": "test/unseen"}
 """Folds of the figures; those of unseen towns come second."""
 
 TESTED: Final = 300
-"""Largest number of pictures of a fold that are tested, evenly chosen."""
+"""Maximum number of pictures of a fold that are tested, evenly chosen."""
 
 _OBJECT_SPACING, _OBJECT_WAIT, _OBJECT_MOST = 4.0, 4.0, 60  # pictures with objects are rare
 
@@ -84,7 +84,7 @@ class VisionExperiment:
 
     @property
     def reads_predictions(self) -> bool:
-        """Whether a SegFormer has to be trained before."""
+        """Whether a SegFormer must be trained first."""
         return self.model == "detr" and self.inputs == "predicted"
 
     @property
@@ -94,7 +94,7 @@ class VisionExperiment:
 
 
 def check_experiment(job: VisionExperiment) -> None:
-    """Raises `ValueError` if a setting is unknown, or the device is not here; `CheckpointError` as of the run."""
+    """Raises `ValueError` if a setting is unknown, or the device is missing; `CheckpointError` as in the run."""
     config_of(job.model, job.size)
     if job.inputs not in ("predicted", "true"):
         raise ValueError(f"there are no inputs {job.inputs!r}; choose from predicted, true")
@@ -122,7 +122,7 @@ def run_vision_experiment(
         OSError: a folder cannot be written.
     """
     threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # equal seeds give equal weights, whatever the number of processors
+    torch.set_num_threads(1)  # equal seeds give equal weights, regardless of the number of processors
     try:
         return _run(job, workers, on_stage)
     finally:
@@ -227,5 +227,5 @@ def _test(learner: PixelLearner | ObjectLearner, pictures: FrameSet) -> dict[str
 
 
 def _known(figures: Mapping[str, float]) -> dict[str, object]:
-    """Returns figures in JSON types: None where there is none."""
+    """Returns figures in JSON types: None if there is none."""
     return {name: None if math.isnan(value) else round(value, 5) for name, value in figures.items()}

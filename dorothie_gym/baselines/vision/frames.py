@@ -1,6 +1,6 @@
 """Labelled pictures of the recorded sessions of a corpus, drawn once and kept in the user's cache.
 
-An entry of the cache is a folder of memory-mapped `.npy` files for one session. Its name is a hash of everything that
+An entry of the cache is a folder of memory-mapped `.npy` files for one session. Its name is a hash of all that
 determines its content: the session, its town, the sampling, and the source of the renderer. Entries are sealed; damaged
 ones are drawn again. The least recently used entries are removed beyond `MOST_BYTES`.
 """
@@ -60,14 +60,14 @@ CLASSES: Final = 23
 """Number of CARLA's semantic classes, `ObjectClass` without QUERIED."""
 
 SPACE_COLUMNS: Final = ("x", "y", "z", "length", "width", "height", "heading")
-"""Columns of a body's upright box in space: middle to the right, down and along the axis of the camera, size [m], and
+"""Columns of a body's upright box in space: centre to the right, down and along the axis of the camera, size [m], and
 heading relative to the camera's, clockwise from above [rad]."""
 
 BOX_DTYPE: Final = np.dtype(
     [(name, np.int32) for name in ("picture", "kind", "left", "top", "right", "bottom", "pixels")]
     + [(name, np.float32) for name in SPACE_COLUMNS]
 )
-"""Number of the picture in its session, `ObjectClass`, limits behind the last pixel, visible pixels, box in space."""
+"""Number of the picture in its session, `ObjectClass`, limits one past the last pixel, visible pixels, box in space."""
 
 CAMERA_FAULTS: Final = tuple(sensor for sensor in Sensor if CLARITY[sensor] < 1.0)
 """Faults that show in pictures."""
@@ -96,7 +96,7 @@ class FrameSampling:
         height: height of a picture [pixels].
         spacing: distance that the car drives between two pictures [m].
         wait: time after which a car that does not drive gives a further picture [s].
-        most: largest number of pictures of a session, evenly thinned out.
+        most: maximum number of pictures of a session, evenly thinned out.
         pixels: visible pixels that at least one road user or prop in a picture has; 0 for any picture.
 
     Raises:
@@ -124,7 +124,7 @@ class FrameSampling:
         return CameraConfig(width=self.width, height=self.height, outputs=_OUTPUTS)
 
     def candidates(self, session: Session) -> NDArray[np.int64]:
-        """Returns the frames (n,) of a session at places that are apart, rising."""
+        """Returns the frames (n,) of a session at places that are apart, ascending."""
         rows = session.trajectory
         faults = _camera_faults(session)
         chosen: list[int] = []
@@ -153,7 +153,7 @@ class FrameSampling:
 
 
 def _thinned(frames: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """Returns at most so many frames, evenly chosen."""
+    """Returns at most a given number of frames, evenly chosen."""
     count = min(len(frames), most)
     return frames[np.arange(count) * len(frames) // max(count, 1)]
 
@@ -200,7 +200,7 @@ class SessionFrames:
     Attributes:
         name: name of the session.
         town: name of its town.
-        key: hash of everything that determines the pictures.
+        key: hash of all that determines the pictures.
         rgb: (n, h, w, 3) uint8.
         semantic: (n, h, w) uint8 `ObjectClass`.
         depth: (n, h, w) float16 distance along the axis of the camera [m], infinite for the sky.
@@ -260,7 +260,7 @@ class FrameSet:
         return int(self._ends[-1]) if len(self._ends) else 0
 
     def take(self, rows: Sequence[int]) -> Pictures:
-        """Returns some pictures."""
+        """Returns the pictures at the given positions."""
         places = [self._place(row) for row in rows]
         return Pictures(
             np.stack([session.rgb[k] for session, k in places]),
@@ -284,7 +284,7 @@ class FrameSet:
 
     @property
     def key(self) -> str:
-        """Hash of everything that determines the pictures."""
+        """Hash of all that determines the pictures."""
         return hashlib.sha256(" ".join(session.key for session in self.sessions).encode()).hexdigest()
 
 
@@ -296,7 +296,7 @@ def load_frames(
     folder: Path | None = None,
     on_session: OnFrames = lambda done, planned: None,
 ) -> dict[str, FrameSet]:
-    """Returns the labelled pictures of a corpus by fold, drawn now where they are not in the cache.
+    """Returns the labelled pictures of a corpus by fold, drawn now if they are not in the cache.
 
     Args:
         corpus: the corpus.
@@ -364,7 +364,7 @@ def _draw(task: _Task) -> _Drawn:
 def _write(
     target: Path, pictures: RecordedPictures, frames: NDArray[np.int64], sampling: FrameSampling, keys: Path
 ) -> None:
-    """Draws pictures into a new folder, which gets its name, and a seal by the key in `keys`, when it is whole."""
+    """Draws pictures into a new folder, which is renamed and sealed with the key in `keys` when it is complete."""
     size = len(frames), sampling.height, sampling.width
     part = Path(tempfile.mkdtemp(prefix=f"{target.name[:16]}.", suffix=PART, dir=target.parent))
     try:
@@ -424,7 +424,7 @@ def _mapped(path: Path, name: str, town: str) -> SessionFrames:
 
 @functools.cache
 def _builder_digest() -> str:
-    """Returns a digest of everything except the session that determines its pictures."""
+    """Returns a digest of all that determines the pictures of a session except the session itself."""
     scenes = builder_digest()
     if scenes is None:
         raise SessionError("the sources of the camera cannot be read; no pictures can be kept for the training")

@@ -1,6 +1,6 @@
 """Metrics of the vision models: intersection over union, errors of depth, and COCO's average precision.
 
-Classes present are those with at least one true pixel in the pictures that are tested; the means over classes are over
+Classes present are those with at least one true pixel in the tested pictures; the means over classes are over
 these. Objects are tested class by class as in COCO: a detection is correct if its box overlaps one of the picture's
 true boxes of its class by at least a share of their union, and no detection with a higher score has matched this box.
 Precision is read at 101 values of recall. True boxes with few visible pixels are ignored: they need not be found, and
@@ -34,7 +34,7 @@ OVERLAPS: Final = tuple(round(0.5 + 0.05 * k, 2) for k in range(10))
 """COCO's thresholds of overlap."""
 
 PLACE_RADIUS: Final = 2.0
-"""Largest distance of the middles of a true and a detected box in space that belong together [m]."""
+"""Largest distance of the centres of a true and a detected box in space that belong together [m]."""
 
 _RECALLS: Final = np.linspace(0.0, 1.0, 101)
 
@@ -72,7 +72,7 @@ class PixelScores:
         }
 
     def figures(self) -> dict[str, float]:
-        """Returns mIoU, mAcc (mean recall of the classes present), aAcc (share of right pixels) and depth error."""
+        """Returns mIoU, mAcc (mean recall of the classes present), aAcc (share of correct pixels) and depth error."""
         right, true = np.diag(self.confusion), self.confusion.sum(1)
         present = true > 0
         if not present.any():
@@ -129,7 +129,7 @@ class PictureBoxes:
 
 
 Closeness: TypeAlias = Callable[[PictureBoxes], Array]
-"""Returns how close each detected box is to each true one (m, n)."""
+"""Returns the closeness of each detected box to each true one (m, n)."""
 
 
 def _overlap(picture: PictureBoxes) -> Array:
@@ -137,7 +137,7 @@ def _overlap(picture: PictureBoxes) -> Array:
 
 
 def _nearness(picture: PictureBoxes) -> Array:
-    """Returns the negative distances of the middles, height aside (m, n) [m]."""
+    """Returns the negative distances of the centres, height aside (m, n) [m]."""
     x, _, z = (picture.detected_spaces[:, None, :3] - picture.spaces[None, :, :3]).transpose(2, 0, 1)
     return np.asarray(-np.hypot(x, z))
 
@@ -165,7 +165,7 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
         turned: kinds whose headings are compared.
 
     Returns:
-        place_error: distance of the middles, height aside [m].
+        place_error: distance of the centres, height aside [m].
         range_error: |detected - true| / true depth.
         size_error: 1 minus the intersection over union of the boxes with aligned centre and heading.
         heading_error: [degrees].
@@ -189,7 +189,7 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
 
 
 def best_threshold(pictures: Sequence[PictureBoxes]) -> tuple[float, float]:
-    """Returns the least score of detections with the highest F1 at an overlap of one half, and the F1; or (1, 0).
+    """Returns the score threshold with the highest F1 at an overlap of one half, and that F1; or (1, 0).
 
     Precision and recall are over the boxes of all classes.
     """
@@ -213,12 +213,12 @@ def best_threshold(pictures: Sequence[PictureBoxes]) -> tuple[float, float]:
 
 
 def _kinds_of(pictures: Sequence[PictureBoxes]) -> list[int]:
-    """Returns the classes that have a true box, rising."""
+    """Returns the classes that have a true box, ascending."""
     return sorted({int(kind) for picture in pictures for kind in picture.kinds[~picture.ignored]})
 
 
 def _of_kind(pictures: Sequence[PictureBoxes], kind: int, least: Sequence[float], closeness: Closeness) -> Array:
-    """Returns the average precision (k,) of a class at each least closeness."""
+    """Returns the average precision (k,) of a class at each closeness threshold."""
     scores, right, counted, wanted = [], [], [], 0
     for picture in (each.of_kind(kind) for each in pictures):
         wanted += int((~picture.ignored).sum())
@@ -232,7 +232,7 @@ def _of_kind(pictures: Sequence[PictureBoxes], kind: int, least: Sequence[float]
 
 
 def _matched(shares: Array, ignored: NDArray[np.bool_], least: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns whether each detection (k, m), the surest first, is right at each closeness, and whether it counts."""
+    """Returns whether each detection (k, m), in order of confidence, is correct at each closeness, and counts."""
     partners = np.array([_partners(shares, ignored, each) for each in least.tolist()]).reshape(len(least), len(shares))
     return partners >= 0, partners > _OF_IGNORED
 
@@ -242,7 +242,7 @@ _OF_IGNORED: Final = -2
 
 
 def _partners(shares: Array, ignored: NDArray[np.bool_], least: float) -> NDArray[np.int64]:
-    """Returns the true box of each detection (m,), the surest first; or `_NOBODY`, or `_OF_IGNORED`."""
+    """Returns the true box of each detection (m,), in order of confidence; or `_NOBODY`, or `_OF_IGNORED`."""
     partners = np.full(len(shares), _NOBODY, dtype=np.int64)
     free = np.ones(len(ignored), dtype=np.bool_)
     for number in np.flatnonzero((shares >= least).any(axis=1)).tolist():

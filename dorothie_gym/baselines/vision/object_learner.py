@@ -32,10 +32,10 @@ OVERLAP: Final = 0.5
 """Overlap above which boxes in a picture count as one object."""
 
 TURNED: Final = (0, 1)
-"""Rows of `KINDS` whose headings mean something: props look alike from several sides."""
+"""Rows of `KINDS` with meaningful headings: props look alike from several sides."""
 
 VALIDATED: Final = 150
-"""Largest number of validation pictures after an epoch, evenly chosen."""
+"""Maximum number of validation pictures after an epoch, evenly chosen."""
 
 _TESTED: Final = 8  # pictures at once
 _LEAST_SHARE: Final = 0.4  # of an object's box that an enlarged part of a picture must hold
@@ -69,7 +69,7 @@ class ObjectLearner(Learner):
         return [(others, 1.0), (backbone, self.config.backbone_rate)]
 
     def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
-        """Returns the mean loss of some training pictures, half of them mirrored, enlarged parts of the whole."""
+        """Returns the mean loss of the given training pictures, half of them mirrored, as enlarged crops."""
         pictures = self._training.take(rows)
         rgb, depth, semantic = inputs(pictures, self.device)
         images, wanted = [], []
@@ -86,7 +86,7 @@ class ObjectLearner(Learner):
         return self.model.loss(colours, depths, classes, wanted)
 
     def validate(self) -> Mapping[str, float]:
-        """Returns figures of the validation pictures, and the best least score of detections; the score is AP50."""
+        """Returns figures of the validation pictures, and the best score threshold of detections; the score is AP50."""
         found = detected_boxes(self.model, self._validation, most=VALIDATED)
         figures = object_figures(found)
         threshold, f1 = best_threshold(found)
@@ -170,7 +170,7 @@ def _mirrored(true: Targets) -> Targets:
 
 
 def detected_boxes(model: Detector, pictures: FrameSet, *, most: int | None = None) -> list[PictureBoxes]:
-    """Returns the true and the detected boxes of pictures, or of at most so many, evenly chosen."""
+    """Returns the true and the detected boxes of pictures, or of at most a given number, evenly chosen."""
     model.eval()
     where = next(model.parameters()).device
     count = min(len(pictures), most or len(pictures))
@@ -192,14 +192,14 @@ def distinct_queries(centred: NDArray[np.floating], scores: NDArray[np.floating]
     """Returns the queries (n,) that overlap no query with a higher score by more than `OVERLAP`, best first.
 
     Args:
-        centred: (q, 4) boxes: middle x and y, width and height.
+        centred: (q, 4) boxes: centre x and y, width and height.
         scores: (q, k) sureness of the kinds.
     """
     return distinct(corners_of(centred).astype(np.float64), scores.max(axis=1).astype(np.float64), OVERLAP)
 
 
 def corners_of(centred: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Returns left, top, right and bottom (n, 4) of boxes (n, 4) with middle x and y, width and height."""
+    """Returns left, top, right and bottom (n, 4) of boxes (n, 4) with centre x and y, width and height."""
     half = centred[:, 2:] / 2
     return np.concatenate((centred[:, :2] - half, centred[:, :2] + half), axis=1)
 

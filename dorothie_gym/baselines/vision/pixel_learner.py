@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.vision.frames import FrameSet, Pictures
 
 VALIDATED: Final = 120
-"""Largest number of validation pictures after an epoch, evenly chosen."""
+"""Maximum number of validation pictures after an epoch, evenly chosen."""
 
 _JITTER: Final = 0.2  # largest change of brightness and contrast
 _TESTED: Final = 8  # pictures at once
@@ -44,7 +44,7 @@ class PixelLearner(Learner):
         return len(self._training)
 
     def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
-        """Returns the mean loss of some training pictures, half of them mirrored."""
+        """Returns the mean loss of the given training pictures, half of them mirrored."""
         rgb, semantic, depth = labelled(self._training.take(rows), self.device)
         if epoch < self.config.coarse_epochs:
             rgb, semantic, depth = F.avg_pool2d(rgb, 2), semantic[:, ::2, ::2], depth[:, ::2, ::2]
@@ -84,7 +84,7 @@ def predict_pixels(model: SegFormer, rgb: NDArray[np.uint8]) -> tuple[NDArray[np
 
 
 def pixel_scores(model: SegFormer, pictures: FrameSet, *, most: int | None = None) -> PixelScores:
-    """Returns the confusion and the errors of a model on pictures, or on at most so many, evenly chosen."""
+    """Returns the confusion and the errors of a model on pictures, or on at most a given number, evenly chosen."""
     model.eval()
     count = min(len(pictures), most or len(pictures))
     rows = (np.arange(count) * len(pictures) // max(count, 1)).tolist()

@@ -176,7 +176,7 @@ class SegFormer(nn.Module):
         return mixed
 
     def classes(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:
-        """Returns the likeliest class of each pixel (B, h, w)."""
+        """Returns the most likely class of each pixel (B, h, w)."""
         return enlarged(outputs.classes, size).max(1).indices  # equal to argmax, but faster on a CPU
 
     def depth(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:
@@ -186,7 +186,7 @@ class SegFormer(nn.Module):
         return enlarged(F.pixel_shuffle(logarithm, self.config.depth_detail), size)[:, 0].exp()
 
     def _median_bins(self, features: Tensor) -> Tensor:
-        """Returns the medians of the bins (B, places of a cell, h / 4, w / 4), in bins from the nearest depth on."""
+        """Returns the medians of the bins (B, places of a cell, h / 4, w / 4), in bins counted from the nearest."""
         config = self.config
         scores = self.depth_head(features.contiguous()).float()
         batch, _, height, width = scores.shape

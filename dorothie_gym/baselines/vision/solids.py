@@ -1,9 +1,9 @@
 """Boxes in space from pictures, in the usual numbers of monocular detection.
 
 A picture shows the position of a box's centre, its distance, its size, and its rotation relative to the viewer
-(Mousavian et al., CVPR 2017; Simonelli et al., ICCV 2019). Solids have these as columns: the projected middle x and y,
+(Mousavian et al., CVPR 2017; Simonelli et al., ICCV 2019). Solids have these as columns: the projected centre x and y,
 in widths and heights of the picture, logarithms of depth, length, width and height [m], and sine and cosine of the
-heading relative to the ray through the middle. They change simply with the picture: mirroring turns the sign of the
+heading relative to the ray through the centre. They change simply with the picture: mirroring turns the sign of the
 sine, and an enlarged part looks like the same scene nearer by, its depths multiplied by the part's share of the
 picture.
 """
@@ -27,9 +27,9 @@ SOLID: Final = 8
 """Number of columns of a solid."""
 
 NEAREST_MIDDLE: Final = 1.0
-"""Smallest depth of a box's middle that is projected [m]."""
+"""Smallest depth of a box's centre that is projected [m]."""
 
-_LEAST_SIDE: Final = 0.02  # of a box in the picture, by which its middle's offset is measured
+_LEAST_SIDE: Final = 0.02  # of a box in the picture, by which its centre's offset is measured
 
 
 class Focals(NamedTuple):
@@ -46,9 +46,9 @@ class Focals(NamedTuple):
 
 
 def solids_of(boxes: NDArray[np.void], focals: Focals) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Returns the solids (n, 8) of boxes (n,) of `BOX_DTYPE`, and whether their middles can be projected (n,).
+    """Returns the solids (n, 8) of boxes (n,) of `BOX_DTYPE`, and whether their centres can be projected (n,).
 
-    The first are meaningless where the second are False: where the middle is beside or behind the camera.
+    The first are meaningless where the second are False: where the centre is beside or behind the camera.
     """
     x, y, z, length, width, height, heading = (boxes[name].astype(np.float64) for name in SPACE_COLUMNS)
     known, depth = z >= NEAREST_MIDDLE, np.maximum(z, NEAREST_MIDDLE)
@@ -79,8 +79,8 @@ def solids_from(boxes: Tensor, raw: Tensor) -> Tensor:
     """Returns the solids (..., 8) that a head predicts in addition to boxes in the picture.
 
     Args:
-        boxes: (..., 4) middle, width and height, in shares of the picture.
-        raw: (..., 8) outputs of the head: as solids, but the projected middle is relative to that of the box, in its
+        boxes: (..., 4) centre, width and height, in shares of the picture.
+        raw: (..., 8) outputs of the head: as solids, but the projected centre is relative to that of the box, in its
             widths and heights.
     """
     middles = boxes[..., :2] + raw[..., :2] * boxes[..., 2:].clamp(min=_LEAST_SIDE)
@@ -93,7 +93,7 @@ def solid_loss(found: Tensor, true: Tensor, boxes: Tensor) -> Tensor:
     Args:
         found: (n, 8) predicted.
         true: (n, 8).
-        boxes: (n, 4) true boxes in the picture, whose widths and heights are the units of the middle's error.
+        boxes: (n, 4) true boxes in the picture, whose widths and heights are the units of the centre's error.
     """
     errors = (found - true).abs()
     units = boxes[:, 2:].clamp(min=_LEAST_SIDE)

@@ -56,7 +56,7 @@ class Learner(ABC):
 
     @abstractmethod
     def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
-        """Returns the mean loss of some training pictures in an epoch, counted from 0."""
+        """Returns the mean loss of the given training pictures in an epoch, counted from 0."""
 
     @abstractmethod
     def validate(self) -> Mapping[str, float]:

@@ -1,6 +1,6 @@
 """Trigger of the scripted Ad-Wizard in a session in which an agent drives.
 
-Compiled code looks at every decision whether a planned trick finds its moment, by the functions and random numbers of
+Compiled code checks at every decision whether a planned trick can be played, by the functions and random numbers of
 the policy. Only then does the policy observe and act.
 """
 
@@ -58,8 +58,8 @@ _place_ahead, _suits_roadblock = compiled(place_ahead), compiled(suits_roadblock
 class PlansRecord:
     """Plans of the scripted Ad-Wizard in an environment."""
 
-    times: Annotated[NDArray[np.float64], "f8", (MOST_TRICKS,)]  # of the tricks to come, infinite for none [s]
-    due: Float  # earliest time of anything [s], infinite for never
+    times: Annotated[NDArray[np.float64], "f8", (MOST_TRICKS,)]  # of the tricks to come, infinite if there is none [s]
+    due: Float  # earliest time of any action [s], infinite for never
     restores: Float  # earliest time at which a change is undone [s]
     last: Float  # time of the last trick [s]
     state_high: UInt64  # `RandomStream`
@@ -73,8 +73,8 @@ class PlansRecord:
     kinds: Annotated[NDArray[np.int32], "i4", (MOST_TRICKS,)]  # of these tricks, as in `KINDS`
     roadblocks: Int32  # number of those placed
     changes: Flag  # whether a change of the task is possible
-    always: Flag  # whether the policy is to be asked at every decision, as with a storyboard of a user's own
-    acts: Flag  # whether it is to be asked at the next decision
+    always: Flag  # whether the policy is called at every decision, as with a storyboard of a user's own
+    acts: Flag  # whether it is called at the next decision
 
 
 # --- Moments (compiled) -----------------------------------------------------------------------------------------------
@@ -136,7 +136,7 @@ def note_path(world: WorldArrays, path: NDArray[np.int64]) -> None:
 
 @compiled
 def is_open(lanes: RecordArray[RoutingLane], marks: RecordArray[MarkRecord], lane: int, station: float) -> bool:
-    """Returns whether a roadblock suits a place."""
+    """Returns whether a place is suitable for a roadblock."""
     length = lanes[lane].length
     return not lanes[lane].junction and _suits_roadblock(marks, lane, station, length, _MARGINS, _CLEARANCE)
 
@@ -145,7 +145,7 @@ def is_open(lanes: RecordArray[RoutingLane], marks: RecordArray[MarkRecord], lan
 
 
 class AdWizardTrigger:
-    """Scripted Ad-Wizard of a session; it is asked for an action only when it may act."""
+    """Scripted Ad-Wizard of a session; it is called for an action only when it may act."""
 
     def __init__(self, town: Town, limits: SpaceLimits, scenario: Scenario, rate: float) -> None:
         """Draws its plans.

@@ -20,21 +20,21 @@ class Stage(enum.IntEnum):
     """Next part of a decision."""
 
     DONE = 0
-    """None: the decision is over."""
+    """None: the decision is complete."""
     ACTING = 1
-    """The action is to be carried out."""
+    """The action must be carried out."""
     MOVING = 2
-    """Sensor faults may have ended: Python is to look, before the rest of the physics is stepped."""
+    """Sensor faults may have ended: Python must check before the rest of the physics is stepped."""
     NO_SPACE = 3
     """The arrays have no room for the path; with longer ones, see `world_arrays.lengthened`, `act` continues."""
     GUIDING = 4
-    """The instructor is to speak."""
+    """The instructor must speak."""
     NO_COSTS = 5
-    """Python is to add the costs to the goal, because a roadblock has been seen; then the episode is to be judged."""
+    """Python must add the costs to the goal, because a roadblock has been seen; then the episode must be judged."""
     LOST = 6
-    """The ego has left its path: a new one is to be laid by `act`."""
+    """The ego has left its path: `act` must lay a new one."""
     OBSERVING = 7
-    """Only the observation is to be written."""
+    """Only the observation must be written."""
 
 
 class Event(enum.IntFlag):
@@ -58,8 +58,8 @@ class DriveRecord:
     """Decision of an environment."""
 
     controls: Annotated[NDArray[np.float64], "f8", (3,)]  # throttle, steer (positive right), brake
-    speed: Float  # of the ego at its beginning [m/s]
-    since: Float  # time of its beginning [s]
+    speed: Float  # of the ego at its start [m/s]
+    since: Float  # time of its start [s]
     goal_station: Float  # goal that progress is measured to [m]
     goal_lane: Int32  # -1 for none
     costs: Int32  # row of the costs to it
@@ -72,11 +72,11 @@ class DriveRecord:
     refusal: Int32  # `codes.Refusal` or `CRUISE_LIMIT`
     refused: Int32  # belief updates that were refused before
     left: Int32  # substeps that are still to be made
-    told_lane: Int32  # place of a goal that is not on the map, as far ahead as was said; -1 for none
+    told_lane: Int32  # place of a goal that is not on the map, at the stated distance ahead; -1 for none
     told_station: Int32  # [m]
-    halfway: Flag  # whether the action is carried out, and only the physics is to be stepped
-    lost: Flag  # whether a new path is to be laid
-    begins: Flag  # whether the episode begins: there is nothing to judge
+    halfway: Flag  # whether the action is carried out, so that only the physics must be stepped
+    lost: Flag  # whether a new path must be laid
+    begins: Flag  # whether the episode begins, so that there is nothing to judge
     faulty: Flag  # whether sensors are faulty, and may work again during the decision
     near: Flag  # whether the ego stands near a waypoint
     said: Flag  # whether an instruction was given at this decision

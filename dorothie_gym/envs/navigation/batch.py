@@ -55,9 +55,9 @@ class DrivingBatch(DrivingRows):
 
     @property
     def observations(self) -> DriverObservation:
-        """Observations at the present decision: vectors (environments, n) or pictures (environments, h, w, 3).
+        """Observations at the current decision: vectors (environments, n) or pictures (environments, h, w, 3).
 
-        They are to be copied. Those of a restored batch are up to date after its next decision.
+        Callers must copy them. Those of a restored batch are up to date after its next decision.
         """
         return self.vectors if self._cameras is None else self._cameras.pictures
 
@@ -67,7 +67,7 @@ class DrivingBatch(DrivingRows):
         return super().nbytes + (0 if self._cameras is None else self._cameras.nbytes)
 
     def _draw(self, numbers: Sequence[int]) -> None:
-        """Draws the pictures of some environments, if they observe any."""
+        """Draws the pictures of the given environments, if they observe any."""
         if self._cameras is not None:
             self._cameras.draw(self, numbers, self._pool)
 
@@ -114,7 +114,7 @@ class DrivingBatch(DrivingRows):
     # --- A decision ---------------------------------------------------------------------------------------------------
 
     def play(self, actions: NDArray[np.generic] | int, playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in some environments.
+        """Steps the given environments by one decision.
 
         Args:
             actions: `NavigationAction` of each environment (n,), or throttle, steering and brake of each (n, 3).
@@ -205,7 +205,7 @@ class DrivingBatch(DrivingRows):
             self._faulty.discard(number)
 
     def _interfere(self, playing: NDArray[np.bool_]) -> None:
-        """Lets the Ad-Wizards act whose plans find a moment."""
+        """Executes the Ad-Wizards that can now play a planned trick."""
         if self._config.exceptions <= 0.0:
             return
         for number in np.flatnonzero(playing & self._plans["acts"]).tolist():
@@ -224,7 +224,7 @@ class DrivingBatch(DrivingRows):
             self._note_task(number, live.task)
 
     def _foresee(self) -> None:
-        """Lets the Ad-Wizards that act next observe the paths that are to be replaced."""
+        """Shows the paths that are about to be replaced to the Ad-Wizards that act next."""
         for number in np.flatnonzero(self._plans["acts"] & (self._decisions["stage"] == Stage.LOST)).tolist():
             self.face(number).seen = seen = LazyObservations(self.catch_up(number))
             seen[Role.AD_WIZARD]  # builds them

@@ -61,7 +61,7 @@ class DrivingCameras:
         return self.pictures.nbytes + sum(known[1].camera.nbytes for known in self._cameras if known is not None)
 
     def draw(self, batch: DrivingRows, numbers: Sequence[int], pool: ThreadPool) -> None:
-        """Draws the pictures of some environments on the threads of a pool."""
+        """Draws the pictures of the given environments on the threads of a pool."""
         jobs = [(number, self._camera(batch, number)) for number in numbers]
         if not self._compiled and jobs:  # here: threads would compile one after another
             self._draw(batch, *jobs.pop())

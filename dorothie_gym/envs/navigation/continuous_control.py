@@ -50,13 +50,13 @@ OBSERVED_OBJECTS: Final = 4
 """Number of objects in the vector, the nearest first."""
 
 LOST: Final = 4.0
-"""Distance from the path beyond which a new path from the present lane is planned [m]."""
+"""Distance from the path beyond which a new path from the current lane is planned [m]."""
 
 END: Final = 2.0
 """Distance to the end of the path within which a new one is planned [m]."""
 
 PREPARED_UNTIL: Final = 5.0
-"""Distance behind its planned place beyond which a manoeuvre is no longer prepared [m]."""
+"""Distance past its planned place beyond which a manoeuvre is no longer prepared [m]."""
 
 _WET = tuple(WeatherParameter).index(WeatherParameter.WETNESS)
 _KINDS = tuple(int(kind.value) for kind in KINDS)
@@ -111,7 +111,7 @@ def instructed_manoeuvre(
 ) -> tuple[int, int]:
     """Returns the manoeuvre of the last instruction: number of a `PhysicalAction`, or 0, and its angle [degrees].
 
-    0 stands for an instruction without a manoeuvre, or one whose manoeuvre is part of the path already, or cannot be.
+    0 for an instruction without a manoeuvre, or whose manoeuvre is already part of the path or infeasible.
     """
     heard, plan = driver.heard[0], world.plan[0]
     order = 0
@@ -139,7 +139,7 @@ def instructed_manoeuvre(
 
 @compiled
 def has_lost_path(world: WorldArrays) -> bool:
-    """Returns whether the ego has left its path, or come to the end of a path that could continue."""
+    """Returns whether the ego has left its path, or reached the end of a path that could continue."""
     plan, car = world.plan[0], world.car[0]
     return bool(abs(car.offset) > LOST or (plan.length - car.s < END and not plan.open_end))
 

@@ -20,7 +20,7 @@ WIDTH, HEIGHT = 84, 12
 """Size of the drawing [pixels]."""
 
 SHARE: Final = 7
-"""The dashboard takes one row in so many of a picture."""
+"""The dashboard takes one out of this many rows of a picture."""
 
 FAR, NEAR, GOAL = 112.0, 28.0, 560.0
 """Lengths of the gauges of distance: to an instruction's place, in two units, and to a goal [m]."""
@@ -30,13 +30,13 @@ FASTEST: Final = 28.0
 
 PANEL = (24, 24, 28)
 AHEAD, PASSED = (255, 210, 0), (255, 40, 40)
-"""Colours of a distance that is left, and of one behind the place."""
+"""Colours of a remaining distance, and of a distance past the place."""
 
 PLANNED, GOAL_COLOUR = (60, 220, 60), (255, 80, 255)
 """Colours of the manoeuvre that the car prepares, and of the goal."""
 
 SPEED, WANTED, LIMIT = (255, 255, 255), (0, 200, 255), (255, 40, 40)
-"""Colours of the speed, of the speed that is asked for, and of the marks at the limit."""
+"""Colours of the speed, of the requested speed, and of the marks at the limit."""
 
 HAZARD, LIGHTS, STEERING = (255, 40, 40), (60, 120, 255), (255, 140, 0)
 """Colours of the lamps and of the gauge of the steering wheel."""
@@ -53,15 +53,15 @@ class Readings:
     Attributes:
         action: action of the last instruction; None before the first, and where a goal was named instead.
         sector: its direction, an index of `SECTORS`; None without one.
-        distance: from the car to its place, negative behind it [m].
-        planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None for none.
+        distance: from the car to its place, negative past it [m].
+        planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None if there is none.
         planned_sector: its direction.
         goal: place of the named goal ahead of the car and to its right [m]; None if it is not known.
         speed: speed of the car [m/s].
         wanted: target speed: the cruise speed, or the speed that the path allows [m/s].
-        limit: speed limit [m/s]; None where it is not known.
+        limit: speed limit [m/s]; None if unknown.
         hazard: whether the car brakes for a hazard.
-        lights: whether the head lights are on.
+        lights: whether the headlights are on.
         steering: share of the greatest steering angle, positive right; None where the car steers itself.
     """
 
@@ -80,7 +80,7 @@ class Readings:
 
 
 def rows_of_dashboard(height: int) -> int:
-    """Returns how many rows of a picture of a height the dashboard takes."""
+    """Returns the number of rows of the dashboard in a picture with a height."""
     return max(1, round(height / SHARE))
 
 
@@ -299,7 +299,7 @@ def _draw_icon(
 
 
 def _draw_needle(panel: NDArray[np.uint8], ahead: float, right: float) -> None:
-    """Draws a needle from the middle of the first icon towards the goal: up is ahead."""
+    """Draws a needle from the centre of the first icon towards the goal: up is ahead."""
     square, middle, reach = panel[HEIGHT - _SIZE :, _ICON : _ICON + _SIZE], _SIZE // 2, pm.hypot(ahead, right)
     square[middle, middle] = SPEED
     if reach > 0.0:

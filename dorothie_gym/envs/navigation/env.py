@@ -108,7 +108,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         return self.batch.observations[0].copy(), self._info()
 
     def _play(self, action: NDArray[np.generic] | int) -> tuple[DriverObservation, float, bool, bool, StepInfo]:
-        """Plays a decision, see `step`."""
+        """Steps the environment by one decision, see `step`."""
         if self._ending:
             raise gym.error.ResetNeeded("the session is over: call reset() first")
         batch = self.batch

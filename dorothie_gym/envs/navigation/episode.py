@@ -1,4 +1,4 @@
-"""End of an episode of the navigation environments, and what is rewarded (compiled)."""
+"""End and rewards of an episode of the navigation environments (compiled)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LEFT_ROAD_DISTANCE = 15.0
 """Distance from the path beyond which the ego counts as having left the road [m]."""
 
 EARLY = 1e-9
-"""Time by which rounding may let a limit seem not yet reached [s]."""
+"""Tolerance for rounding in time limits [s]."""
 
 
 class Ending(enum.IntEnum):
@@ -62,10 +62,10 @@ class EpisodeRecord:
     reached: Int32  # number of live subgoals reached
     refusals: Int32  # actions that were refused at this decision
     acted: Flag  # whether a physical action was chosen
-    renewed: Flag  # whether the goal or the roadblocks on the way have changed
+    renewed: Flag  # whether the goal or the roadblocks on the route have changed
     done: Flag  # whether the destination was reached, and whether all live subgoals were
     succeeded: Flag
-    nearest: Float  # least cost to go so far, and the time at which it was reached [s]
+    nearest: Float  # minimum cost to go so far, and the time at which it was reached [s]
     nearest_at: Float
     counted: Int32  # subgoals, collisions of the ego's own fault, and infractions that were rewarded so far
     collisions: Int64
@@ -108,7 +108,7 @@ _write_terms = compiled(write_navigation_terms)
 
 @compiled
 def judge(world: WorldArrays, episode: EpisodeArrays) -> None:
-    """Ends an episode where it is over, and writes the reward of the last decision and its terms.
+    """Ends an episode if its conditions are met, and writes the reward of the last decision and its terms.
 
     Args:
         world: arrays of the world after the decision.

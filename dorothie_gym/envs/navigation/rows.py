@@ -110,7 +110,7 @@ class DrivingRows(CachedViews):
 
     Attributes:
         town: the map.
-        faces: present session of each environment; None before its first.
+        faces: current session of each environment; None before its first.
         frames: substeps of a decision.
         pedals: whether the agents use throttle, steering and brake.
         threads: number of threads, the caller's included.
@@ -237,12 +237,12 @@ class DrivingRows(CachedViews):
 
     @property
     def vectors(self) -> Vector:
-        """Vectors at the present decision (environments, n), to be copied."""
+        """Vectors at the current decision (environments, n); callers must copy them."""
         return self._drivers.vector
 
     @property
     def masks(self) -> NDArray[np.int8]:
-        """Feasible actions at the present decision (environments, 18), to be copied."""
+        """Feasible actions at the current decision (environments, 18); callers must copy them."""
         return self._drivers.mask
 
     @cached_property
@@ -252,7 +252,7 @@ class DrivingRows(CachedViews):
 
     @cached_property
     def infractions(self) -> NDArray[np.int64]:
-        """Numbers of infractions so far (environments, 5), in the order of `INFRACTION_KINDS`, to be copied."""
+        """Numbers of infractions so far (environments, 5), ordered as `INFRACTION_KINDS`; callers must copy them."""
         counts: NDArray[np.int64] = plain(self.worlds.watch)[:, 0]["counts"]
         return counts
 
@@ -287,7 +287,7 @@ class DrivingRows(CachedViews):
 
     @property
     def any_refused(self) -> NDArray[np.bool_]:
-        """Environments at whose last decision something was refused (environments,)."""
+        """Environments whose last decision had a refusal (environments,)."""
         refused: NDArray[np.bool_] = (self._decisions["refusal"] > 0) | (self._decisions["refused"] > 0)
         return refused
 
@@ -316,7 +316,7 @@ class DrivingRows(CachedViews):
         return (int(state["goal_lane"]), float(state["goal_station"])) if state["goal_lane"] >= 0 else None
 
     def blocked(self, number: int) -> tuple[Place, ...]:
-        """Returns the places behind the roadblocks that the instructor of an environment has seen."""
+        """Returns the places beyond the roadblocks that the instructor of an environment has seen."""
         guidance = row_of(self._guidances, number)
         closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
         return tuple((lane, station) for station, lane in closed.tolist())

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NEAR_WAYPOINT: Final = ARRIVAL_DISTANCE + 1e-6
-"""Distance within which Python looks whether the ego has arrived [m]."""
+"""Distance within which Python checks whether the ego has arrived [m]."""
 
 _FASTER = int(NavigationAction.FASTER)
 _INSTRUCT = int(DialogueMove.INSTRUCT.value)
@@ -81,7 +81,7 @@ def act(
     frames: int,
     pedals: bool,
 ) -> None:
-    """Carries out the action of a decision and steps the physics, or lays a new path, as far as Python is not needed.
+    """Carries out the action of a decision and steps the physics, or lays a new path, until Python is needed.
 
     Args:
         town: arrays of the town.
@@ -255,7 +255,7 @@ def finish(
 
 @compiled
 def _cost_to_go(graph: RoutingGraph, common: DrivingTown, state: DriveRecord, lane: int, station: float) -> float:
-    """Returns the cost from a place to the present goal [m], infinite without one."""
+    """Returns the cost from a place to the current goal [m], infinite without a goal."""
     if state.goal_lane < 0:
         return math.inf
     return cost_from(graph.lanes, common.costs[state.costs], int(state.goal_lane), state.goal_station, lane, station)
@@ -269,7 +269,7 @@ def act_share(
     turns: NDArray[np.int64], home: int, town: TownArrays, exits: ExitArrays, worlds: WorldArrays,
     drivers: DriverArrays, drives: DriveArrays, frames: int, pedals: bool,
 ) -> None:  # fmt: skip
-    """Calls `act` for the environments whose stage is `ACTING`, `MOVING`, `NO_SPACE` or `LOST`, until all are taken.
+    """Calls `act` for the environments whose stage is `ACTING`, `MOVING`, `NO_SPACE` or `LOST`, until none is left.
 
     Args:
         turns: numbers of the environments, see `threads.take`; events are noted in the column `EVENTS`.
@@ -300,7 +300,7 @@ def guide_share(
     graph: RoutingGraph, searches: RouteSearch, common: DrivingTown, worlds: WorldArrays, drivers: DriverArrays,
     guidances: InstructorArrays, episodes: EpisodeArrays, drives: DriveArrays,
 ) -> None:  # fmt: skip
-    """Guides, judges and observes as the stage of each environment says, until all are taken.
+    """Guides, judges and observes according to the stage of each environment, until none is left.
 
     Args:
         turns: numbers of the environments, see `threads.take`; events are noted in the column `EVENTS`.

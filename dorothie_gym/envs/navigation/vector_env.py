@@ -44,7 +44,7 @@ class DrivingVectorEnv(
     """Base class of the vectorised navigation environments.
 
     Each environment has episodes of its own: they depend on its seed and actions, and neither on the other
-    environments, nor on its place among them, nor on the number of threads.
+    environments, nor on its index, nor on the number of threads.
     """
 
     MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = (
@@ -123,7 +123,7 @@ class DrivingVectorEnv(
     def step(
         self, actions: NDArray[np.generic]
     ) -> tuple[DriverObservation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
-        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
+        """Steps every environment by one decision; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: (num_envs, ...) one for each.
@@ -133,7 +133,7 @@ class DrivingVectorEnv(
 
         Raises:
             ValueError: the actions are not in the action space.
-            gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
+            gymnasium.error.ResetNeeded: an environment was never reset, or has ended and is not reset automatically.
         """
         actions = self._checked(actions)
         over = self._terminations | self._truncations
@@ -181,11 +181,11 @@ class DrivingVectorEnv(
         """Returns actions as an array; raises `ValueError` if they are not in the action space."""
 
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in the environments of a mask, and records its outcome."""
+        """Steps the environments of a mask by one decision, and records the outcome."""
         for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])
-                self._note(batch, members)  # the others begin anew in the same step
+                self._note(batch, members)  # the others are reset in the same step
                 for number in members[playing[members]].tolist() if self._views else ():
                     self._views[number].note(*self._places[number])
 
@@ -200,7 +200,7 @@ class DrivingVectorEnv(
                     self._views[number].note(*self._places[number])
 
     def _note(self, batch: DrivingBatch, members: NDArray[np.int64], rows: slice | list[int] = slice(None)) -> None:
-        """Copies the outcomes of some rows of a batch, by default of all."""
+        """Copies the outcomes of the given rows of a batch, by default of all."""
         outcomes, changed = batch.outcomes[rows], members[rows]
         numbers = slice(None) if len(changed) == self.num_envs else changed
         self._observations[numbers] = batch.observations[rows]
@@ -246,7 +246,7 @@ class DrivingVectorEnv(
         return found
 
     def _begin_at_once(self, over: NDArray[np.bool_]) -> Infos:
-        """Resets environments that are over; returns the infos of the mode `SAME_STEP`."""
+        """Resets environments whose episode has ended; returns the infos of the mode `SAME_STEP`."""
         final = np.full(self.num_envs, None, dtype=object)
         ended, numbers = self._infos(over), np.flatnonzero(over).tolist()
         for number in numbers:

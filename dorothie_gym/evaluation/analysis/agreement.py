@@ -73,14 +73,14 @@ def _labelled(utterance: UtteranceRecord, name: str) -> LabelledUtterance:
 
 
 def inconsistencies(session: Session, units: Units | None = None) -> tuple[str, ...]:
-    """Returns one sentence for each fault of the annotation, beginning with its place; empty if it is consistent.
+    """Returns one sentence for each fault of the annotation, starting with its place; empty if it is consistent.
 
     An exchange starts with an initiating move, every response has an exchange, and exchanges and transactions equal, in
     number and act by act, those that the rules derive. The last is not required of sessions that people have
     annotated.
 
     Args:
-        session: any.
+        session: a session of any layout.
         units: the units that the rules derive, if already known.
     """
     again = Units(session) if units is None else units

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.recording.session import Session
 
 MAX_UNDEFINED_SHARE: Final = 0.5
-"""Share of undefined bootstrap samples from which on the interval is undefined."""
+"""Share of undefined bootstrap samples at which the interval becomes undefined."""
 
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
 _ENV, _TASK, _NONE = Handled.ENVIRONMENTAL, Handled.TASK, Handled.NONE
@@ -121,12 +121,12 @@ class BehaviourClaim:
 
 @dataclass(frozen=True, kw_only=True)
 class BehaviourVerdict:
-    """Evidence of a corpus for a claim.
+    """Result of testing a claim on a corpus.
 
     Attributes:
         claim: the claim.
-        difference: its figure over all sessions; None if it is undefined.
-        low, high: ends of its interval; None likewise.
+        difference: difference of the claim over all sessions; None if undefined.
+        low, high: limits of its interval; None if undefined.
     """
 
     claim: BehaviourClaim

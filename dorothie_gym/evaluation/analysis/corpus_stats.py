@@ -37,7 +37,7 @@ _STEADY = (PhysicalAction.STOP, PhysicalAction.LANE_FOLLOW)
 def effective_actions(session: Session) -> Iterator[ActionRecord]:
     """Yields the effective actions of the Co-Wizard.
 
-    Refused actions are not recorded as actions. Switching lights to their present state, a stop after a stop, and a
+    Refused actions are not recorded as actions. Switching lights to their current state, a stop after a stop, and a
     lane follow after a lane follow have no effect. Hazard stops, and driving on after them, are
     actions of the car itself.
     """
@@ -200,7 +200,7 @@ ANCHOR_TOLERANCE = 0.08
 
 
 class AnchorRow(TypedDict):
-    """Share of a label in a corpus and in the paper; fields as of `Anchors.to_json`."""
+    """Share of a label in a corpus and in the paper; fields as in `Anchors.to_json`."""
 
     label: NotRequired[str | None]
     share: float | None
@@ -288,7 +288,7 @@ class CorpusStats:
         anchors: shares of the most frequent labels.
         profiles: moves and slots per transaction and exchange.
         texts: utterances of the training and the test folds.
-        incomplete: names of interrupted sessions, which count as far as they were recorded.
+        incomplete: names of interrupted sessions, whose recorded part counts.
     """
 
     counts: Counts = field(default_factory=Counts)

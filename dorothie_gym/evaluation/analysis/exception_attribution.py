@@ -14,7 +14,7 @@ sessions with recorded meanings, the propositions decide (`exception_mentions`).
 
 For an object on the road, the window starts again when the car comes near. A question within `ANSWER_TIMEOUT` after an
 exchange that handles an object on the road belongs to it if it names no landmark; after an exchange that handles a task
-exception, a question for status or destination does. If several exceptions fit, the latest counts.
+exception, a question for status or destination does. If several exceptions match, the latest counts.
 
 If annotators have marked what an exchange handles, their mark counts.
 """
@@ -130,7 +130,7 @@ def kind_of(event: Event) -> ExceptionKind | None:
 
 
 def place_of(event: Event) -> tuple[float, float] | None:
-    """Returns the place of an exception (x, y) [m]: of its object, or the middle of its area; None if it has none."""
+    """Returns the place of an exception (x, y) [m]: of its object, or the centre of its area; None if it has none."""
     data = event.data
     x, y = data.get("x"), data.get("y")
     if isinstance(x, int | float) and isinstance(y, int | float):
@@ -300,7 +300,7 @@ class _Happened:
 
         Args:
             exchange: the exchange.
-            meant: whether the session has meanings; a question about an obstacle then has to be about the way.
+            meant: whether the session has meanings; a question about an obstacle must then be about the route.
         """
         first = exchange.moves[0].act
         if meant and self.kind.is_plan_level:

@@ -1,7 +1,7 @@
 """Propositions that are about an exception: the content of an utterance decides, not its words.
 
 - weather: `weather` with a parameter of the same kind (fog; rain and wet roads; sun; clouds; wind); `visibility` where
-  that kind limits it; `lights_on`, and switching the head lights, for the altitude of the sun;
+  that kind limits it; `lights_on`, and switching the headlights, for the altitude of the sun;
 - vehicles, pedestrians: `crowded` with their class, and `hinders` near the place;
 - an object on the road: `blocked`, and `hinders` with an obstacle;
 - a sensor fault: `failed` with the sensor or with none; `localised` for the GPS; `visibility` for the camera;

@@ -1,7 +1,7 @@
 """Confidence intervals: Wilson's for shares, percentile bootstrap over sessions (Efron, 1979), Student's t over seeds.
 
 `scipy.stats.bootstrap` is not used: it draws new samples for each figure instead of one set for all, and a single
-sample with an undefined figure (no exception met, say) makes its interval undefined.
+sample with an undefined figure (such as no exception met) makes its interval undefined.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def percentile_interval(figures: NDArray[np.float64]) -> tuple[float, float]:
 def wilson_interval(successes: float, trials: float) -> tuple[float, float]:
     """Returns the 95 % interval of a share (Wilson 1927, JASA 22, 209-212); of 0 trials, (0, 1).
 
-    Unlike the bootstrap interval, it has a width where all trials succeeded, or none: 4 of 4 give (0.51, 1).
+    Unlike the bootstrap interval, it has a width even if all trials succeeded or failed: 4 of 4 give (0.51, 1).
     """
     if not trials:
         return 0.0, 1.0
@@ -98,7 +98,7 @@ class Estimate:
 
 
 def half_width(values: list[float]) -> float | None:
-    """Returns half the width of the 95 % interval of the mean of some numbers; None with fewer than two.
+    """Returns half the width of the 95 % interval of the mean of numbers; None for fewer than two.
 
     t(0.975, n - 1) x standard deviation (n - 1) / sqrt(n).
     """

@@ -55,7 +55,7 @@ class LostMeaning:
 
     @property
     def is_repaired(self) -> bool:
-        """Whether the listener asked, or the value was said again."""
+        """Whether the listener asked, or the value was repeated."""
         return self.asked or self.said_again
 
 
@@ -91,7 +91,7 @@ def _annotated(utterance: UtteranceRecord) -> frozenset[SlotValue]:
 
 
 def _asks(utterance: UtteranceRecord, after: Sequence[UtteranceRecord]) -> bool:
-    later = (each for each in after if each.start >= utterance.end)  # what has begun meanwhile is no answer
+    later = (each for each in after if each.start >= utterance.end)  # an earlier start is no answer
     answer = next((each for each in later if each.speaker is not utterance.speaker), None)
     return answer is not None and any(move.act.move in ASKS for move in answer.moves)
 

@@ -28,7 +28,7 @@ class UnitSpan:
 
     Attributes:
         words: number of its words, at least 1.
-        unit: number of its exchange, or transaction; None for none.
+        unit: number of its exchange, or transaction; None if there is none.
         decided: whether the annotator has finished it.
     """
 
@@ -49,7 +49,7 @@ class SegmentationAgreement:
     """Agreement of two annotators on borders.
 
     Attributes:
-        kappa: Cohen's kappa of the sites; None if all of them are borders for both, or none is.
+        kappa: Cohen's kappa of the sites; None if both agree that all of them are borders, or none.
         similarity: boundary similarity; None without borders.
         sites: number of sites that both have judged.
         borders: number of borders of each annotator.

@@ -47,11 +47,11 @@ class Agreement:
     Attributes:
         moves: Cohen's kappa of the moves of pieces; None if both use a single move, so that chance explains the
             agreement.
-        slots: Cohen's kappa of the values of each of the five slots in each piece; None likewise.
+        slots: Cohen's kappa of the values of each of the five slots in each piece; None in the same case.
         pieces: compared stretches of words.
         utterances: number of utterances that both have finished.
         equal_spans: number of spans with the same borders in both annotations.
-        moves_of_equal_spans: Cohen's kappa of the moves of these spans; None likewise.
+        moves_of_equal_spans: Cohen's kappa of the moves of these spans; None in the same case.
         spans: span agreement: F1 of the spans, twice the number of equal ones divided by the number of all spans of
             both; None without spans.
     """
@@ -148,7 +148,7 @@ class Alpha:
     Attributes:
         moves: alpha of the moves of pieces; None if fewer than two different moves, or no piece with two judgements,
             exist.
-        slots: alpha of the values of each of the five slots in each piece; None likewise.
+        slots: alpha of the values of each of the five slots in each piece; None in the same case.
         pieces: number of pieces that at least two annotators have judged.
     """
 

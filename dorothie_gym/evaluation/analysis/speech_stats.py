@@ -90,7 +90,7 @@ PUBLISHED: Final = (
 
 @dataclass
 class SpeechStats:
-    """Counts of the speech of some sessions; durations in seconds.
+    """Counts of the speech in sessions; durations in seconds.
 
     Attributes:
         sessions: number of sessions.

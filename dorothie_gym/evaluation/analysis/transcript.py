@@ -69,7 +69,7 @@ def markdown(session: Session, title: str | None = None) -> str:
     """Returns a session as a section of a Markdown page.
 
     Args:
-        session: any.
+        session: a session of any layout.
         title: heading of the section; None for the session's name.
     """
     head = [f"## {title or session.name}", "", *_facts(session), ""]

@@ -64,7 +64,7 @@ class Units:
         """Derives the units.
 
         Args:
-            session: any.
+            session: a session of any layout.
         """
         self.session = session
         self.utterances: tuple[UtteranceRecord, ...] = tuple(

@@ -26,7 +26,7 @@ _Key = TypeVar("_Key", Role, Loudness, WordClass)
 
 @dataclass
 class WordErrors:
-    """Errors in the words of some utterances.
+    """Errors in the words of utterances.
 
     Attributes:
         words: number of words that were spoken.
@@ -107,7 +107,7 @@ def _classified(text: str) -> tuple[list[str], list[WordClass]]:
 
 @dataclass
 class WordErrorCounts:
-    """Word errors of some sessions.
+    """Word errors of sessions.
 
     Attributes:
         speakers: errors by speaker.
@@ -139,7 +139,7 @@ class WordErrorCounts:
                 self.noises[loudness_at(session, last)] += errors
 
     def to_json(self) -> dict[str, object]:
-        """Returns the errors in JSON types: all of them, and by speaker, noise and class of word."""
+        """Returns the errors as JSON types: in total, and by speaker, noise and class of word."""
         return {
             **self.total.to_json(),
             "by_speaker": {role.value: errors.to_json() for role, errors in _sorted(self.speakers)},

@@ -28,13 +28,13 @@ class Claim(enum.StrEnum):
     """Statements about a rollout that may be unchecked."""
 
     FIGURES = "figures"
-    """Metrics, seeds, towns, settings and partners: everything that follows from the sessions."""
+    """Metrics, seeds, towns, settings and partners: all that follows from the sessions."""
     NAME = "name"
     """Which policy chose the actions of the Co-Wizard."""
     WEIGHTS = "weights"
     """SHA-256 of its weights."""
     LANGUAGE_MODEL = "language model"
-    """Settings of the language model that it asked."""
+    """Settings of its language model."""
     PERSONA = "persona"
     """Traits of the Co-Wizard in the headers of the sessions."""
     TRAINING = "training cost"
@@ -77,11 +77,11 @@ def claims_of(
     return tuple(claim for claim, is_claim in there.items() if is_claim)
 
 
-# --- Policies that come with the package ------------------------------------------------------------------------------
+# --- Shipped policies -------------------------------------------------------------------------------------------------
 
 
 def shipped_player(name: str) -> Player | None:
-    """Returns the Co-Wizard of a name if the package has its policy; None for a file or a language model.
+    """Returns the Co-Wizard with a name if the package has its policy; None for a file or a language model.
 
     Raises:
         PolicyLoadError: the name begins like one of the package, which has none of that name.

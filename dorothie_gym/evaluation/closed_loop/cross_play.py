@@ -174,7 +174,7 @@ def cross_play(
 
     Raises:
         RolloutError: a result is damaged.
-        SessionError: a folder holds something else, or a rollout of other settings.
+        SessionError: a folder contains other files, or a rollout of other settings.
         ProcessError: a process died, or there is no such cluster.
         OSError: a folder cannot be written.
     """

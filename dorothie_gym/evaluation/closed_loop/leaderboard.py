@@ -48,7 +48,7 @@ PART_TITLES: Final[Mapping[str, str]] = {
 """Parts of the page and their titles."""
 
 ENOUGH: Final = 100
-"""Number of sessions of a row from which on it is compared; as `submission.LeaderboardProtocol`."""
+"""Minimum number of sessions of a row that is compared, as in `submission.LeaderboardProtocol`."""
 
 _KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind if kind is not ExceptionKind.NONE), NO_EXCEPTION)
 
@@ -85,7 +85,7 @@ class LeaderboardEntry:
 
     @property
     def claims(self) -> tuple[Claim, ...]:
-        """Statements in the rollout's files that nothing has checked."""
+        """Unchecked statements in the files of a rollout."""
         if self.check is not None:
             return self.check.claims
         usage, run_time = bool(self.result.usage()), bool(self.cost)
@@ -176,8 +176,8 @@ def checked_entries(
     Args:
         entries: the rollouts.
         protocol: protocol of the leaderboard.
-        workers: number of processes, as of `check_submission`.
-        on_session: called with the numbers of sessions checked and to be checked, of all rollouts.
+        workers: number of processes, as in `check_submission`.
+        on_session: called with the numbers of checked sessions and of all sessions to check, over all rollouts.
 
     Raises:
         RolloutError: a rollout has faults.

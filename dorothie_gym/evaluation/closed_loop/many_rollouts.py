@@ -38,7 +38,7 @@ def roll_out_all(
 
     Raises:
         RolloutError: a result is damaged.
-        SessionError: a folder holds something else, or a rollout of other settings.
+        SessionError: a folder contains other files, or a rollout of other settings.
         ProcessError: a process died, or there is no such cluster.
         OSError: a folder cannot be written.
     """
@@ -62,7 +62,7 @@ def roll_out_all(
 
 
 def _finished(folder: Path, settings: RolloutSettings) -> RolloutResult | None:
-    """Returns the result in a folder if it is that of a whole rollout with some settings, without errors."""
+    """Returns the result in a folder if it is that of a whole rollout with the given settings, without errors."""
     if not (folder / RESULT_FILE).is_file():
         return None
     result = read_result(folder)

@@ -51,7 +51,7 @@ class ClosedLoopMetric(ABC):
         """Returns the contributions of a session to numerator and denominator; (0, 0) leaves the session out."""
 
     def of(self, records: Iterable[SessionRecord]) -> float | None:
-        """Returns the metric over some sessions; None if all are left out."""
+        """Returns the metric over sessions; None if all are left out."""
         sums = [self.parts(record) for record in records]
         lower = sum(part for _, part in sums)
         return sum(part for part, _ in sums) / lower if lower else None
@@ -285,7 +285,7 @@ class RecoverySeconds:
         return tuple(each.seconds for each in record.exceptions if each.seconds is not None)
 
     def of(self, records: Iterable[SessionRecord]) -> float | None:
-        """Returns the median over the exceptions of some sessions; None without a recovery."""
+        """Returns the median over the exceptions of the given sessions; None without a recovery."""
         found = [seconds for record in records for seconds in self.values(record)]
         return statistics.median(found) if found else None
 
@@ -305,7 +305,7 @@ class MetricInterval:
     """Metric over sessions with its 95 % interval.
 
     The interval is Wilson's for a share of sessions (success), and for shares that are 0, or 1, in all sessions, where
-    the sessions count as trials. It is the percentile bootstrap over sessions for everything else.
+    the sessions count as trials. For all others, it is the percentile bootstrap over sessions.
 
     Attributes:
         mean: value over all sessions; None if undefined.

@@ -57,7 +57,7 @@ class RolloutRow:
         seed: seed of the session.
         record: measures of the session; None if it ended in an error.
         error: the error, if any.
-        usage: usage of language models, by role; empty for none.
+        usage: usage of language models, by role; empty if there is none.
     """
 
     number: int
@@ -76,7 +76,7 @@ class RolloutRow:
 
 @dataclass(frozen=True, kw_only=True)
 class RolloutTable:
-    """Metrics over some sessions of a rollout.
+    """Metrics over sessions of a rollout.
 
     Attributes:
         sessions: number of sessions.
@@ -92,7 +92,7 @@ class RolloutTable:
 
     @classmethod
     def of(cls, rows: Sequence[RolloutRow]) -> RolloutTable:
-        """Returns the table of some rows."""
+        """Returns the table of the given rows."""
         records = [row.record for row in rows if row.record is not None]
         return cls(
             sessions=len(rows),
@@ -153,7 +153,7 @@ class RolloutResult:
         return RolloutTable.of(self.rows)
 
     def usage(self) -> SessionUsage:
-        """Returns the usage of language models in all sessions, by role; empty for none."""
+        """Returns the usage of language models in all sessions, by role; empty if there is none."""
         return total_usage([row.usage for row in self.rows])
 
     def per_town(self) -> dict[str, RolloutTable]:
@@ -180,7 +180,7 @@ class RolloutResult:
 
 
 class _RowPage(TypedDict):
-    """Row in JSON types; fields as of `RolloutRow`."""
+    """Row in JSON types; fields as in `RolloutRow`."""
 
     number: Annotated[int, Meta(ge=0)]
     town: str
@@ -205,7 +205,7 @@ class _TrainingPage(TypedDict, total=False):
 
 
 class _SettingsPage(TypedDict):
-    """Output of `RolloutSettings.to_json`, as far as it is read."""
+    """Fields of the output of `RolloutSettings.to_json` that are read."""
 
     participant: str
     co_wizard: str
@@ -218,7 +218,7 @@ class _SettingsPage(TypedDict):
 
 
 class _ResultPage(TypedDict):
-    """Output of `RolloutResult.to_json`, as far as it is read; the tables follow from the rows."""
+    """Fields of the output of `RolloutResult.to_json` that are read; the tables follow from the rows."""
 
     version: str
     settings: _SettingsPage

@@ -205,9 +205,9 @@ def roll_out(
 
     Raises:
         ValueError: there are no workers.
-        SessionError: the folder holds something else, or another process holds its lock.
+        SessionError: the folder contains other files, or another process holds its lock.
         ProcessError: a process died, or there is no such cluster.
-        OutputFolderError: the folder was deleted or replaced meanwhile.
+        OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.
     """
     root, rows = Path(folder), list[RolloutRow]()

@@ -50,9 +50,9 @@ class SessionTask:
     """Session to be checked.
 
     Attributes:
-        plan: session that the protocol plans.
-        row: its row in the result; None without one.
-        simulated: whether it is played again.
+        plan: session of the protocol.
+        row: its row in the result; None if it has none.
+        simulated: whether the session is simulated again.
     """
 
     plan: RolloutPlan
@@ -203,7 +203,7 @@ class SessionChecker:
                 )
             except OSError:
                 raise  # of the temporary folder
-            except Exception as error:  # recorded actions are the submitter's: whatever they break is their fault
+            except Exception as error:  # recorded actions are the submitter's, and so are the failures they cause
                 raise SessionError(f"cannot be played again: {type(error).__name__}: {one_line(error)}") from error
             again = Session.load(Path(folder) / "s")
             difference = first_difference(session, again, strict=True)
@@ -225,7 +225,7 @@ class SessionChecker:
         """Yields differences between the row and the measures of the session."""
         try:
             wanted = measure(session, self._engine(plan.town).town).to_json()
-        except Exception as error:  # a session that was not played again may hold anything
+        except Exception as error:  # a session that was not simulated again may contain anything
             raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
         given: Mapping[str, object] = record.to_json()
         for name, value in wanted.items():

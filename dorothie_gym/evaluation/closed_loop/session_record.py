@@ -50,7 +50,7 @@ CLARIFICATIONS: Final = frozenset({DialogueMove.CONFUSE, DialogueMove.CLARIFY, D
 
 
 class TalkPage(TypedDict):
-    """Counts of a session's dialogue in JSON types; fields as of `TalkRecord`."""
+    """Counts of a session's dialogue in JSON types; fields as in `TalkRecord`."""
 
     utterances: Count
     exchanges: Count
@@ -112,7 +112,7 @@ PROBE_PERIOD: Final = 1.0
 
 
 class MetExceptionPage(TypedDict):
-    """Exception in JSON types; fields as of `MetException`."""
+    """Exception in JSON types; fields as in `MetException`."""
 
     kind: str
     met: Amount | None
@@ -256,7 +256,7 @@ _TOUCHED: Final = {ObjectClass.PEDESTRIAN: "pedestrian", ObjectClass.VEHICLES: "
 
 
 class SessionRecordPage(TypedDict):
-    """Measures of one session in JSON types; fields as of `SessionRecord`."""
+    """Measures of one session in JSON types; fields as in `SessionRecord`."""
 
     live: Count
     reached: Count
@@ -368,7 +368,7 @@ def measure(session: Session, town: Town) -> SessionRecord:
 def count_infractions(session: Session) -> dict[str, int]:
     """Returns the number of infractions of each kind; kinds without infractions are left out.
 
-    Collisions are classified by the counterpart: pedestrian, vehicle, or anything else ("static"). Collisions that
+    Collisions are classified by the counterpart: pedestrian, vehicle, or other ("static"). Collisions that
     others caused (`own_fault` is false: the car stood or was hit from behind) count as "hit_by_others".
     """
     counts: Counter[str] = Counter()

@@ -64,7 +64,7 @@ class LeaderboardProtocol:
 
     Attributes:
         folds: folds whose towns a rollout may be played in; it covers one of them as a whole, in the usual order.
-        sessions: number of sessions; with more of them, a submitter could stop at the best moment.
+        sessions: number of sessions; if more were allowed, a submitter could stop at the best moment.
         seed: seed of the rollout.
         config: settings of the engine.
     """
@@ -118,9 +118,9 @@ class SubmissionCheck:
         submission: content of the submission's file; None if there are faults.
         resimulated: numbers of the sessions that were played again and found equal.
         sessions: number of sessions of the protocol.
-        seed: seed of the sample; None if all sessions were to be played again.
+        seed: seed of the sample; None if all sessions were selected.
         played: whether the Co-Wizard's policy was also played again.
-        claims: statements of the rollout that nothing checks.
+        claims: statements of the rollout that cannot be checked.
     """
 
     faults: tuple[str, ...]
@@ -145,7 +145,7 @@ def check_submission(
 
     Args:
         folder: folder of the rollout, with its sessions.
-        sample: number of sessions to play again; None for all of them. The other ones are drawn, read and measured.
+        sample: number of sessions to simulate again; None for all. The others are drawn, read and measured.
         seed: seed of the sample, which also depends on the content of all sessions; None draws one, so that the sample
             cannot be known beforehand.
         protocol: the protocol.

@@ -41,7 +41,7 @@ class TaskRecord:
 
     @property
     def live(self) -> tuple[int, ...]:
-        """Numbers of the live subgoals; the last is the destination."""
+        """Indices of the live subgoals; the last one is the destination."""
         return tuple(self.places)
 
     @property
@@ -51,7 +51,7 @@ class TaskRecord:
 
     @property
     def done(self) -> bool:
-        """Whether every live subgoal has been reached, the destination among them."""
+        """Whether every live subgoal has been reached, including the destination."""
         return bool(self.live) and not self.left
 
     def may_be_next(self, goal: int, reached: frozenset[int]) -> bool:

@@ -19,7 +19,7 @@ SessionUsage: TypeAlias = Mapping[str, ModelUsage]
 
 
 def read_usage(folder: Path) -> dict[str, ModelUsage]:
-    """Returns the usage recorded next to a session; empty for none.
+    """Returns the usage recorded next to a session; empty if there is none.
 
     Raises:
         SessionError: the file is damaged.
@@ -42,7 +42,7 @@ def usage_to_json(usage: SessionUsage) -> dict[str, UsagePage]:
 
 
 def total_usage(sessions: Sequence[SessionUsage]) -> dict[str, ModelUsage]:
-    """Returns the usage of each role in several sessions in all; empty for none."""
+    """Returns the total usage of each role in several sessions; empty if there is none."""
     found: dict[str, ModelUsage] = {}
     for role in map(str, AGENT_ROLES):
         parts = [usage[role] for usage in sessions if role in usage]

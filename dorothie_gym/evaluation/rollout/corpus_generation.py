@@ -134,9 +134,9 @@ def generate_corpus(
 
     Raises:
         ValueError: no sessions or no workers, or a negative seed.
-        SessionError: the folder holds something else, or another process holds its lock.
+        SessionError: the folder contains other files, or another process holds its lock.
         ProcessError: a session failed in another process, or there is no such cluster.
-        OutputFolderError: the folder was deleted or replaced meanwhile.
+        OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.
     """
     plans, root, config = plan_corpus(sessions, seed), Path(root), config or EnvConfig()

@@ -53,7 +53,7 @@ def locked_folder(root: Path, file: str, settings: Mapping[str, object]) -> Iter
         settings: settings that determine the sessions, in JSON types; a folder with other settings is refused.
 
     Raises:
-        SessionError: the folder holds something else, or another process holds its lock.
+        SessionError: the folder contains other files, or another process holds its lock.
         OutputFolderError: the folder was deleted or replaced inside the block.
         OSError: the folder cannot be written.
     """

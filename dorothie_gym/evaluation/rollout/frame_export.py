@@ -143,7 +143,7 @@ def export_frames(
         on_part: called with the number of parts that are done and of all.
 
     Raises:
-        SessionError: a folder holds something else, or a session has no surroundings or no known town.
+        SessionError: a folder contains other files, or a session has no surroundings or no known town.
         OSError: a file cannot be written.
         ProcessError: a process died.
     """
@@ -177,7 +177,7 @@ def export_frames(
 
 
 def _finished(folder: Path, export: FrameExport) -> ExportedSession | None:
-    """Returns the result of an earlier export with these settings; None where there is nothing yet."""
+    """Returns the result of an earlier export with these settings; None if there is nothing yet."""
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return None
     try:
@@ -255,7 +255,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Annotations of a part."""
+    """Annotations of a part of the pictures."""
 
     job: _Job
     number: int

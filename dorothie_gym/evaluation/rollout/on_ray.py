@@ -1,4 +1,4 @@
-"""Sessions on a Ray cluster: each session is a task that returns its files, so that no folder has to be shared."""
+"""Sessions on a Ray cluster: each session is a task that returns its files, so that no shared folder is needed."""
 
 from __future__ import annotations
 

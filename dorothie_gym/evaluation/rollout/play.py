@@ -74,7 +74,7 @@ def play_session(
     Raises:
         ValueError: a role has no policy.
         SessionError: the folder holds a session already.
-        OutputFolderError: the folder was deleted meanwhile.
+        OutputFolderError: the folder was deleted during the session.
         OSError: the folder cannot be written.
     """
     missing = [role for role in AGENT_ROLES if role not in policies]
@@ -120,7 +120,7 @@ def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> 
 def with_personas(
     header: SessionHeader, policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
 ) -> SessionHeader:
-    """Returns a header that records the personas of policies, by role; the same one where there are none."""
+    """Returns a header that records the personas of policies, by role; the same one if there are none."""
     personas = personas_of(policies, states)
     return replace(header, extra={**header.extra, PERSONAS: personas}) if personas else header
 
@@ -134,7 +134,7 @@ def personas_of(
 
 
 def pitches_of(personas: object) -> dict[Role, float]:
-    """Returns the pitch of the speakers' voices by role, from personas as a header records them; none without any."""
+    """Returns the pitch of the speakers' voices by role, from the personas in a header; empty without personas."""
     known = personas if isinstance(personas, Mapping) else {}
     found = {role: known[str(role)].get(PITCH) for role in AGENT_ROLES if isinstance(known.get(str(role)), Mapping)}
     return {role: float(pitch) for role, pitch in found.items() if isinstance(pitch, float | int)}

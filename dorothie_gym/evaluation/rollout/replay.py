@@ -79,7 +79,7 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
 def _with_recordings(again: Session, session: Session) -> Session:
     """Returns a replay whose dialogue moves name the recordings of people, who are not played, as the record does.
 
-    Audio of the channel is made again, with its names.
+    Audio of the channel is recreated, with its names.
     """
     if config_of(session.header).channel is ChannelKind.SPEECH:
         return again
@@ -112,7 +112,7 @@ def watch_session(
 
 
 def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None) -> SessionEngine:
-    """Returns an engine in the state in which a session began; `recorded_actions` then gives what it is stepped with.
+    """Returns an engine in the state in which a session began; `recorded_actions` then returns its actions.
 
     Args:
         session: session that this package has recorded, complete or interrupted.
@@ -165,7 +165,7 @@ def _step(engine: SessionEngine, session: Session, actions: Actions) -> None:
 
 
 def _broken_off(session: Session) -> EndReason | None:
-    """Returns the reason for which people broke the session off; None if it came to an end of its own or has none."""
+    """Returns the reason for which people ended the session early; None if it ended by itself or has not ended."""
     given = (session.summary or {}).get("reason")
     return next((reason for reason in EndReason if reason.breaks_off and reason.value == given), None)
 

@@ -125,7 +125,7 @@ def lived_through(
 
 
 def distinct_ids(ids: Sequence[str]) -> list[str]:
-    """Returns sorted ids; repeated ones, from sessions with equal observations and actions, get a number."""
+    """Returns sorted ids; duplicates, from sessions with equal observations and actions, are numbered."""
     found, times = [], 0
     for number, name in enumerate(ids):
         times = times + 1 if number and ids[number - 1] == name else 1

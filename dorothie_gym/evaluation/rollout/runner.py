@@ -60,7 +60,7 @@ class SessionMaker:
         """Plays a session unless its folder is finished; returns the session, its folder, and whether it is new.
 
         Raises:
-            SessionError: the folder holds something else.
+            SessionError: the folder contains other files.
             OSError: the folder cannot be written, or was deleted.
             ValueError: a policy cannot be made, or its action is malformed; policies may raise other errors.
         """
@@ -77,7 +77,7 @@ class SessionMaker:
         part = self.root / PARTS_FOLDER / folder.name
         engine = self.engine(plan.town)
         policies = {role: self.cast[role].make(role, engine.limits) for role in AGENT_ROLES}
-        part.mkdir(exist_ok=True)  # without its parents: a series that was deleted meanwhile is not made again
+        part.mkdir(exist_ok=True)  # without its parents: a series that was deleted during the run is not recreated
         play_session(engine, policies, seed=plan.seed, folder=part, create=False)
         session = Session.load(part)
         for parent in reversed(Path(plan.path).parents[:-1]):
@@ -191,9 +191,9 @@ def run_sessions(
 
     Raises:
         ValueError: there are no workers.
-        SessionError: the folder holds something else, or another process holds its lock.
+        SessionError: the folder contains other files, or another process holds its lock.
         ProcessError: a session failed in another process, a process died, or the cluster cannot be reached.
-        OutputFolderError: the folder was deleted or replaced meanwhile.
+        OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.
     """
     if workers < 1:

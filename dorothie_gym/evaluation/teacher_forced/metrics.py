@@ -31,7 +31,7 @@ PredictionsT = TypeVar("PredictionsT", ActPredictions, ActionPredictions)
 
 
 class Metric(ABC, Generic[PredictionsT, PointT]):
-    """Metric of the predictions at some points.
+    """Metric of predictions.
 
     Attributes:
         name: name of the metric in tables.
@@ -74,7 +74,7 @@ class SlotF1(ActMetric):
 
     Attributes:
         average: "micro" counts pairs over all points; "macro" is the mean of the F1 of each of the 69 labels that
-            occurs; "type" is micro over the five slots, whatever their values.
+            occurs; "type" is micro over the five slots, regardless of their values.
     """
 
     name: ClassVar[str] = "slot F1"

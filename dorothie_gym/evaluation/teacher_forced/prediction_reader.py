@@ -153,7 +153,7 @@ def _is_type(kind: pa.DataType, wanted: str) -> bool:
     from pyarrow import types
 
     if types.is_null(kind):
-        return True  # a column of nothing but nulls: its rows are checked one by one
+        return True  # a column of nulls only: its rows are checked one by one
     if types.is_dictionary(kind):
         kind = kind.value_type
     if wanted == "str":
@@ -305,7 +305,7 @@ def _together(pieces: Sequence[Predictions]) -> Predictions:
 
 
 def _refuse(source: str, wrong: Sequence[str]) -> None:
-    """Raises `PredictionError` with the faults of a file, if any."""
+    """Raises `PredictionError` if a file has faults; the message lists them."""
     if wrong:
         more = [f"... and {len(wrong) - SHOWN} more rows"] if len(wrong) > SHOWN else []
         raise PredictionError(f"{source}: {'; '.join([*wrong[:SHOWN], *more])}")

@@ -48,7 +48,7 @@ class ActPredictions:
         return len(self.moves)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> ActPredictions:
-        """Returns those at some rows: their numbers, or a mask (n,)."""
+        """Returns those in the given rows: their numbers, or a mask (n,)."""
         return ActPredictions(moves=self.moves[rows], slots=self.slots[rows])
 
 
@@ -77,7 +77,7 @@ class ActionPredictions:
         return len(self.actions)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> ActionPredictions:
-        """Returns those at some rows: their numbers, or a mask (n,)."""
+        """Returns those in the given rows: their numbers, or a mask (n,)."""
         return ActionPredictions(actions=self.actions[rows], angles=self.angles[rows])
 
 
@@ -85,7 +85,7 @@ Predictions: TypeAlias = ActPredictions | ActionPredictions
 
 
 def act_labels(points: Sequence[InferencePoint] | ActPredictions) -> ActPredictions:
-    """Returns the labels of the points, in the form of a prediction; what is in that form already stays as it is."""
+    """Returns the labels of the points, in the form of a prediction; labels in that form are returned unchanged."""
     if isinstance(points, ActPredictions):
         return points
     return ActPredictions(

@@ -61,7 +61,7 @@ def write_report(table: ResultsTable, folder: Path | str, *, pictures: bool = Tr
 
     Args:
         table: the table.
-        folder: gets `table.md`, `table.tex` and `table.json`, and the pictures.
+        folder: folder for `table.md`, `table.tex`, `table.json` and the pictures.
         pictures: also draw `table.png`, and `confusion-<model>.png` for each model.
 
     Returns:
@@ -96,7 +96,7 @@ def file_name(model: str) -> str:
 
 
 def percent(estimate: Estimate | PaperFigure) -> str:
-    """Returns a figure in per cent with its half-width, as far as there is one: "40.9 ± 3.9"."""
+    """Returns a figure in per cent with its half-width, if it has one: "40.9 ± 3.9"."""
     if estimate.mean is None:
         return NONE
     mean = f"{100 * estimate.mean:.1f}"

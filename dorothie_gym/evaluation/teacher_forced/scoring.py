@@ -27,7 +27,7 @@ NEARBY_POINTS: Final = 3
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scores:
-    """Scores of some points.
+    """Scores of points.
 
     Attributes:
         points: number of scored points of each predicted task.

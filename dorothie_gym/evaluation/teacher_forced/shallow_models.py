@@ -172,7 +172,7 @@ class _Constant:
 
 
 def _rows(inputs: Any, rows: NDArray[np.bool_]) -> Any:
-    """Returns some rows of a dense or sparse matrix."""
+    """Returns the given rows of a dense or sparse matrix."""
     return inputs[np.flatnonzero(rows)]
 
 
@@ -202,7 +202,7 @@ class BoostedTrees(ShallowModel[NDArray[np.float64]]):
     spec = BatchSpec(moves=8, utterances=0, actions=_LAST_ACTIONS, window=1, window_objects=0, objects=1)
 
     ITERATIONS: Final = 100
-    """Largest number of boosting iterations."""
+    """Maximum number of boosting iterations."""
 
     FOREST: Final = 100
     """Number of trees of the forest for slot values."""
@@ -359,4 +359,4 @@ def _documents(columns: Columns, batch: Batch) -> tuple[list[str], ...]:
 SHALLOW: Final[Mapping[str, Callable[..., ShallowModel[Any]]]] = MappingProxyType(
     {"trees": BoostedTrees, "tfidf": WordRegression}
 )
-"""Constructors of the shallow models by name; arguments as of `ShallowModel`."""
+"""Constructors of the shallow models by name; arguments as in `ShallowModel`."""

@@ -80,7 +80,7 @@ class ResultsTable:
         return tuple(sorted((run for run in self.runs if run.model == model), key=lambda run: run.seed))
 
     def estimate(self, model: str, part: str, key: str, handled: Handled | None = None) -> Estimate:
-        """Returns a figure over the seeds of a model, without any seed where it was not run or is undefined.
+        """Returns a figure over the seeds of a model, without any seed if it was not run or is undefined.
 
         Args:
             model: name of the model.
@@ -103,7 +103,7 @@ class ResultsTable:
         return _scores_of(runs[0], part, handled).points.get(task, 0) if runs else 0
 
     def confusion(self, model: str, part: str, task: Task) -> NDArray[np.int64] | None:
-        """Returns the confusion matrix of a task, summed over seeds; None where it was not predicted."""
+        """Returns the confusion matrix of a task, summed over seeds; None if it was not predicted."""
         found = [run.parts[part].confusion[task] for run in self.runs_of(model) if task in run.parts[part].confusion]
         return np.sum(found, axis=0, dtype=np.int64) if found else None
 
@@ -143,7 +143,7 @@ class ResultsTable:
         return tuple(found)
 
     def to_json(self) -> dict[str, object]:
-        """Returns everything as JSON types; None where a figure is undefined.
+        """Returns the whole table as JSON types; None where a figure is undefined.
 
         `models.<name>.<part>.<metric>` = {mean, half_width, seeds, values}; docs/predictions.md describes the rest.
         """
@@ -240,11 +240,11 @@ def evaluate_predictions(
         corpus: the labels (`labels_of`), or the corpus whose split is taken.
         split: see `labels_of`.
         missing: why models could not be run, by name.
-        about: how the predictions were made, by model or file.
+        about: origin of the predictions, by model or file.
 
     Raises:
         SessionError: the corpus cannot be read.
-        PredictionError: the predictions do not fit the corpus; see `score_runs`.
+        PredictionError: the predictions do not match the corpus; see `score_runs`.
     """
     labels = corpus if isinstance(corpus, CorpusLabels) else labels_of(corpus, split)
     return ResultsTable(

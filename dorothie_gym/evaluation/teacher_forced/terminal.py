@@ -1,4 +1,4 @@
-"""The table and everything behind it, for a terminal (rich)."""
+"""The table and its supplements, for a terminal (rich)."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 
 WIDE: Final = 110
-"""Terminal width from which the tasks stand side by side [characters]."""
+"""Minimum terminal width for showing the tasks side by side [characters]."""
 
 NOTES: Final = 8
 """Number of notes shown; the JSON has all."""
@@ -162,7 +162,7 @@ def _metrics(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Table:
 
 
 def _is_own(name: str) -> bool:
-    """Returns whether a metric is worth a row of its own: the paper's protocol takes moves and actions as we do."""
+    """Returns whether a metric needs a row of its own: for moves and actions, the paper's protocol equals ours."""
     return name.removesuffix(PAPER_SUFFIX) not in ("move_accuracy", "action_accuracy") or PAPER_SUFFIX not in name
 
 

@@ -48,7 +48,7 @@ class UnitStarts:
 
     Attributes:
         exchanges: number of the first word, by number of the exchange.
-        transactions: likewise.
+        transactions: the same for transactions.
     """
 
     def __init__(self, text: SourceText, annotation: Annotation) -> None:

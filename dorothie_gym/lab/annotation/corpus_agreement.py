@@ -67,11 +67,11 @@ class CorpusAgreement:
 
     Attributes:
         annotators: their names, in order.
-        sessions: number of sessions with two or more of them.
+        sessions: number of sessions with two or more annotations.
         pairs: agreement of each pair of annotators, over the sessions that both have annotated, with the number of
             these.
         alpha: Krippendorff's alpha of all annotators; None if the package `krippendorff` is not installed.
-        exchange_alpha: the same for the borders of exchanges; None likewise, and if it is undefined.
+        exchange_alpha: the same for the borders of exchanges; also None if it is undefined.
         transaction_alpha: the same for the borders of transactions.
     """
 
@@ -139,7 +139,7 @@ def corpus_agreement(
 
     Args:
         entries: the sessions.
-        annotators: names to compare; `RECORDED` stands for the labels of the sessions, `ADJUDICATED` for the final
+        annotators: names to compare; `RECORDED` denotes the labels of the sessions, `ADJUDICATED` the final
             version. Empty: all annotators.
         with_alpha: whether to compute Krippendorff's alpha.
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
 
 MAX_ELEMENTS: Final = 500_000
-"""Most elements of a file; each takes some 200 bytes of memory."""
+"""Maximum number of elements of a file; each takes some 200 bytes of memory."""
 
 _NUMBER: Final = re.compile(r"\d{1,8}", re.ASCII)
 _TIME: Final = re.compile(r"\d{1,12}", re.ASCII)
@@ -58,7 +58,7 @@ def read_elan(path: Path, text: SourceText) -> Annotation:
     """Returns the annotation of an ELAN file for the session with a text.
 
     Raises:
-        AnnotationError: the file is not XML, lacks a tier, or does not fit the session; the message names file and
+        AnnotationError: the file is not XML, lacks a tier, or does not match the session; the message names file and
             annotation.
         SessionError: the file is missing or too large.
     """
@@ -229,7 +229,7 @@ class _Reader:
         return number
 
     def _unit(self, value: str, names: tuple[str, ...]) -> tuple[int | None, dict[str, str]]:
-        """Returns the number of a unit, and the marks behind it."""
+        """Returns the number of a unit, and the marks after it."""
         if not value:
             return None, {}
         number, *rest = (part.strip() for part in value.split(";"))

@@ -2,7 +2,7 @@
 
 Each speaker has a tier of utterances with their times. Its spans are a symbolic subdivision of the utterances; moves,
 slots, exchanges and transactions are symbolically associated with the spans. The marks of an exchange or transaction
-stand behind its number at its first span.
+follow its number at its first span.
 """
 
 from __future__ import annotations

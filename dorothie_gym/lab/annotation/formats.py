@@ -94,7 +94,7 @@ def import_annotation(session: Session, path: Path, *, maps: Path | None = None)
     """Returns the annotation in a file or folder of any format, for a session.
 
     Raises:
-        AnnotationError: it does not fit the session.
+        AnnotationError: it does not match the session.
         SessionError: it cannot be read.
     """
     text, found = SourceText.of(session), format_of(path)

@@ -46,7 +46,7 @@ def seats_of(root: Path, people: Sequence[tuple[str, SeatKind]], *, renew: bool 
     Args:
         root: folder of the session or corpus.
         people: name and kind of each seat.
-        renew: whether all get new links.
+        renew: whether all links are replaced.
 
     Returns:
         Seats without a token for links that were given before: only their hashes are known.
@@ -61,7 +61,7 @@ def seats_of(root: Path, people: Sequence[tuple[str, SeatKind]], *, renew: bool 
 
 
 def read_links(root: Path) -> list[LinkRow]:
-    """Returns the links of a session or corpus; none if there are none. Errors as of `seats_of`."""
+    """Returns the links of a session or corpus; none if there are none. Errors as in `seats_of`."""
     path = links_path(root)
     check_place(path)
     if not path.exists():
@@ -87,7 +87,7 @@ def keep_links(root: Path, seats: Sequence[Seat], *, renew: bool = False) -> Non
         renew: whether links of other people also stop working; otherwise they work again when these people are named.
 
     Raises:
-        AnnotationError: as of `seats_of`.
+        AnnotationError: as in `seats_of`.
         OSError: the file cannot be written.
     """
     before = [] if renew else read_links(root)

@@ -32,7 +32,7 @@ ADJUDICATED: Final = "adjudicated"
 """Name of the log of the final version."""
 
 RECORDED: Final = "recorded"
-"""Name that stands for the labels of the session itself; no annotator can have it."""
+"""Name for the labels of the session itself; no annotator can have it."""
 
 LOG_VERSION: Final = "1.0"
 
@@ -93,7 +93,7 @@ class StaleError(AnnotationError):
 
 @dataclass(frozen=True, kw_only=True)
 class Edit:
-    """Edit that a person asks for.
+    """Edit requested by a person.
 
     Attributes:
         action: mark, undo or redo.
@@ -150,7 +150,7 @@ class AnnotationLog:
         text: text of the session.
         path: the file.
         annotator: name of the annotator.
-        annotation: the present marks.
+        annotation: the current marks.
         edits: number of edits so far.
         lines: all edits, in order.
 
@@ -186,7 +186,7 @@ class AnnotationLog:
         check_place(self.path)
         if self.path.exists():
             self._read()
-        if not self.lines:  # there is no log, or a program died while it wrote the beginning of one
+        if not self.lines:  # there is no log, or a program died while it wrote the start of one
             self._torn, self._size, self._extent = self._torn + self._size, 0, Extent()
             self.pre_annotated = pre_annotation
         if not self.lines and start is not None:
@@ -217,9 +217,9 @@ class AnnotationLog:
             source: annotator whose marks are copied, in the final version.
 
         Raises:
-            AnnotationError: the change does not fit the text, or the log is full or a link.
+            AnnotationError: the change does not match the text, or the log is full or a link.
             StaleError: another program has written to the log.
-            OSError: the log cannot be written; then nothing of the edit is kept.
+            OSError: the log cannot be written; then no part of the edit is kept.
         """
         check_change(change, self.text)
         done = self.annotation.after(change).difference(self.annotation)

@@ -13,7 +13,7 @@ from dorothie_gym.errors import AnnotationError
 from dorothie_gym.support.input_files import MAX_SESSION_TEXT, MAX_VALUES, MIB
 
 MAX_LINES: Final = 50_000
-"""Most lines of a log; a long session takes some 3,000 edits."""
+"""Maximum number of lines of a log; a long session takes some 3,000 edits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,4 +94,4 @@ def _cut(path: Path, size: int) -> None:
 
 
 _UNLINKED: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-"""A link or a pipe that is put there in the meantime is neither followed nor waited for."""
+"""A link or pipe that replaces the file in the meantime is neither followed nor waited for."""

@@ -27,8 +27,8 @@ class SpanMark:
         words: number of its words, at least 1.
         move: dialogue move; None if it is not decided.
         slots: slot values.
-        exchange: number of its exchange; None for none.
-        transaction: number of its transaction; None for none.
+        exchange: number of its exchange; None if there is none.
+        transaction: number of its transaction; None if there is none.
         suggested: whether the marks come from the classifier and the annotator has not accepted them yet.
     """
 
@@ -41,7 +41,7 @@ class SpanMark:
 
     @property
     def act(self) -> DialogueAct | None:
-        """Move and slots that the annotator has decided on; None before."""
+        """Move and slots that the annotator has chosen; None if undecided."""
         return None if self.move is None or self.suggested else DialogueAct(self.move, self.slots)
 
 
@@ -88,7 +88,7 @@ Spans: TypeAlias = tuple[SpanMark, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """New marks of some utterances, exchanges and transactions, which replace the former ones.
+    """New marks of utterances, exchanges and transactions, which replace the previous ones.
 
     Attributes:
         utterances: spans by utterance.
@@ -111,7 +111,7 @@ class Annotation:
     Attributes:
         utterances: spans of every utterance of the session.
         exchanges: marks of exchanges that have any; others are undecided.
-        transactions: likewise.
+        transactions: the same for transactions.
     """
 
     utterances: Mapping[UtteranceId, Spans]
@@ -187,14 +187,14 @@ class Annotation:
         return [UnitSpan(span.words, span.transaction, span.act is not None) for _, _, span in self.spans(text)]
 
     def undecided(self, text: SourceText) -> Iterator[str]:
-        """Yields the place of every span without a move that the annotator has decided on."""
+        """Yields the place of every span for which the annotator has not chosen a move."""
         for line, first, span in self.spans(text):
             if span.act is None:
                 yield f"{line.id}, span {line.text(first, span.words)!r}"
 
 
 def check_change(change: Change, text: SourceText) -> None:
-    """Raises `AnnotationError` if a change does not fit the text of its session; names the place."""
+    """Raises `AnnotationError` if a change does not match the text of its session; the message names the place."""
     for id, spans in change.utterances.items():
         line = text.by_id.get(id)
         if line is None:

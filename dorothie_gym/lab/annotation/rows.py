@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dorothie_gym.ontology.slots import LandmarkName
 
 MAX_SPANS: Final = 400
-"""Most spans of an utterance: one for each word of the longest one."""
+"""Maximum number of spans of an utterance: one for each word of the longest one."""
 
 Label: TypeAlias = Annotated[str, Meta(max_length=40)]
 """Label of a vocabulary."""

@@ -31,7 +31,7 @@ _LABELS: Final = ("span", "move", "slots", "exchange", "transaction", EXCHANGE_U
 def recorded_annotation(session: Session, text: SourceText) -> Annotation:
     """Returns the labels of a session as an annotation.
 
-    Acts of one utterance that have no spans of their own, as in some layouts of SDN, get equal parts of its words, in
+    Acts of one utterance that have no spans of their own, as in some layouts of SDN, get equal shares of its words, in
     their order.
 
     Raises:
@@ -116,7 +116,7 @@ def relabelled(session: Session, text: SourceText, annotation: Annotation, annot
     """Returns a session with the labels of an annotation in place of its own.
 
     Everything else is kept, except data of spans or acts that no longer exist: audio, meaning and fluent words
-    of a span with other words. Decisions of the roles are left out: a replay would give the former labels. The header
+    of a span with other words. Decisions of the roles are left out: a replay would give the previous labels. The header
     names the annotator, so that statistics use the stored exchanges and transactions instead of deriving them.
 
     Args:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.recording.session import Session
 
 POSE_STEP: Final = 6
-"""Frames between two poses that a browser gets: 5 a second."""
+"""Frames between two poses that a browser receives: 5 a second."""
 
 WINDOW: Final = 300
 """Frames whose bodies are sent at once: 10 s."""

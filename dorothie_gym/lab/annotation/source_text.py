@@ -46,7 +46,7 @@ class SourceLine:
     offset: int
 
     def text(self, first: int, count: int) -> str:
-        """Returns `count` words from word `first` on."""
+        """Returns `count` words, starting with word `first`."""
         return " ".join(self.words[first : first + count])
 
 

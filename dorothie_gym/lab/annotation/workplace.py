@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from dorothie_gym.archive.corpus import CorpusEntry
 
 MOST_OPEN: Final = 4
-"""Most sessions that are kept in memory."""
+"""Maximum number of sessions that are kept in memory."""
 
 
 class SeatKind(enum.StrEnum):
@@ -96,7 +96,7 @@ class OpenSession:
         self._logs: dict[str, AnnotationLog] = {}
 
     def log(self, seat: Seat) -> AnnotationLog:
-        """Returns the log of a seat, read from the file when it is first asked for."""
+        """Returns the log of a seat, which is read from the file on first use."""
         if seat.log not in self._logs:
             log = AnnotationLog(self.text, self.folder, seat.log)
             if not log.lines and (start := self._start(seat)) is not None:
@@ -112,7 +112,7 @@ class OpenSession:
         return pre_annotation(self.page.session, self.text) if self._pre_annotate else None
 
     def forget(self, seat: Seat) -> None:
-        """Reads the log of a seat again when it is next asked for."""
+        """Discards the log of a seat, so that it is read again on the next use."""
         self._logs.pop(seat.log, None)
 
     def annotations(self) -> dict[str, Annotation]:
@@ -193,7 +193,7 @@ class Workplace:
 
         Raises:
             StaleError: there were later edits.
-            AnnotationError: the change does not fit the session, or there is nothing to undo or redo.
+            AnnotationError: the change does not match the session, or there is nothing to undo or redo.
             OSError: the log cannot be written.
         """
         with self._lock:
@@ -210,10 +210,10 @@ class Workplace:
                 try:
                     log.edit(edit)
                 except OSError:
-                    session.forget(seat)  # what is in the file counts
+                    session.forget(seat)  # the content of the file counts
                     raise
                 done = log.annotation.difference(before)
-            # Only now is it settled with which suggestions a log begins: a server that was started anew may differ.
+            # The suggestions with which a log begins are fixed only now: a restarted server may have others.
             return _state(log, None if base == 0 else done)
 
     # --- adjudication -------------------------------------------------------------------------------------------------

@@ -52,5 +52,5 @@ def pause_reason(seats: Collection[Seat], rules: AbsenceRules, *, started: bool)
     if rules.while_away is WhileAway.PAUSE and any(map(is_missing, roles)):
         return PauseReason.ABSENCE
     if not started and not any(seat.present for seat in seats) and not any(seat.taken_over for seat in roles):
-        return PauseReason.ABSENCE  # nobody is there at all
+        return PauseReason.ABSENCE  # no person is connected
     return None

@@ -34,7 +34,7 @@ class AbsenceRules:
 
     Attributes:
         while_away: immediate effect of an absence.
-        seconds: time to come back [s].
+        seconds: time to return [s].
         then: effect after that time.
 
     Raises:

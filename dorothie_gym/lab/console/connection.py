@@ -12,14 +12,14 @@ import msgspec
 from dorothie_gym.lab.admission import TokenBucket
 
 MOST_WAITING: Final = 300
-"""Messages that may wait for a slow browser; beyond that the connection is closed and can be made again: 30 s."""
+"""Messages that may wait for a slow browser, 30 s; beyond that, the connection is closed and can be reopened."""
 
 BURST, RATE = 60.0, 30.0
 """Messages that a browser may send at once, and per second: a person who holds a key down sends 30 in a second."""
 
 
 class CloseCode(enum.IntEnum):
-    """Codes with which the server closes a connection; browsers do not connect again after those from 4400 on."""
+    """Codes with which the server closes a connection; browsers do not reconnect after codes of 4400 and above."""
 
     RESTART = 1012
     TOO_SLOW = 1013
@@ -48,7 +48,7 @@ class Connection:
         talk: number of lines of the talk that were sent.
         events: number of events that were sent.
         done: last acknowledged command.
-        rate: wanted pictures per second.
+        rate: requested pictures per second.
         pictured: decision of the last picture; None before the first.
         greeted: whether the seat has answered its first message.
     """
@@ -98,7 +98,7 @@ class Connection:
             self._waiting.put_nowait(Closing(code))
 
     async def next(self) -> str | bytes | Closing:
-        """Returns the next text in JSON, the next picture (bytes), or the wish to close the connection."""
+        """Returns the next text in JSON, the next picture (bytes), or the request to close the connection."""
         while True:
             item = await self._waiting.get()
             if isinstance(item, Closing):

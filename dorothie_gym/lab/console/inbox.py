@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.spaces.observations import ObservationMapping
 
 MOST_WAITING: Final = 24
-"""Most commands of one kind that wait; more are refused."""
+"""Maximum number of commands of one kind that wait; more are refused."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +49,8 @@ class TakenActions:
 
     Attributes:
         action: the action of the role.
-        spoken: typed span that begins with it; None for none.
-        done: largest number of the commands that it carries out; 0 for none.
+        spoken: typed span whose speech begins in this decision; None if there is none.
+        done: highest number of the executed commands; 0 for none.
     """
 
     action: RoleAction
@@ -97,7 +97,7 @@ class SeatInbox:
         self._handlers = self._table()[role]
 
     def clear(self) -> None:
-        """Forgets the commands that wait."""
+        """Drops the waiting commands."""
         for queue in self._queues():
             queue.clear()
         self._spans.in_utterance = 0
@@ -113,7 +113,7 @@ class SeatInbox:
             queue.extend(waiting)
 
     def start_turn(self) -> None:
-        """Makes the first span wait until the utterance that the role is speaking is over: a policy began it."""
+        """Delays the first span until the end of an utterance that a policy has begun in the role."""
         self._spans.in_utterance = self._limits.spans
 
     def put(self, command: Command, after: DialogueMove | None = None) -> None:
@@ -135,7 +135,7 @@ class SeatInbox:
             raise MessageError(str(error)) from None
 
     def take(self, observation: ObservationMapping) -> TakenActions:
-        """Returns the action of the present decision: at most one span, one physical and one mental action.
+        """Returns the action of the current decision: at most one span, one physical and one mental action.
 
         Args:
             observation: observation of the role at the decision.

@@ -26,7 +26,7 @@ _Typed: TypeAlias = Annotated[str, Meta(max_length=MAX_TYPED)]
 
 
 class MessageError(DorothieGymError, ValueError):
-    """A message of a browser is malformed, or asks for something that its seat does not offer."""
+    """A message of a browser is malformed, or requests something that its seat does not offer."""
 
 
 class _Message(Struct, tag_field="k", tag=str.lower, forbid_unknown_fields=True, frozen=True):
@@ -46,13 +46,13 @@ class Join(_Message, frozen=True):
 
 
 class Ping(_Message, frozen=True):
-    """Request for an answer with the same number, to measure the way and back."""
+    """Request for an answer with the same number, to measure the round trip."""
 
     c: float
 
 
 class View(_Message, frozen=True):
-    """Wanted pictures through the windscreen, per second; 0 for none."""
+    """Requested pictures through the windscreen per second; 0 for none."""
 
     rate: Literal[0, 1, 2, 5, 10]
 
@@ -128,7 +128,7 @@ class Mark(_Command, frozen=True):
 
 
 class Other(_Command, frozen=True):
-    """Another change of what the Co-Wizard believes."""
+    """Other change of the Co-Wizard's beliefs."""
 
 
 class Weather(_Command, frozen=True):
@@ -192,7 +192,7 @@ class Message(_Command, frozen=True):
 
 
 class Control(_Message, frozen=True):
-    """Control of the session by the experimenter, or a new session, which any seat may request after the last one."""
+    """Control of the session by the experimenter; after a session, any seat may request a new one."""
 
     act: Literal["start", "pause", "resume", "end", "again"]
 

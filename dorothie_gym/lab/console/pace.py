@@ -16,7 +16,7 @@ QUIET_PERIOD: Final = 0.25
 """Time between the ticks of a room in which nothing happens [s]."""
 
 MOST_BEHIND: Final = 0.5
-"""Delay from which on a session no longer catches up with the clock [s]."""
+"""Delay at which a session stops trying to catch up with the clock [s]."""
 
 
 async def run_room(room: Room, threads: Executor, builders: Executor) -> None:

@@ -39,7 +39,7 @@ def pin_rows(
     The columns are landmark, x, y [m], name on the map, x and y of the stopping place [m], and index of the street.
 
     Args:
-        pins: landmarks that the role knows; the names depend on nothing else, so they reveal no other landmarks.
+        pins: landmarks that the role knows; the names depend only on them, so they reveal no other landmarks.
         streets: name of each street.
         places: lanes of the town.
     """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Players:
-    """Policies of the roles that no person plays at present.
+    """Policies of the roles that no person currently plays.
 
     Args:
         engine: engine of the sessions.
@@ -42,13 +42,13 @@ class Players:
                 self.start(role)
 
     def start(self, role: Role) -> None:
-        """Lets the policy of a role play from now on."""
+        """Hands a role over to its policy."""
         policy = self._plans[role].player.make(role, self._engine.limits)
         self._policies[role] = policy
         self._states[role] = policy.initial_state(policy_seed(self._seed, role), self._engine.town)
 
     def stop(self, role: Role) -> None:
-        """Lets a person play a role from now on."""
+        """Hands a role over to a person."""
         self._policies.pop(role, None)
         self._states.pop(role, None)
 
@@ -62,7 +62,7 @@ class Players:
         return frozenset(self._policies)
 
     def actions(self) -> dict[str, ActionMapping]:
-        """Returns the actions of the policies in the present decision, by role."""
+        """Returns the actions of the policies in the current decision, by role."""
         actions: dict[str, ActionMapping] = {}
         inputs = policy_inputs(self._engine, self._policies)
         for role, policy in self._policies.items():

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 class SpanRecordings:
-    """Names of the recordings of the spans that people have said and that are not over yet.
+    """Names of the recordings of spans that people have said and that have not ended yet.
 
-    The engine does not know about recordings. A span is found again by its speaker and words when its utterance is
-    over; spans of the same words are over in the order in which they were said.
+    The engine does not know about recordings. A span is found by its speaker and words when its utterance
+    ends; spans with equal words end in the order in which they were said.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class SpanRecordings:
             yield event if audio is None else replace(event, data={**event.data, "audio": audio})
 
     def _take(self, role: Role, text: str) -> str | None:
-        """Returns the recording of the first span with these words; forgets it, and those before, which were refused.
+        """Returns and removes the recording of the first span with these words; also removes earlier, refused ones.
 
         A span of a policy has none.
         """

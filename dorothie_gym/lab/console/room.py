@@ -44,7 +44,7 @@ class Room:
     """Room of one session after the other, with the same seats.
 
     The thread of the event loop calls `join`, `leave`, `receive`, `start` and `end`, which only append to a queue;
-    everything else happens in `tick`, which one thread at a time may call.
+    all other work is done in `tick`, which one thread at a time may call.
 
     Args:
         engine: engine of the sessions.
@@ -63,7 +63,7 @@ class Room:
         seats: seats by name; roles that a policy plays have none.
         state: state of the room.
         windscreen: pictures through the windscreen; None if there are none.
-        record: record of the present session; None if it is not recorded.
+        record: record of the current session; None if it is not recorded.
         failed: whether an error of the program ended the room.
     """
 
@@ -140,7 +140,7 @@ class Room:
 
     @property
     def wants_pictures(self) -> bool:
-        """Whether a browser has asked for pictures through the windscreen."""
+        """Whether a browser has requested pictures through the windscreen."""
         return any(connection.rate for seat in self._all() for connection in seat.connections)
 
     @property
@@ -151,7 +151,7 @@ class Room:
     # --- a tick -----------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> list[Outgoing]:
-        """Handles incoming messages, plays a decision if the session runs, and returns outgoing messages.
+        """Handles incoming messages, steps the session by one decision if it runs, and returns outgoing messages.
 
         Args:
             now: clock that does not jump [s].
@@ -174,7 +174,7 @@ class Room:
         if self.record is not None:
             try:
                 self.record.close()
-            except OSError as error:  # the disk is full, say: people must learn all the same that the session is over
+            except OSError as error:  # such as a full disk: people must be told in any case that the session has ended
                 logger.warning("the record of a session that failed could not be closed: %s", error)
         return [Outgoing(each, code=CloseCode.FAILED) for seat in self._all() for each in seat.connections]
 
@@ -242,7 +242,7 @@ class Room:
             self._finish()
 
     def _finish(self, *, broken_off: bool = False) -> None:
-        """Closes the record of a session that is over."""
+        """Closes the record of a session that has ended."""
         if self.record is not None:
             self.record.finish(broken_off=broken_off)
         self.state, self._why, self._held = RoomState.OVER, None, False

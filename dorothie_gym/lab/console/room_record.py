@@ -90,7 +90,7 @@ class RoomRecord:
         self._audio.add(name)
 
     def finish(self, *, broken_off: bool) -> None:
-        """Closes the record of a session that is over.
+        """Closes the record of a session that has ended.
 
         Args:
             broken_off: whether it was broken off after the last decision, so that its end is not recorded yet.
@@ -113,7 +113,7 @@ class RoomRecord:
 
 
 def free_folder(parent: Path, name: str) -> Path:
-    """Returns the first folder of a name, or of the name with a number, that does not exist."""
+    """Returns the first folder that does not exist among those with a name, or the name and a number."""
     folder, number = parent / name, 2
     while folder.exists():
         folder, number = parent / f"{name}_{number}", number + 1

@@ -31,9 +31,9 @@ class RoomStatus:
 
     Attributes:
         state: state of the room.
-        why: reason of a pause; None for none.
+        why: reason of a pause; None if there is none.
         plans: plan of the seat of each role.
-        policies: roles that a policy plays at present.
+        policies: roles that a policy currently plays.
     """
 
     state: RoomState
@@ -50,7 +50,7 @@ class SeatFrames:
         seats: seats by name.
         config: settings.
         places: lanes of the town.
-        windscreen: pictures; None for none.
+        windscreen: pictures; None if there is none.
 
     Attributes:
         events: events of the session in JSON types, for spectators.
@@ -161,7 +161,7 @@ class SeatFrames:
     # --- pictures ---------------------------------------------------------------------------------------------------
 
     def pictures(self, *, advanced: bool) -> list[Outgoing]:
-        """Returns the picture through the windscreen for each browser that is due to get one.
+        """Returns the picture through the windscreen for each browser whose next picture is due.
 
         Args:
             advanced: whether a decision was played at this tick.

@@ -45,10 +45,10 @@ JOIN_SECONDS: Final = 10.0
 """Time for the first message of a connection [s]."""
 
 MOST_JOINING: Final = 400
-"""Most websockets that have not joined yet; when there are more, the one that has waited longest is closed."""
+"""Maximum number of websockets that have not joined yet; beyond it, the one that has waited longest is closed."""
 
 MOST_WATCHING: Final = 500
-"""Most websockets at seats that watch; a seat of a role has one at most, and always has room."""
+"""Maximum number of websockets at seats that watch; a seat of a role has one at most, and always has room."""
 
 THREADS: Final = 4
 """Threads for the ticks of all rooms; they share one core, as Python code holds a lock."""
@@ -94,7 +94,7 @@ class Console:
         self._run(room)
 
     def close(self, room: Room) -> None:
-        """Closes a room whose session is over, and the connections of its seats."""
+        """Closes a room whose session has ended, and the connections of its seats."""
         self.rooms.remove(room)
         self._tasks.pop(room).cancel()
         for seat in room.seats.values():
@@ -144,7 +144,7 @@ class Console:
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Plays the sessions as long as the block lasts."""
-        load_grammar()  # otherwise the first thing that a script says keeps its session waiting
+        load_grammar()  # otherwise the first utterance of a script keeps its session waiting
         with (
             ThreadPoolExecutor(THREADS, thread_name_prefix="tick") as threads,
             ThreadPoolExecutor(1, thread_name_prefix="scene") as builders,
@@ -204,7 +204,7 @@ async def _join(console: Console, socket: WebSocket) -> tuple[Room, Seat] | None
 
 
 async def _first_text(console: Console, socket: WebSocket) -> str | None:
-    """Returns the first text, or closes the websocket if it does not come in time, or gives way to newer ones."""
+    """Returns the first text, or closes the websocket if it does not come in time, or must give way to newer ones."""
     loop = asyncio.get_running_loop()
     while len(console.joining) >= MOST_JOINING:
         oldest = next(iter(console.joining))

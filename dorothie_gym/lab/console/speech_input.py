@@ -85,7 +85,7 @@ def typed_acts(message: Say, after: DialogueMove | None) -> tuple[TypedAct, ...]
     """Returns the spans of a typed turn, with the acts of the speaker where they are given.
 
     Raises:
-        MessageError: a label is unknown, or nothing that can be spoken was typed.
+        MessageError: a label is unknown, or the typed text cannot be spoken.
     """
     found = read_typed(message.text, after) if message.spans is None else _confirmed(message.spans, after)
     if not found:

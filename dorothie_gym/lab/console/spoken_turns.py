@@ -1,6 +1,6 @@
 """Speech at the seats: recognition of people's speech, and synthesis of the utterances that they hear.
 
-The browser asks by HTTP with the secret of its seat; the websocket carries the talk itself, as typed text.
+The browser sends audio by HTTP with the secret of its seat; the websocket carries the utterances, as typed text.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class SpokenTurns:
     """
 
     def __init__(self, find: Find) -> None:
-        find_recognizer()  # slow, and reported before somebody speaks
+        find_recognizer()  # slow, and reported before a person speaks
         find_synthesizer()
         self._find = find
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="speech")

@@ -25,10 +25,10 @@ class TalkLog:
 
     Attributes:
         entries: lines in order.
-        awaiting: last move that the seat heard, which an answer may follow; None for none.
+        awaiting: last move that the seat heard, which an answer may follow; None if there is none.
 
     Args:
-        role: role of the seat; None for spectators, who hear everything with its acts.
+        role: role of the seat; None for spectators, who hear all utterances with their acts.
     """
 
     def __init__(self, role: Role | None) -> None:
@@ -50,11 +50,11 @@ class TalkLog:
             self.entries.append({"t": time, "who": Role.AD_WIZARD.value, "text": message})
 
     def read_own(self, said: Sequence[Utterance], time: float) -> None:
-        """Appends the role's own utterances that are over, and all for spectators.
+        """Appends the role's own utterances that have ended, and all for spectators.
 
         Args:
-            said: all utterances of the session that are over.
-            time: present time [s].
+            said: all utterances of the session that have ended.
+            time: current time [s].
         """
         for number in range(self._read, len(said)):
             utterance = said[number]

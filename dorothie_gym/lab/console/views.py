@@ -1,4 +1,4 @@
-"""Views of the roles: JSON for the browser, made of nothing but the role's observation, its mask and the static map."""
+"""Views of the roles: JSON for the browser, made only of the role's observation, its mask and the static map."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class Windscreen:
         self._camera: SessionCamera | None = None
 
     def prepare(self, session: LiveSession) -> None:
-        """Builds the scene of a session, which takes seconds where it is not in the cache."""
+        """Builds the scene of a session, which takes seconds if it is not in the cache."""
         camera = windscreen_camera(session.world.town, session.scenario, session.config, self._config.picture_size)
         self._session, self._camera = session, camera
 
@@ -37,7 +37,7 @@ class Windscreen:
         return self._session is session and self._camera is not None
 
     def picture(self, session: LiveSession) -> bytes:
-        """Returns the picture at the present decision of the session that was prepared, as JPEG."""
+        """Returns the picture at the current decision of the session that was prepared, as JPEG."""
         assert self._camera is not None
         rgb = self._camera.render(session.world).rgb
         assert rgb is not None

@@ -37,8 +37,8 @@ def set_secret(to: Response, request: Request, name: str, secret: str, seconds: 
         request: the request, whose page says whether the cookie needs TLS.
         name: name of the cookie, without the port.
         secret: its value.
-        seconds: how long browsers keep it [s]; None: until they are closed.
-        path: beginning of the paths to which it is sent.
+        seconds: time for which browsers keep it [s]; None: until they are closed.
+        path: prefix of the paths to which it is sent.
     """
     secure = request.url.scheme == "https" or request.headers.get("origin", "").startswith("https:")
     to.set_cookie(

@@ -29,7 +29,7 @@ class Candidate:
     Attributes:
         name: id of the participant.
         role: role.
-        certainty: share of people like this one who come to a session.
+        certainty: share of people in the same position who come to a session.
         movable: whether the role can still be changed.
     """
 
@@ -41,7 +41,7 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class Slot:
-    """Sessions that one group of people is to play.
+    """Sessions planned for one group of people.
 
     Attributes:
         number: number of the slot.
@@ -123,7 +123,7 @@ class Assigner:
 
 
 MOST_SLOTS: Final = 100_000
-"""Most slots of a study."""
+"""Maximum number of slots of a study."""
 
 
 def match(

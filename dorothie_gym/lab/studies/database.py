@@ -73,7 +73,7 @@ class Database:
         """Makes the changes of a block in one step, or none of them if it fails; blocks may be nested.
 
         Raises:
-            StorageError: nothing of the block is stored.
+            StorageError: no part of the block is stored.
         """
         if self._connection.in_transaction:
             yield
@@ -83,13 +83,13 @@ class Database:
             yield
             self.run("COMMIT")
         except BaseException:
-            if self._connection.in_transaction:  # after some errors, SQLite has gone back by itself
+            if self._connection.in_transaction:  # after some errors, SQLite has already rolled back
                 self.run("ROLLBACK")
             raise
 
     @contextlib.contextmanager
     def snapshot(self) -> Iterator[None]:
-        """Reads everything in a block from one moment; changes wait meanwhile, so that it should be short."""
+        """Reads a consistent snapshot in a block; changes wait for its end, so it should be short."""
         self._connection.execute("BEGIN")
         try:
             yield
@@ -149,5 +149,5 @@ class RunLock:
             ) from None
 
     def close(self) -> None:
-        """Gives the lock back."""
+        """Releases the lock."""
         self._connection.close()

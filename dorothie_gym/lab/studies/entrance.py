@@ -16,7 +16,7 @@ _PLACEHOLDER: Final = re.compile(r"[{}<>\[\]%$]")
 """Signs of templates, such as {{%PROLIFIC_PID%}}, ${e://Field/id}, [ID] or <id>; ids of platforms have none of them."""
 
 _NO_VALUES: Final = frozenset(("null", "undefined", "none", "assignment_id_not_available"))
-"""Values, in lower case, that programs write where they have no id; the last one is of MTurk's preview."""
+"""Values, in lower case, that programs write if they have no id; the last one is of MTurk's preview."""
 
 
 def is_placeholder(name: str, value: str) -> bool:
@@ -42,11 +42,11 @@ class Entrance:
 
         Args:
             parameters: parameters of the link; unknown names and placeholders are left out.
-            token: token of an invitation, or of a link for readmission; None for none.
+            token: token of an invitation, or of a link for readmission; None for neither.
             visit: random text of the browser's tab. If an answer is lost in transit, the same tab gets the same place.
 
         Raises:
-            RefusedError: the person takes part already, or the link lacks what the study needs.
+            RefusedError: the person already takes part, or the link lacks a parameter that the study needs.
         """
         records, kept, contact = self._records, self._kept(parameters), self._study.contact
         with records.transaction():

@@ -33,7 +33,7 @@ _CHUNK: Final = 1 << 20
 
 
 def erase(records: StudyRecords, *names: str) -> tuple[list[str], list[str]]:
-    """Deletes everything of participants.
+    """Deletes all data of participants.
 
     Sessions of the participants must not be in progress.
 
@@ -59,7 +59,7 @@ def erase_from_data(records: StudyRecords, *names: str) -> list[str]:
         names: ids of the participants.
 
     Returns:
-        The ids of the sessions whose records are to be removed.
+        The ids of the sessions whose records must be removed.
 
     Raises:
         StorageError: nothing is deleted.
@@ -108,12 +108,12 @@ def _attempt(left: list[str], step: Callable[[], None]) -> None:
 
 
 def is_unfinished(records: StudyRecords) -> bool:
-    """Returns whether an erasure was interrupted, so that `finish_erasures` has something to do."""
+    """Returns whether an erasure was interrupted, so that `finish_erasures` has work to do."""
     return bool(records.pending_erasures() or _forgotten(records))
 
 
 def _forgotten(records: StudyRecords) -> list[str]:
-    """Returns the ids with parameters of links that belong to no participant (any more)."""
+    """Returns the ids with parameters of links that belong to no participant, or no longer to one."""
     known = {row["id"] for row in records.data.rows("SELECT id FROM participants")}
     rows = records.recruitment.rows("SELECT DISTINCT participant FROM parameters")
     return [row["participant"] for row in rows if row["participant"] not in known]
@@ -126,7 +126,7 @@ def _forget_platform_ids(records: StudyRecords) -> None:
 
 
 def _note_removal(records: StudyRecords, session: str) -> None:
-    """Records that nothing of a session is left, once this is durable."""
+    """Records that all data of a session are deleted, once the deletion is durable."""
     sync(records.folder / SESSIONS_FOLDER)
     records.erased(session)
 
@@ -200,7 +200,7 @@ def _reason(path: Path, error: OSError) -> str:
 
 
 def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence[str]) -> list[str]:
-    """Returns the files of a study folder that people have put there and that may still hold something of a person.
+    """Returns other files in a study folder that may still contain data of a person.
 
     Databases and the recordings of other sessions are not searched, because the deleted data there are known.
 
@@ -229,7 +229,7 @@ def find_traces(records: StudyRecords, traces: Sequence[str], sessions: Sequence
 
 
 def _holds(path: Path, wanted: Sequence[bytes]) -> bool:
-    """Returns whether a file has any of some texts; False for one that cannot be read, which other checks report."""
+    """Returns whether a file contains any of the given texts; False if it is unreadable, which other checks report."""
     longest, rest = max(map(len, wanted), default=0), b""
     with contextlib.suppress(OSError), path.open("rb") as file:
         while part := file.read(_CHUNK):

@@ -38,7 +38,7 @@ def explain(reason: str, schema: type, steps: list[tuple[str, str]]) -> str:
 
 
 def _descend(kinds: list[Any], steps: list[tuple[str, str]]) -> list[Any]:
-    """Returns the types that the value at the end of some steps may have."""
+    """Returns the types that the value at the end of the given steps may have."""
     kinds = _alternatives(kinds)
     for name, index in steps:
         below: list[Any] = []

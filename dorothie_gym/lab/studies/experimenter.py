@@ -87,7 +87,7 @@ class Experimenter:
         return answer(self.overview())
 
     async def _readmit(self, gate: Gate, request: Request) -> Response:
-        """Answers with the token of a link with which a person goes on in another browser, once."""
+        """Answers with the token of a link with which a person can continue in another browser once."""
         body = gate.read(request, r.Readmit)
         self._check(request)
         token = self._entrance.readmit(body.participant.strip())

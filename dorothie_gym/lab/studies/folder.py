@@ -49,7 +49,7 @@ def running_study(file: Path, folder: Path) -> Iterator[tuple[Study, StudyRecord
 
 @contextlib.contextmanager
 def open_study(folder: Path) -> Iterator[StudyRecords]:
-    """Yields the records of a study for changes, while no server runs; errors as of `running_study`."""
+    """Yields the records of a study for changes, while no server runs; errors as in `running_study`."""
     check_folder(folder)
     with contextlib.closing(RunLock(folder)), contextlib.closing(StudyRecords(folder)) as records:
         yield records

@@ -36,7 +36,7 @@ LEAST_PATIENCE: Final = 15.0
 """Shortest time for the people of a new session to sit down [s]: pages have to load."""
 
 STOP_SECONDS: Final = 10.0
-"""Longest time for a session to end after it was asked to; then its room is closed as it is [s]."""
+"""Longest time for a session to end on request; after that, its room is closed in any state [s]."""
 
 
 @dataclass(eq=False)
@@ -63,7 +63,7 @@ class OpenRoom:
 
     @property
     def is_over(self) -> bool:
-        """Whether the session is over."""
+        """Whether the session has ended."""
         return self.room is not None and self.room.state is RoomState.OVER
 
 
@@ -77,7 +77,7 @@ class OpenRooms:
         builder: builder of rooms.
         records: records of the study.
         console: server of the rooms.
-        changed: called when participants have to be notified of a change.
+        changed: called when participants must be notified of a change.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class OpenRooms:
                     room = await asyncio.to_thread(self._builder.tutorial, role)
                 else:
                     room = await asyncio.to_thread(self._builder.session, row, place.people)
-        except Exception:  # such as a full disk; the others go on
+        except Exception:  # such as a full disk; the others continue
             logger.exception("%s cannot be opened", "a tutorial" if row is None else f"session {row.id}")
             self._rooms.remove(place)
             if row is not None:
@@ -166,7 +166,7 @@ class OpenRooms:
     # --- progress ---------------------------------------------------------------------------------------------------
 
     def finished(self) -> list[OpenRoom]:
-        """Returns the sessions that are over."""
+        """Returns the sessions that have ended."""
         return [each for each in self._rooms if each.is_over and each.session is not None]
 
     def mind(self, now: float) -> list[OpenRoom]:
@@ -198,7 +198,7 @@ class OpenRooms:
         return max(LEAST_PATIENCE, self._study.absence.seconds)
 
     def _go_on_without(self, room: Room) -> None:
-        """Applies the rules for people who leave to people who do not come back after a restart."""
+        """Applies the rules for people who leave to people who do not return after a restart."""
         if self._study.absence.then is AfterAbsence.END:
             room.end(EndReason.LEFT)
         elif self._study.absence.then is AfterAbsence.SCRIPT:

@@ -1,4 +1,4 @@
-"""Presence of participants: whose browsers ask for news, and their notification."""
+"""Presence of participants, known from their browsers' requests for news, and their notification."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 PRESENT_SECONDS: Final = 8.0
-"""Time after the end of the last request for news for which a person counts as present [s]: a reload takes some."""
+"""Time after the last request for news for which a person counts as present [s]: a reload takes time."""
 
 LONGEST: Final = 60.0
 """Time for which the last sign of a person is remembered [s]."""

@@ -77,7 +77,7 @@ class Progress:
             self._advance(person)
 
     def proceed(self, person: Participant, stage: Stage) -> None:
-        """Ends a stage at the wish of its participant."""
+        """Ends a stage at the request of its participant."""
         check_stage(person.stage, stage)
         if stage is Stage.SESSION:
             self._leave_session(person)
@@ -104,7 +104,7 @@ class Progress:
         return group is not None and person.position < self.study.sessions_each and not self.records.is_broken(group.id)
 
     def _leave_session(self, person: Participant) -> None:
-        """Moves a participant whose session is over to the next stage."""
+        """Moves a participant whose session has ended to the next stage."""
         row = self.session_of(person)
         if row is None or row.reason is None:
             raise RefusedError("The session is still in progress.")
@@ -125,7 +125,7 @@ class Progress:
     # --- sessions ---------------------------------------------------------------------------------------------------
 
     def session_of(self, person: Participant) -> SessionRow | None:
-        """Returns the present session of a participant."""
+        """Returns the current session of a participant."""
         group = self.records.group_of(person.id)
         return None if group is None else self.records.sessions(group.id)[person.position]
 
@@ -143,7 +143,7 @@ class Progress:
     def reopen(self) -> None:
         """Opens the rooms of sessions that were in progress when the last server stopped.
 
-        Ends that the last server could not note any more are noted.
+        Ends that the last server could no longer record are recorded.
         """
         for row in self.records.sessions():
             summary = None if row.reason is not None else self.rooms.summary_left_behind(row)
@@ -202,7 +202,7 @@ class Progress:
                 self.records.set_outcome(name, Outcome.LEFT)
 
     def dissolve(self, place: OpenRoom) -> None:
-        """Sends the people of a session that did not begin, as not all of them came, back to the waiting room."""
+        """Returns the people of a session that did not begin, because some did not come, to the waiting room."""
         row = place.session
         assert row is not None
         logger.info("session %s did not begin: not everybody came", row.id)
@@ -223,7 +223,7 @@ class Progress:
             self._forget(names)
 
     def _forget(self, names: Sequence[str]) -> None:
-        """Deletes people who have not agreed to anything; their invitations can be used again."""
+        """Deletes people who have given no consent; their invitations can be used again."""
         with self.records.transaction():
             for name in names:
                 self.records.free_invitation(name)
@@ -233,10 +233,10 @@ class Progress:
     # --- withdrawal -------------------------------------------------------------------------------------------------
 
     async def withdraw(self, person: Participant) -> bool:
-        """Deletes everything of a person; a session in progress ends for all its people.
+        """Deletes all data of a person; a session in progress ends for all its people.
 
         Returns:
-            Whether nothing is left; otherwise the server tries again.
+            Whether all data are removed; otherwise the server tries again.
 
         Raises:
             StorageError: nothing is deleted; the person takes part as before.
@@ -255,7 +255,7 @@ class Progress:
         return self.finish_erasures()
 
     def finish_erasures(self) -> bool:
-        """Removes the data of deleted people from other files; returns whether nothing is left."""
+        """Removes the data of deleted people from other files; returns whether all are removed."""
         left = finish_erasures(self.records)
         for each in left if left != self._left else []:
             logger.warning("still to be deleted: %s", each)

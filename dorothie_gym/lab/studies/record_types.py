@@ -62,8 +62,8 @@ class Participant:
     Attributes:
         id: pseudonymous id.
         role: role in the sessions; None before the instructions.
-        stage: present stage.
-        position: number of the next session of the participant's group, or of the present one.
+        stage: current stage.
+        position: number of the next session of the participant's group, or of the current one.
         outcome: outcome; None before the end.
         seen: time at which the browser was last heard of [s since 1970].
     """

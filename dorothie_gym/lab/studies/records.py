@@ -102,7 +102,7 @@ class StudyRecords:
         return name, secret
 
     def _new_id(self) -> str:
-        """Returns an unused random id, which says nothing about the person or the order of arrival."""
+        """Returns an unused random id, which reveals nothing about the person or the order of arrival."""
         while True:
             name = "P" + "".join(secrets.choice("23456789ABCDEFGHJKLMNPQRSTUVWXYZ") for _ in range(7))
             if self.participant(name) is None:
@@ -118,7 +118,7 @@ class StudyRecords:
         return [_participant(row) for row in self.data.rows("SELECT * FROM participants ORDER BY id")]
 
     def stage_counts(self) -> dict[Stage, int]:
-        """Returns the number of participants at each stage that has any."""
+        """Returns the number of participants at each stage with participants."""
         rows = self.data.rows("SELECT stage, count(*) AS number FROM participants GROUP BY stage")
         return {Stage(row["stage"]): row["number"] for row in rows}
 
@@ -229,7 +229,7 @@ class StudyRecords:
         return self.data.row(query, digest(token)) is not None
 
     def free_invitation(self, name: str) -> None:
-        """Makes the invitation of a participant valid again, who has not agreed to anything."""
+        """Makes the invitation of a participant who has given no consent valid again."""
         query = "SELECT invitation FROM visits WHERE participant = ?"
         self.data.run(f"UPDATE invitations SET used = 0 WHERE token = ({query})", name)
 
@@ -357,16 +357,16 @@ class StudyRecords:
     # --- erasure ----------------------------------------------------------------------------------------------------
 
     def erase_later(self, sessions: Sequence[str]) -> None:
-        """Records sessions whose recordings have to be removed, also after a crash."""
+        """Records sessions whose recordings must be removed, also after a crash."""
         for session in sessions:
             self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", session)
 
     def pending_erasures(self) -> list[str]:
-        """Returns the ids of the sessions whose records are to be removed."""
+        """Returns the ids of the sessions whose records must be removed."""
         return [row["folder"] for row in self.data.rows("SELECT folder FROM erasures ORDER BY folder")]
 
     def erased(self, session: str) -> None:
-        """Records that nothing of a session is left."""
+        """Records that all data of a session are removed."""
         self.data.run("DELETE FROM erasures WHERE folder = ?", session)
 
 

@@ -191,14 +191,14 @@ class StudyServer:
     def _read(self, request: Request, kind: type[_T]) -> tuple[Participant, _T]:
         """Returns the participant and the body of a request."""
         body = self.gate.read(request, kind)
-        person = self._person(request)  # again, as the body may have taken long to come
+        person = self._person(request)  # again, as the body may have arrived late
         if person is None:
             raise self._not_signed_in()
         self._presence.see(person.id)
         return person, body
 
     def _view(self, person: Participant) -> Response:
-        """Answers with the present view of a participant."""
+        """Answers with the current view of a participant."""
         self._presence.tell()
         found = self._records.participant(person.id)
         return answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))
@@ -272,7 +272,7 @@ class StudyServer:
             raise RefusedError("Please confirm that you want to withdraw.")
         self._withdrawing.add(person.id)
         try:
-            clean = await asyncio.shield(self.progress.withdraw(person))  # also if the browser has gone meanwhile
+            clean = await asyncio.shield(self.progress.withdraw(person))  # also if the browser has disconnected since
         finally:
             self._withdrawing.discard(person.id)
         self._presence.tell()
@@ -294,7 +294,7 @@ def _explain(error: BaseException) -> RequestError | None:
 
 
 def _farewell(request: Request, text: str, *, again: bool = False) -> Response:
-    """Answers a person whose data have been deleted; `again` says whether the page offers to begin anew."""
+    """Answers a person whose data have been deleted; `again`: whether the page offers to start again."""
     gone = answer({"gone": text, "again": again})
     gone.delete_cookie(cookie_name(request, COOKIE), httponly=True, samesite="strict")
     return gone

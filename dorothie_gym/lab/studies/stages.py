@@ -20,7 +20,7 @@ class Stage(enum.StrEnum):
 
     CONSENT = "consent"
     BEFORE = "before"
-    """Questionnaire before everything."""
+    """Questionnaire before the sessions."""
     INSTRUCTIONS = "instructions"
     TUTORIAL = "tutorial"
     LOBBY = "lobby"
@@ -45,7 +45,7 @@ class Outcome(enum.StrEnum):
     LEFT = "left"
     """The participant left a session and came back after its end."""
     NO_PARTNER = "no partner"
-    """The participant waited in vain and played no session."""
+    """The participant found no partner and played no session."""
 
 
 QUESTIONNAIRES = {
@@ -59,11 +59,11 @@ _ORDER = list(Stage)
 
 
 def next_stage(study: Study, stage: Stage, *, more_sessions: bool = False) -> Stage:
-    """Returns the stage after another one; stages that the study does not have are left out.
+    """Returns the stage after the given one, without stages that the study does not have.
 
     Args:
         study: the study.
-        stage: stage that is over.
+        stage: stage that has ended.
         more_sessions: whether the participant has another session to play.
     """
     if stage is Stage.AFTER_SESSION and more_sessions:

@@ -215,7 +215,7 @@ Questionnaire: TypeAlias = Annotated[list[Item], Meta(max_length=200)]
 
 
 class Questionnaires(_Part, frozen=True, kw_only=True):
-    """Questionnaires before everything, after each session, and after the last one; empty ones are left out."""
+    """Questionnaires before the sessions, after each session, and after the last one; empty ones are left out."""
 
     before: Questionnaire = []
     after_session: Questionnaire = []
@@ -235,7 +235,7 @@ class Study(_Part, frozen=True, kw_only=True):
         questionnaires: questionnaires.
         assignment: method of assignment.
         session: settings of the sessions.
-        tutorial: tutorial drive; None for none.
+        tutorial: tutorial drive; None if there is none.
         absence: rules for people who leave.
         waiting_room: rules of the waiting room.
         recruitment: recruitment.

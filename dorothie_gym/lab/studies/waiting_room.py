@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 GONE_SECONDS: Final = 20.0
-"""Time after the last sign of a page after which its person is not counted on any more [s]; a reload takes some."""
+"""Time after the last sign of a page after which its person no longer counts as available [s]; a reload takes time."""
 
 CERTAINTY: Final = {Stage.LOBBY: 1.0, Stage.TUTORIAL: 0.93, Stage.INSTRUCTIONS: 0.85}
 """Share of people at the stages before a session who come to it, if 30 % of all drop out (`benchmarks/arrivals.py`)."""
@@ -54,7 +54,7 @@ class WaitingRoom:
         return [(person, now - self._waiting_since[person.id]) for person in self._waiting()]
 
     def forget(self, name: str) -> None:
-        """Forgets since when a participant has waited."""
+        """Clears the start of a participant's wait."""
         self._waiting_since.pop(name, None)
 
     def has_waited_in_vain(self, name: str) -> bool:
@@ -94,13 +94,13 @@ class WaitingRoom:
             self._records.set_role(person.id, role)
 
     def mend_roles(self) -> bool:
-        """Changes the role of a person who reads the instructions or practises, if others would otherwise wait in vain.
+        """Changes the role of a person who reads the instructions or practises, if others would find no partner.
 
         Returns:
             Whether a role has changed.
         """
         there = self._there()
-        if there == self._looked_at or time.monotonic() - self._opened < GONE_SECONDS:  # pages come back first
+        if there == self._looked_at or time.monotonic() - self._opened < GONE_SECONDS:  # pages reconnect first
             return False
         self._looked_at = there
         change = changed_role(self._assigner, there, self._records.taken_slots())

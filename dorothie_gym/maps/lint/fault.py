@@ -1,4 +1,4 @@
-"""Fault of a town, and the dimensions of the car that the roads must fit."""
+"""Fault of a town, and the dimensions of the car for which roads must have room."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class Corner:
         rounded = (from_middle @ start.along > 0.0) & (from_middle @ end.along < 0.0)
         depth = self.beyond(places)
         depth = np.where(rounded, np.minimum(depth, (self._radius - distance) / scale), depth)
-        # The kerb ends at the mouths: another street begins behind them.
+        # The kerb ends at the mouths: another street begins there.
         between = ((places - kerb) @ start.along > 0.0) & ((places - kerb_behind) @ end.along < 0.0)
         result: Array = np.where(between, np.maximum(depth, 0.0), 0.0)
         return result
@@ -264,7 +264,7 @@ def _fault(samples: LaneSamples, rows: slice, over: Array, what: str) -> Fault:
 
 
 def _car_sides(samples: LaneSamples, rows: slice) -> Array:
-    """Returns the left side, middle and right side of a car along a lane (n, 3, 2) [m]."""
+    """Returns the left side, centre and right side of a car along a lane (n, 3, 2) [m]."""
     sides: Array = samples.points[rows, None] + _SIDES[:, None] * samples.right[rows, None]
     return sides
 

@@ -60,7 +60,7 @@ def _turn(town: Town, link: LaneLink) -> Iterator[Fault]:
 
 
 def _fits(kind: LinkType, angle: float) -> bool:
-    """Returns whether a type fits a turn by an angle [degrees], positive left."""
+    """Returns whether a type matches a turn by an angle [degrees], positive left."""
     if kind is LinkType.STRAIGHT:
         return abs(angle) < LARGEST_STRAIGHT
     if kind is LinkType.U_TURN:

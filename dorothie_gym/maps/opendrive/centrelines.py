@@ -66,7 +66,7 @@ class RoadSamples:
             x = self.x[here] - across * pn.sin(self.heading[here])
             y = self.y[here] + across * pn.cos(self.heading[here])
             z = self.z[here] + lateral * pn.sin(self.tilt[here])
-            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y south from here on
+            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y points south below
         return np.concatenate(rows)
 
 
@@ -114,7 +114,7 @@ def _is_open(widths: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
 def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
     """Removes the samples at the ends of a centre line (n, 4) where the lane is still opening or already closing."""
     wide = np.flatnonzero(_is_open(line[:, 3]))
-    if not len(wide):  # a width that is no number
+    if not len(wide):  # a width that is not a number
         return line
     first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
     kept = line[first : last + 1]
@@ -158,7 +158,7 @@ def sample_road(road: RoadRecord) -> RoadSamples:
 def _lateral_places(
     road: RoadRecord, section: int, ds: Array, pick: Array, offset: Array
 ) -> dict[int, tuple[Array, Array]]:
-    """Returns lateral position and width of the lanes of a section, stacked from the middle outwards.
+    """Returns lateral position and width of the lanes of a section, stacked from the centre outwards.
 
     A lane with a border ends at it regardless of the lanes between (OpenDRIVE 1.7, section 11.6.2).
     """
@@ -189,7 +189,7 @@ def thin(line: Array) -> Array:
     longest = np.where(curvature > _STRAIGHT_CURVATURE, _LONGEST_CURVE_STEP, _LONGEST_STEP)
     spacing = np.clip(np.sqrt(8.0 * _CHORD_ERROR / np.maximum(sharpest, 1e-9)), _SHORTEST_STEP, longest)
     spacing = np.concatenate((spacing[:1], np.minimum(spacing[:-1], spacing[1:]), spacing[-1:]))  # (count,) intervals
-    points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # how many points until here
+    points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # number of points so far
     total = max(1, int(np.ceil(points[-1] - 1e-9)))
     return _at(np.interp(np.linspace(0.0, points[-1], total + 1), points, grid), station, line)
 

@@ -130,7 +130,7 @@ class _Ways:
 
 
 def _names(road: RoadRecord, record: SignalRecord, lane: int) -> bool:
-    """Returns whether a signal applies to a lane; the orientation decides if it lists both directions or none."""
+    """Returns whether a signal applies to a lane; if it lists both directions or none, the orientation decides."""
     spans: list[tuple[float, float]] = [(min(span), max(span)) for span in record.lanes] or [(-math.inf, math.inf)]
     if not any(low <= lane <= high for low, high in spans):
         return False
@@ -145,7 +145,7 @@ def _signal(
     x, y, heading = (float(v[0]) for v in road.line.place(s))
     z = float(road.elevation.at(s)[0]) + record.z
     position = (x - record.t * pn.sin(heading), -(y + record.t * pn.cos(heading)), z)
-    if ruled:  # exporters disagree about orientation and hOffset; a signal faces those who have to heed it
+    if ruled:  # exporters disagree about orientation and hOffset; a signal faces the traffic to which it applies
         facing = float(lanes[ruled[0]].headings[-1]) + np.pi
     else:
         facing = -(heading + record.heading + (0.0 if record.orientation == "-" else np.pi))
@@ -184,7 +184,7 @@ NARROWEST_SIDEWALK = 0.5
 # Shortest sidewalk [m].
 SHORTEST_SIDEWALK = 1.0
 
-# Largest jump of a middle line from one sample to the next [m].
+# Largest jump of a centre line from one sample to the next [m].
 LARGEST_JUMP = 2.0
 
 # Largest gap between joined sidewalks of successive lane sections [m].
@@ -203,7 +203,7 @@ def lay_sidewalks(
     """
     street: dict[tuple[int, bool], int] = {}
     for lane in lanes:
-        for left in (lane.lane_id > 0, lane.lane_id < 0):  # the other side's lanes stand in where a side has none
+        for left in (lane.lane_id > 0, lane.lane_id < 0):  # the other side's lanes are used where a side has none
             if lane.street != NO_STREET:
                 street.setdefault((lane.road_id, left), lane.street)
     found = [
@@ -219,7 +219,7 @@ def lay_sidewalks(
 
 
 def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[Array]:
-    """Yields the middle lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
+    """Yields the centre lines (n, 4) of the sidewalks at one side of a road: x, y, z, width [m]."""
     open_: list[Array] = []
     for k, section in enumerate(road.sections):
         begun = []
@@ -234,7 +234,7 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
 
 
 def _wide_parts(line: Array) -> list[Array]:
-    """Returns the parts of a middle line with sufficient width, split at jumps in the profiles."""
+    """Returns the parts of a centre line with sufficient width, split at jumps in the profiles."""
     wide = line[:, 3] >= NARROWEST_SIDEWALK
     step = pn.hypot(*np.diff(line[:, :2], axis=0).T)
     edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1

@@ -225,7 +225,7 @@ def _open_ring(corners: Array) -> Array:
 # Largest length of a road [m]; a longer one is an error that would exhaust memory.
 LONGEST_ROAD = 100_000.0
 
-# Largest length of all lanes [m], likewise. The roads of a CARLA map of 10 km x 10 km have 800 km of lanes.
+# Largest total length of lanes [m], for the same reason. Roads of a CARLA map of 10 km x 10 km have 800 km of lanes.
 LONGEST_LANES = 4_000_000.0
 
 # Tolerance for the start of a lane section beyond the end of its road [m]: exporters round.
@@ -375,7 +375,7 @@ class _Parser(ElementReader):
     def _road_link(self, road: Element, side: str) -> RoadLink | None:
         """Returns the road or junction at an end of a road; None for -1, or for a position midway along another road.
 
-        The latter occurs at virtual junctions (OpenDRIVE 1.6): a side road leaves a main road without lanes that end
+        This occurs at virtual junctions (OpenDRIVE 1.6): a side road leaves a main road without lanes that end
         there: such a road has no continuation at that end.
         """
         link = road.find(f"link/{side}")

@@ -1,6 +1,6 @@
 """Topology of an OpenDRIVE file: lane sections linked, contracted and merged to lanes, with turn types.
 
-A file divides a road into lane sections wherever anything changes, often every few millimetres. A lane of a town is a
+A file divides a road into lane sections at every change, often every few millimetres. A lane of a town is a
 chain of one-to-one linked lane sections of one road; it ends where it forks, merges or enters another road.
 """
 

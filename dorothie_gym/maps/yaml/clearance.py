@@ -66,7 +66,7 @@ def _radius(crossing: Crossing, arms: Sequence[Arm], trims: Mapping[tuple[int, b
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Samples:
-    """Points on the middles of roads, those of segments first, then those of crossings.
+    """Points on the centres of roads, those of segments first, then those of crossings.
 
     Attributes:
         points: where they are (n, 3) [m].
@@ -93,7 +93,7 @@ def check_clearance(
     """Checks all roads and all paths through crossings against each other.
 
     Raises:
-        TownError: two of them touch at one level without meeting there.
+        TownError: two roads touch at one level without meeting there.
     """
     samples = _samples(crossings, segments, centrelines, ways)
     # samples farther apart than the width of the widest road cannot touch

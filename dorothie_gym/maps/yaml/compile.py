@@ -1,4 +1,4 @@
-"""YAML town compiler: from the layout to a `Town` with lanes, connectors, links, and everything beside the roads."""
+"""YAML town compiler: from the layout to a `Town` with lanes, connectors, links, and objects beside the roads."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def _kinds(layout: Layout, crossing: Crossing) -> dict[int, SignalKind]:
 
 
 def _heads(approach: Approach, kind: SignalKind, number: int) -> list[_Head]:
-    """Returns the signals of an approach, with ids from `number` on."""
+    """Returns the signals of an approach, with ids that count up from `number`."""
     street, through, pocket = approach.arm.street, approach.through, approach.pocket
     kerb = through[0]
     aside = kerb.widths[-1] / 2.0 + SIGNAL_ASIDE

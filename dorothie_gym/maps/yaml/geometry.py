@@ -200,9 +200,9 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
 
 
 def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float]:
-    """Returns the distances of the middles of the bends along the `rounded` polyline [m]."""
+    """Returns the distances of the centres of the bends along the `rounded` polyline [m]."""
     stations, here = list[float](), 0.0
-    shortened = 0.0  # what the bend before takes of the leg
+    shortened = 0.0  # the share of the leg that the previous bend uses
     for k, radius in enumerate(radii, start=1):
         turn = abs(turn_at(points[k - 1], points[k], points[k + 1]))
         tangent = radius * pm.tan(turn / 2.0)
@@ -222,7 +222,7 @@ def connect(entry: Pose, exit_: Pose) -> Curve:
 
 
 def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
-    """Returns one arc between the lines through both poses, if they meet ahead of the first and behind the second."""
+    """Returns one arc between the lines through both poses if they meet ahead of the first and behind the second."""
     turn = wrap_radians(exit_[2] - entry[2])
     if abs(pm.sin(turn)) < 1e-3:  # as good as parallel
         return None

@@ -173,7 +173,7 @@ def lay_out(plan: TownPlan) -> Layout:
     """Computes the layout of a plan.
 
     Raises:
-        TownError: streets or junctions do not fit.
+        TownError: streets or junctions do not fit together.
     """
     streets, crossings, segments = _graph(plan)
     ends: dict[int, list[tuple[int, bool]]] = {crossing.id: [] for crossing in crossings}

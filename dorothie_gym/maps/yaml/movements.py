@@ -69,7 +69,7 @@ def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], segments: Sequence[S
     result = []
     for arm in arms:
         if arm in wanted and LinkType.LEFT in _kinds(arms, arm, slips).values() and arm.incoming:
-            # between the middle of the median and the incoming lanes, which are on the left seen outwards
+            # between the centre of the median and the incoming lanes, which are on the left seen outwards
             pocket = LaneEnd(POCKET, -segments[arm.segment].section.pocket)
             arm = replace(arm, incoming=(*arm.incoming, pocket))
         result.append(arm)

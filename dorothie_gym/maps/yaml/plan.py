@@ -24,7 +24,7 @@ CourseStep: TypeAlias = "str | Bend"
 
 @dataclass(frozen=True, kw_only=True)
 class RoundaboutPlan:
-    """Roundabout: radius of the middle line [m], number of lanes, speed limit [km/h]."""
+    """Roundabout: radius of the centre line [m], number of lanes, speed limit [km/h]."""
 
     radius: float
     lanes: int

@@ -1,7 +1,7 @@
 """Schema of the YAML town language: reads a file into a validated plan.
 
 docs/towns.md describes the language. The checks here need no geometry: keys, types, ranges, names, and references
-between elements. The layout checks whether everything fits geometrically.
+between elements. The layout checks the geometry.
 
 A village::
 
@@ -201,7 +201,7 @@ JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
 ROUNDABOUT_SPEED = 30.0
 """Default speed limit of roundabouts [km/h], unless that of the town is lower."""
 ROUNDABOUT_RADIUS = (8.0, 150.0)
-"""Range of radii of the middle line of a ring [m]."""
+"""Range of radii of the centre line of a ring [m]."""
 ROUNDABOUT_LANES = (1, 3)
 
 

@@ -15,7 +15,7 @@ from dorothie_gym.maps.yaml.plan import Bend, JunctionPlan, StreetPlan, TownPlan
 class CrossSection:
     """Cross-section of a street in the direction of its course; offsets are positive to the right [m].
 
-    The line is the middle of the median of a two-way street, and the middle of the lanes of a one-way street.
+    The line is the centre of the median of a two-way street, and the centre of the lanes of a one-way street.
     """
 
     street: StreetPlan

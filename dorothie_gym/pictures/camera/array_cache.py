@@ -45,7 +45,7 @@ def through_cache(
     Args:
         folder: name of the folder in the cache.
         key: bytes that determine the content, in addition to the sources of the camera.
-        most: largest number of archives in the folder; the oldest are removed beyond it.
+        most: maximum number of archives in the folder; the oldest are removed beyond it.
         build: makes the content.
         pack: returns the arrays of the content.
         unpack: returns the content of such arrays; `KeyError` and `ValueError` mean that they are damaged.
@@ -98,11 +98,11 @@ def table_of(arrays: Arrays, name: str, kind: Callable[..., Table]) -> Table:
 
 @functools.cache
 def builder_digest() -> str | None:
-    """Returns a digest of everything except the town that determines its scene; None if it cannot be read."""
+    """Returns a digest of all that determines the scene of a town except the town itself; None if it cannot be read."""
     compiler = compiler_digest()
     if compiler is None:
         return None
-    import shapely  # here: what is in the cache does not need it
+    import shapely  # here: cached entries do not need it
 
     versions = [importlib.metadata.version(name) for name in ("highway-env", "pillow", "shapely")]
     digest = hashlib.sha256(f"{compiler} {versions} {shapely.geos_version_string}\n".encode())

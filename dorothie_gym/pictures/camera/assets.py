@@ -17,7 +17,7 @@ from dorothie_gym.pictures.camera.sky import sky_noise
 from dorothie_gym.support.copying import shared
 
 ASSETS_KEPT = 4
-"""Largest number of entries, of different versions of the package; one takes 6 MB."""
+"""Maximum number of entries, of different versions of the package; one takes 6 MB."""
 
 
 @shared

@@ -25,7 +25,7 @@ STREET_GROUND: Ink = (0, 96, 60)
 
 
 class Texture(enum.IntEnum):
-    """Textures of every town, by their index; street names follow from `STREET_NAMES` on.
+    """Textures of every town, by their index; street names follow at `STREET_NAMES`.
 
     Textures with windows show four bays by four storeys in one repeat.
     """

@@ -75,7 +75,7 @@ def surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> N
 
 @inlined
 def _copy(view: View, bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) -> bool:
-    """Writes a triangle, unless it is seen from behind; returns whether it is not."""
+    """Writes a triangle unless it is seen from behind; returns whether it was written."""
     c, s = body.cos, body.sin
     if body.rise == 0.0:  # a quick look in the frame of the model
         x, y = view.origin[0] - body.x, view.origin[1] - body.y

@@ -37,7 +37,7 @@ def snapshot_of(bodies: Bodies) -> BodySnapshot:
 def bodies_between(before: BodySnapshot, after: BodySnapshot, share: float) -> BodySnapshot:
     """Returns the bodies at a share of the time between two snapshots of one world, moved along straight lines.
 
-    Bodies that have appeared in between, whose row has another key or none before, are where they appeared.
+    Bodies that have appeared in between, whose row had another key or none before, stay where they appeared.
     """
     return BodySnapshot(
         _between(VehicleRecord, before.vehicles, after.vehicles, share),

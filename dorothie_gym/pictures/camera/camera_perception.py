@@ -39,7 +39,7 @@ class CameraPerception(CachedViews):
     """Bodies and landmarks that the camera on the car of a session shows.
 
     Attributes:
-        in_view: indices of the landmarks that are recognised at the present decision, ascending.
+        in_view: indices of the landmarks that are recognised at the current decision, ascending.
         recognised: indices of the landmarks that have been recognised so far, in the order of the first time.
     """
 
@@ -73,7 +73,7 @@ class CameraPerception(CachedViews):
         return empty_records(SeenRecord, 0)
 
     def look(self) -> None:
-        """Looks at the present decision."""
+        """Updates to the current decision."""
         boxes = self._camera.render(self._world).bodies
         self._pixels = dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))
         self.in_view = tuple(

@@ -1,4 +1,4 @@
-"""Square cells of a mesh, drawn from the near to the far ones as far as they are in view and not hidden."""
+"""Square cells of a mesh, drawn from near to far if they are in view and not hidden."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def sorted_by_cell(mesh: Mesh, size: float = CELL) -> tuple[Mesh, CellTable, NDA
 
 
 def new_order(cells: CellTable, width: int, height: int) -> CellOrder:
-    """Returns scratch space for some cells and a picture."""
+    """Returns scratch space for the given number of cells and a picture."""
     count, rows, columns = len(cells.ranges), -(-height // TILE), -(-width // TILE)
     return CellOrder(
         np.zeros(_RINGS + 1, np.int32),
@@ -188,7 +188,7 @@ def _sort_cells(view: View, cells: CellTable, scratch: CellOrder) -> None:
 
 @compiled
 def is_in_view(view: View, low: Array, high: Array) -> bool:
-    """Returns whether a box (3,), (3,) [m] touches the pyramid of the picture; for some boxes beside it as well."""
+    """Returns whether a box (3,), (3,) [m] touches the view frustum; also True for some boxes beside it."""
     wide, tall = 0.5 * view.width / view.focal, 0.5 * view.height / view.focal
     for side in range(5):
         across = 0 if side < 2 else 1
@@ -246,7 +246,7 @@ def _least(line: NDArray[np.float32], k: int) -> np.float32:
 
 @compiled
 def is_hidden(view: View, tiles: NDArray[np.float32], low: Array, high: Array) -> bool:
-    """Returns whether all samples that a box (3,), (3,) [m] may cover see something nearer than the whole box."""
+    """Returns whether all samples that a box (3,), (3,) [m] may cover see a surface nearer than the whole box."""
     left, right, top, bottom, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
     for corner in range(8):
         x = (high[0] if corner & 1 else low[0]) - view.origin[0]

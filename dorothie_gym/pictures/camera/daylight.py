@@ -57,8 +57,8 @@ class Daylight(NamedTuple):
         rainfall: strength of the rain in [0, 1].
         wetness: wetness of the road in [0, 1].
         lamps: strength of street lamps, lit windows and signs in [0, 1].
-        head_lights: strength of the car's head lights in [0, 1].
-        beams: strength of the head lights of other vehicles in [0, 1].
+        head_lights: strength of the car's headlights in [0, 1].
+        beams: strength of the headlights of other vehicles in [0, 1].
     """
 
     sun: Array
@@ -86,7 +86,7 @@ def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
 
     Args:
         weather: the ten parameters.
-        head_lights: whether the car's head lights are on.
+        head_lights: whether the car's headlights are on.
     """
     value = weather.values
     altitude = value[WeatherParameter.SUN_ALTITUDE_ANGLE]
@@ -98,7 +98,7 @@ def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
     horizon = _between(_sky(_CLEAR_HORIZON, _WARM_HORIZON, _GREY_HORIZON, warm, clouds), _NIGHT_HORIZON, 1.0 - bright)
     zenith = _between(_sky(_CLEAR_ZENITH, _WARM_ZENITH, _GREY_ZENITH, warm, clouds), _NIGHT_ZENITH, 1.0 - bright)
     fogginess = weather.above_clear(WeatherParameter.FOG_DENSITY)
-    haze = min(1.0, _HAZE * fogginess)  # takes the sun's direct light, and scatters a part of it
+    haze = min(1.0, _HAZE * fogginess)  # blocks the sun's direct light, and scatters a part of it
     sunshine = _SUNSHINE * (1.0 - 0.9 * clouds * clouds) * _share(altitude, -1.0, 5.0) * (1.0 - haze)
     tint = _between(_NOON_TINT, _WARM_TINT, warm) if sunshine > 0.02 else np.array(_SHADE_TINT)
     daily = (_AMBIENT + (_OVERCAST_AMBIENT - _AMBIENT) * max(clouds, haze)) * (1.0 - 0.35 * rainfall)

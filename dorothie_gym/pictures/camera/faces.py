@@ -47,7 +47,7 @@ FACES: Final = 64
 """Number of triangles whose faces are kept; a power of two."""
 
 _EMISSIVE, _GROUND, _LEAF = int(Surface.EMISSIVE), int(Surface.GROUND), int(Surface.LEAF)
-_BIAS = 0.05  # height by which something must be higher to cast a shadow on the ground [m]
+_BIAS = 0.05  # minimum height of a body above the ground for a shadow on it [m]
 
 
 @by_reference

@@ -124,7 +124,7 @@ class Boxes:
 
     Attributes:
         keys: (n,) int32 key of each body.
-        limits: (n, 4) int32 left, top, right and bottom, behind the last pixel [pixels].
+        limits: (n, 4) int32 left, top, right and bottom, the latter two one past the last pixel [pixels].
         pixels: (n,) int32 number of visible pixels.
     """
 
@@ -209,7 +209,7 @@ class FirstPersonCamera:
             weather: weather and sun.
             bodies: moving bodies, as from `model_bank.place_bodies`.
             time: simulated seconds, which move the rain.
-            head_lights: whether the car's head lights are on.
+            head_lights: whether the car's headlights are on.
             faults: faulty sensors, which act on RGB.
         """
         config = self.config
@@ -258,7 +258,7 @@ class FirstPersonCamera:
         placed: int,
         casts_shadows: bool = False,
     ) -> int:
-        """Draws all triangles, and shadows if they are wanted; returns the number of triangles of bodies.
+        """Draws all triangles, and shadows if requested; returns the number of triangles of bodies.
 
         These are copied first if `placed`, which is their number otherwise, is negative.
         """

@@ -1,4 +1,4 @@
-"""Light of the head lights of other vehicles on the road and the objects in front of them.
+"""Light of the headlights of other vehicles on the road and the objects in front of them.
 
 For each picture in the dark, the beams are drawn from above into a map of squares of 1 m, with the height of the road.
 Buildings and vehicles do not stop a beam: it reaches few metres.
@@ -22,11 +22,11 @@ from dorothie_gym.support.compilation.records import RecordArray, by_reference
 SQUARES = 128
 """Squares along each side of the map."""
 
-_AHEAD = 50.0  # [m] from the camera to the middle of the map
+_AHEAD = 50.0  # [m] from the camera to the centre of the map
 _FADING, _FARTHEST = 60.0, 90.0  # [m] from the camera over which beams fade
 _REACH = 26.0  # [m] from the front of a vehicle
 _NARROW, _SPREAD = 1.1, 0.34  # [m] half the width of a beam at the front, and its growth per metre
-_MARGIN = 1.5  # [m] around beams in which the height of the road is noted, too
+_MARGIN = 1.5  # [m] around beams in which the height of the road is also stored
 _SOFT = 4.0  # [m] over which a beam meets the road
 _SQUARED = 180.0  # [m2] distance at which it is half as bright, squared
 _BRIGHTEST = 1.2  # factor of the light
@@ -37,7 +37,7 @@ _FRONT, _LIGHTS = 0.5 * CAR_LENGTH, int(Lamps.LIGHTS)
 
 @by_reference
 class HeadLights(NamedTuple):
-    """Map of the light of head lights.
+    """Map of the light of headlights.
 
     Attributes:
         corner: (2,) x and y of the first square [m], whole numbers.
@@ -60,7 +60,7 @@ def new_head_lights() -> HeadLights:
 def draw_head_lights(
     lights: HeadLights, x: float, y: float, heading: float, bodies: RecordArray[PlacementRecord]
 ) -> None:
-    """Draws the beams of all vehicles before a camera whose lights are on.
+    """Draws the beams of all vehicles in front of a camera that have their lights on.
 
     Args:
         lights: receives the beams.
@@ -105,7 +105,7 @@ def _add_beam(lights: HeadLights, body: PlacementRecord, strength: float) -> Non
 
 @inlined
 def beam_light(lights: HeadLights, x: float, y: float, z: float) -> float:
-    """Returns the factor of the light of head lights at a position [m]."""
+    """Returns the factor of the light of headlights at a position [m]."""
     u, v = x - lights.corner[0] - 0.5, y - lights.corner[1] - 0.5
     i, j = math.floor(u), math.floor(v)
     if i < 0 or j < 0 or i >= SQUARES - 1 or j >= SQUARES - 1:

@@ -57,12 +57,12 @@ _GLOW = (0.8, 0.69, 0.5)  # factors of the light of lit windows
 def light_samples(
     optics: Optics, lamps: LampMap, beams: HeadLights, shadows: ShadowMaps, samples: Samples, count: int
 ) -> None:
-    """Changes the colours of surfaces to those that the camera sees of them, 0..255.
+    """Converts the colours of surfaces to those in the picture, 0..255.
 
     Args:
         optics: numbers of the picture.
         lamps: light of street lamps.
-        beams: light of the head lights of other vehicles, that was drawn for the picture.
+        beams: light of the headlights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: colours, places and surfaces.
         count: number of the samples.

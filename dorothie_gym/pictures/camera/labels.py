@@ -161,7 +161,7 @@ def find_boxes(instance: NDArray[np.int32], keys: NDArray[np.int32], boxes: NDAr
     Args:
         instance: (h, w).
         keys: (n,) ascending; others, and 0, are left out.
-        boxes: (n, 5): left, top, right, bottom (behind the last pixel) [pixels], number of pixels; zeros if unseen.
+        boxes: (n, 5): left, top, right, bottom (one past the last pixel) [pixels], number of pixels; zeros if unseen.
     """
     height, width = instance.shape
     for k in range(len(keys)):

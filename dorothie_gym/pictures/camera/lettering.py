@@ -56,7 +56,7 @@ def lettered(
     for k, row in enumerate(rows):
         middle = height / 2.0 + (k - (len(rows) - 1) / 2.0) * _LINES * points
         left, _, right, _ = font.getbbox(row)
-        # capitals stand in the middle of the panel, whatever hangs below the line
+        # capitals are in the middle of the panel, regardless of descenders
         cap_top, cap_bottom = font.getbbox("H")[1::2]
         pen.text((width / 2.0 - (left + right) / 2.0, middle - (cap_top + cap_bottom) / 2.0), row, font=font, fill=ink)
     pixels = np.asarray(image.resize(size, Image.Resampling.BOX), dtype=np.float32)[::-1]

@@ -30,7 +30,7 @@ HAZE_START = 100.0
 _HAZE = 1.2e-3  # extinction beyond [1/m]
 _SQUARE = 1.0  # [m] width of a square of a map of lamps
 _POOL = 0.75  # factor of the light below a lamp
-_BEAM = 1.5  # factor of head lights at their brightest
+_BEAM = 1.5  # factor of headlights at their brightest
 
 
 @by_reference
@@ -87,10 +87,10 @@ def lamp_light(lamps: LampMap, x: float, y: float) -> float:
 
 @inlined
 def head_light(optics: Optics, x: float, y: float, z: float, slant: float) -> float:
-    """Returns the factor of the light of the car's head lights.
+    """Returns the factor of the light of the car's headlights.
 
     Args:
-        optics: strength of the head lights, and the camera on the car.
+        optics: strength of the headlights, and the camera on the car.
         x: x coordinate of the surface relative to the camera [m].
         y: y coordinate of the surface relative to the camera [m].
         z: z coordinate of the surface relative to the camera [m].

@@ -26,7 +26,7 @@ PLAIN = 0
 """Index of the texture without a pattern."""
 
 PADDING = 8
-"""Columns of `Mesh.components` behind the last triangle, so that vectors of the processor may end there."""
+"""Columns of `Mesh.components` after the last triangle, so that vectors of the processor may end there."""
 
 TOWN = 0
 """Instance of triangles that belong to no body."""
@@ -145,7 +145,7 @@ class MeshBuilder:
             corners: (n, 3, 3) [m].
             colour: (3,) of all, or (n, 3).
             kind: semantic class.
-            coordinates: (n, 3, 2) texture coordinates u, v of the corners; v points up. Zeros where absent.
+            coordinates: (n, 3, 2) texture coordinates u, v of the corners; v points up. Zeros if omitted.
             texture: index in the atlas.
             surface: kind of surface.
             instance: key of the body.
@@ -244,9 +244,9 @@ class MeshBuilder:
             high: height of its top [m].
             colour: (3,) of the walls.
             kind: semantic class.
-            top: (n, 2) corners of the top, those of the base where absent.
-            top_colour: (3,) of top and bottom, that of the walls where absent.
-            repeat: width and height of one repeat of the texture [m]; whole repeats per wall. One where absent.
+            top: (n, 2) corners of the top, those of the base if omitted.
+            top_colour: (3,) of top and bottom, that of the walls if omitted.
+            repeat: width and height of one repeat of the texture [m]; whole repeats per wall. One if omitted.
             texture: index in the atlas, for the walls.
             surface: kind of surface.
             instance: key of the body.

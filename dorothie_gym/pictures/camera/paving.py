@@ -129,7 +129,7 @@ def _add_mixed(
 def _place_ground(
     optics: Optics, ground: GroundArrays, values: Array, places: NDArray[np.int64], face: Face, count: int
 ) -> None:
-    """Writes where samples lie, and all that is the same for all of them."""
+    """Writes the positions of samples and their common values."""
     plane, sheet, inverse = face.plane, face.kind[1], 1.0 / ground.size[0]
     offset, rightward, upward, inward = plane[0], plane[1], plane[2], plane[3]
     sun, bias, ambient = face.light[0], face.light[1], face.light[2]

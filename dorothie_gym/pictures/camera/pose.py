@@ -47,7 +47,7 @@ class CameraPose:
         """Returns the pose of a mount on a car with this pose.
 
         Args:
-            forward: distance in front of the middle of the car [m].
+            forward: distance in front of the centre of the car [m].
             up: above the road, at a right angle to it [m].
             pitch: relative to the car [rad].
         """
@@ -59,7 +59,7 @@ class CameraPose:
 
 @by_reference
 class View(NamedTuple):
-    """Pinhole projection from a pose: square pixels, the principal point in the middle.
+    """Pinhole projection from a pose: square pixels, the principal point in the centre.
 
     Attributes:
         origin: (3,) position [m].

@@ -39,13 +39,13 @@ _BX, _BY = 2 * _STRETCH, 3 * _STRETCH
 _CX, _CY = 4 * _STRETCH, 5 * _STRETCH
 _OFFSET, _CHOICE = 6 * _STRETCH, 7 * _STRETCH
 _QUANTITIES = 8
-_NONE, _WHOLE, _CUT = 0.0, 1.0, 2.0  # what is drawn of a triangle: nothing, all, or what the near plane leaves
+_NONE, _WHOLE, _CUT = 0.0, 1.0, 2.0  # drawn part of a triangle: none, all, or the part beyond the near plane
 
 _ROWS = 4  # whose ends are computed at once
 
-_MARGIN = 0.5 + 1e-6  # [samples] from the left side of a sample to its middle, and a little more
+_MARGIN = 0.5 + 1e-6  # [samples] from the left side of a sample to its centre, and a little more
 
-# what sifting with half the digits may be wrong by, and more: float32 has 24 bits
+# upper bounds of the errors of sifting with half the digits: float32 has 24 bits
 _SLACK = 1e-3  # [m]
 _SHARE = 1e-6  # of the coordinates of the camera
 _SOME = 0.51  # [samples] as `_MARGIN`
@@ -64,7 +64,7 @@ class VisibilityBuffer(NamedTuple):
         kept: (_ROOM,) scratch: their rows.
         parts: (12, _ROOM) float32 scratch: their components, see `Mesh.components`.
         firsts: (h + _ROWS,) scratch: first sample of a triangle in each of its rows.
-        lasts: (h + _ROWS,) scratch: sample behind the last one.
+        lasts: (h + _ROWS,) scratch: sample after the last one.
         corners: (3, 3) scratch: a triangle's corners to the right and up, times the focal length, and forward.
         cut: (4, 2) scratch: the picture coordinates of a triangle clipped by the near plane.
     """
@@ -116,7 +116,7 @@ def collect_triangles(
         buffer: collects the triangles of one mesh.
         mesh: that mesh.
         first: triangle of the range.
-        last: triangle behind the range.
+        last: triangle after the range.
         found: number of the triangles that are collected already.
         shift: number of a triangle minus its row.
 
@@ -141,8 +141,8 @@ def collect_triangles(
 def _sift(view: View, mesh: Mesh, first: int, sifted: NDArray[np.int32], count: int) -> None:
     """Finds the triangles of a batch that may cover a sample: all that do, and few others.
 
-    Nine of ten triangles do not, seen from behind, out of the picture, or between samples. Half the digits suffice for
-    most of them, and twice as many triangles fit into a vector register.
+    Nine of ten triangles do not: they are seen from behind, out of the picture, or between samples. Half the digits
+    suffice for most of these, and twice as many triangles fit into a vector register.
     """
     origin, axes = view.origin, view.axes
     far = max(max(abs(origin[0]), abs(origin[1])), abs(origin[2]))
@@ -178,7 +178,7 @@ def _sift(view: View, mesh: Mesh, first: int, sifted: NDArray[np.int32], count: 
         scale_a, scale_b, scale_c = one / max(a, close), one / max(b, close), one / max(c, close)
         ax, bx, cx = a_right * scale_a, b_right * scale_b, c_right * scale_c
         ay, by, cy = a_up * scale_a, b_up * scale_b, c_up * scale_c
-        around = some + margin * max(max(scale_a, scale_b), scale_c)  # from a corner to the next middle of a sample
+        around = some + margin * max(max(scale_a, scale_b), scale_c)  # from a corner to the next centre of a sample
         low, top = min(min(ay, by), cy), max(max(ay, by), cy)
         left, right = min(min(ax, bx), cx), max(max(ax, bx), cx)
         is_between = (np.ceil(high - top - around) == np.ceil(high - low - one + around)) | (

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 _KINDS = {ActorKind.VEHICLE: Kind.CAR, ActorKind.CYCLIST: Kind.CYCLIST}
 _NO_BODY = -1
 _SAME_PLACE = 1.0  # [m] between a recorded landmark and its site
-_OWN_LOT = 6.0, 5.0  # [m] length and depth of the lot of a landmark that stands at no site of the town
+_OWN_LOT = 6.0, 5.0  # [m] length and depth of the lot of a landmark without a site in the town
 
 
 class RecordedPictures:
@@ -232,7 +232,7 @@ class RecordedPictures:
         before = np.arange(-1, len(rows) - 1)
         _follow(town, x, y, heading, before, np.zeros(len(rows)), heights, odometers)
         for k, lane in enumerate(rows["lane"].tolist()):
-            if 0 <= lane < len(lanes):  # the lane that it follows, of several above each other
+            if 0 <= lane < len(lanes):  # of several lanes above each other, the one that it follows
                 heights[k] = lanes[lane].height_at(lanes[lane].project(np.array([x[k], y[k]]))[0])
         return heights
 
@@ -272,7 +272,7 @@ def _accelerations_of(tracks: ActorTracks) -> Array:
 def _moved_before(tracks: ActorTracks) -> Array:
     """Returns the time for which the actor of each row has probably moved since it appeared (m,) [s].
 
-    Actors of the first record have been there since frame 0, where pedestrians take their first steps in turn.
+    Actors of the first record have existed since frame 0, where pedestrians start to walk one after another.
     """
     first = slice(int(tracks.table.offsets[0]), int(tracks.table.offsets[1]))
     walking = tracks.table.rows["kind"][first] == int(ActorKind.PEDESTRIAN)
@@ -314,7 +314,7 @@ def _follow(
         x: [m].
         y: [m].
         heading: [rad].
-        before: row of the same actor in the record before, -1 for none.
+        before: row of the same actor in the previous record, -1 for none.
         begun: distance of rows without one [m].
         heights: receives the heights [m].
         odometers: receives the driven distances [m].
@@ -357,7 +357,7 @@ def _last_switch(switches: Switches, frame: int) -> bool:
 def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene) -> tuple[TownScene, list[Landmark]]:
     """Returns the landmarks of a header at the sites of the town.
 
-    Landmarks that stand at no site, of other corpora, get additional lots in the returned scene.
+    Landmarks without a site, as in other corpora, have additional lots in the returned scene.
     """
     lots, landmarks = list(scene.lots), []
     for index, row in enumerate(rows):

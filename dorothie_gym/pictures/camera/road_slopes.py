@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _CELL = 5.0  # [m]; samples as far away count
 _LEVEL = 1.5  # [m] of height between a vehicle and its road, at most
-_SMALLEST = 1e-3  # slope from which on samples are kept
+_SMALLEST = 1e-3  # minimum slope of the samples that are kept
 _FAINT = 1e-3  # weight, of 1 for a sample at the place itself, of level ground
 
 
@@ -33,7 +33,7 @@ class RoadSlopes(NamedTuple):
         shape: (2,) columns and rows of cells.
         firsts: (cells + 1,) int32 first sample of each cell.
         places: (n, 3) positions [m].
-        ways: (n, 3) direction along x and y, and rise per metre in it.
+        ways: (n, 3) direction along x and y, and rise per metre in that direction.
     """
 
     origin: Array
@@ -50,7 +50,7 @@ def road_slopes(town: Town) -> RoadSlopes:
     for a, b in samples.bounds.tolist():
         if b - a > 1:
             slope[a:b] = np.gradient(samples.centre[a:b, 2], samples.station[a:b])
-    keep = np.full(len(slope), bool((np.abs(slope) > _SMALLEST).any()))  # level ones as well: beside a slope, say
+    keep = np.full(len(slope), bool((np.abs(slope) > _SMALLEST).any()))  # including level ones, such as beside a slope
     places = samples.centre[keep]
     ways = np.column_stack((pn.cos(samples.heading), pn.sin(samples.heading), slope))[keep]
     if not len(places):
@@ -69,8 +69,7 @@ def road_slopes(town: Town) -> RoadSlopes:
 def rise_at(slopes: RoadSlopes, x: float, y: float, z: float, cos: float, sin: float) -> float:
     """Returns the rise per metre of the road at a position [m] in a direction, 0 beside the roads.
 
-    The slope is that of the plane that fits the surrounding lanes best, so that it changes continuously as a vehicle
-    drives on.
+    The slope is that of the best-fitting plane of the surrounding lanes, so that it changes continuously along a drive.
     """
     if slopes.shape[0] == 0:
         return 0.0

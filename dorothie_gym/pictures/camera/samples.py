@@ -16,7 +16,7 @@ from dorothie_gym.support.compilation import inlined
 from dorothie_gym.support.compilation.records import by_reference
 
 ROOM: Final = 192
-"""Largest number of samples that are shaded together: their quantities fit into the processor's nearest cache."""
+"""Maximum number of samples that are shaded together: their quantities fit into the processor's nearest cache."""
 
 # entries of a quantity; were it a multiple of 512, quantities would compete for the same lines of the processor's cache
 _STRETCH = ROOM + 24
@@ -73,7 +73,7 @@ class Samples(NamedTuple):
             BRIGHT: 1 for surfaces that emit their own colour, 0 otherwise.
             AMBIENT: share of the light of the sky.
             SUN: cosine to the sun, negative for surfaces that face away.
-            BIAS: height by which something must be higher to cast a shadow on the sample [m].
+            BIAS: minimum height of a body above the sample for a shadow on it [m].
             LAMP: share of the light of street lamps.
         indices: whole numbers, intermediate results.
         surfaces: (ROOM,) `Surface` of each sample.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 SCENES_KEPT = 16
-"""Largest number of entries; the oldest are removed beyond it. A scene takes 10 to 30 MB."""
+"""Maximum number of entries; the oldest are removed beyond it. A scene takes 10 to 30 MB."""
 
 
 @functools.lru_cache(maxsize=4)

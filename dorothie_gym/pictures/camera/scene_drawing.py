@@ -45,7 +45,7 @@ def draw_scene(
         bodies: models and places.
         box: (2, 3) scratch space.
         placed: triangles of bodies. If it has too little room, they are not drawn.
-        count: number of triangles in `placed`, negative if they have to be written first.
+        count: number of triangles in `placed`, negative if they must be written first.
         shadows: maps of shadows.
         casts_shadows: whether the picture also needs shadows.
     """

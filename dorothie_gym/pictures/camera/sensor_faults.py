@@ -17,7 +17,7 @@ _ROUNDS = 2  # of means; two make the weights fall off linearly
 
 
 def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch: NDArray[np.uint8]) -> None:
-    """Changes a picture (h, w, 3) as the fault does that leaves least of it.
+    """Applies to a picture (h, w, 3) the fault that degrades it most.
 
     Args:
         picture: picture to change.
@@ -44,7 +44,7 @@ def _take_details(picture: NDArray[np.uint8], scratch: NDArray[np.uint8]) -> Non
 _CHANGES: Mapping[Sensor, Callable[[NDArray[np.uint8], NDArray[np.uint8]], None] | None] = complete(
     {Sensor.BLUR: _take_details, Sensor.GPS: None, Sensor.VIEW: _black_out}, Sensor, "_CHANGES", __name__
 )
-"""Change of the picture by each fault; None for sensors that the picture does not come from."""
+"""Change of the picture by each fault; None for sensors other than the camera."""
 
 
 @concurrent

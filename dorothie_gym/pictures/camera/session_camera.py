@@ -37,12 +37,12 @@ REACH = 250.0
 """Distance up to which bodies are drawn [m]: a car is then two pixels high in a picture of 480 x 320."""
 
 SHADED = 120.0
-"""Distance up to which bodies out of view are listed, for their shadows and head lights [m]."""
+"""Distance up to which bodies out of view are listed, for their shadows and headlights [m]."""
 
 LIGHTS_BELOW = 6.0
 """Altitude of the sun below which cars drive with their lights on [degrees]; also in rain and fog."""
 
-_LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
+_LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # minimum precipitation and density of fog for this [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
 _PAINTS = np.zeros((2, max(Colour) + 1, 3), np.uint8)  # of lenses that are off and on, by `Colour`
 for _colour in Colour:
@@ -68,7 +68,7 @@ class Bodies(Protocol):
 
     @property
     def props(self) -> RecordArray[PropRecord]:
-        """Things on the road; rows that are not present are free."""
+        """Bodies on the road; rows that are not present are free."""
         ...
 
 
@@ -234,7 +234,7 @@ def _place(
                 material = material_at(ground, sheet, body.x, body.y)
                 if ground.outside[sheet] == _NOTHING:  # a bridge, on which there are no kerbs
                     raised &= material == _NOTHING
-                else:  # a tunnel, with kerbs below whatever is above
+                else:  # a tunnel, with kerbs below the structures above it
                     raised |= _RAISED[material] and body.z < _BELOW
             if raised:
                 body.z += KERB_HEIGHT

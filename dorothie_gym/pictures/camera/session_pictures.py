@@ -49,13 +49,13 @@ class SessionPictures(CachedViews):
         return camera_of(self._world.town, self._scenario, self._config)
 
     def frame(self, decision: int) -> CameraFrame:
-        """Returns the picture at the present decision, of this number."""
+        """Returns the picture at the current decision, of this number."""
         if self._taken is None or self._taken[0] != decision:
             self._taken = decision, self._camera.render(self._world)
         return self._taken[1]
 
     def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
-        """Adds the pictures of the present decision to the observations of the roles that see them."""
+        """Adds the pictures of the current decision to the observations of the roles that see them."""
         for role in OBSERVERS:
             if role in observations:
                 observations[role].update(self._fields(decision))

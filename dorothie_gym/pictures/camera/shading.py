@@ -55,7 +55,7 @@ def shade(
         light: light and air.
         noise: noise of the sky.
         lamps: light of street lamps on the ground.
-        beams: light of the head lights of other vehicles, that was drawn for the picture.
+        beams: light of the headlights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: scratch space.
         faces: scratch space, see `new_faces`.
@@ -132,7 +132,7 @@ def _sample(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) 
 
 @compiled
 def _place_of(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) -> tuple[float, float, float]:
-    """Returns the middle and the share of the samples of a pixel that see the triangle of sample k.
+    """Returns the centre and the share of the samples of a pixel that see the triangle of sample k.
 
     The share is 0 if an earlier sample already sees it.
     """
@@ -222,7 +222,7 @@ def _add_run(
 
 @inlined
 def _write(samples: Samples, count: int, picture: NDArray[np.uint8], first: int) -> int:
-    """Writes the colours of pixels from one on; returns the pixel after the last."""
+    """Writes the colours of pixels, starting with a given one; returns the pixel after the last."""
     values, pixel, k = samples.values, first, 0
     while k < count:
         parts = int(samples.parts[k])

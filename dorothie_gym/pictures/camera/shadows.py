@@ -44,7 +44,7 @@ _TILES = 8  # tiles along each side of the map; a power of two
 _SIDE = _TILE * _TILES
 _WRAP = _SIDE - 1
 _BODIES = 512  # width of the map of bodies [squares]
-_PARTS = 64  # parts of the map of bodies that are emptied one by one; with more of them, all of it is
+_PARTS = 64  # used parts of the map of bodies that are cleared singly; if there are more, the whole map is cleared
 _NOTHING = -32768
 _LINE_BELOW = 10.0  # [1/50 m] by which the line of a narrow triangle lies below it: it lights the triangle itself
 _BESIDE = 3.0 * TEXEL  # [m] around a shadow that squares of the map and their mixture darken at most
@@ -59,7 +59,7 @@ class ShadowMaps(NamedTuple):
         town: (n, n) int16 heights [1/50 m], tiles side by side, each at its place modulo their number.
         held: (t, t, 2) int32 place of the tile that is held.
         bodies: (m, m) int16 heights.
-        drawn: (k, 4) int64 parts of the map of bodies that were drawn to: columns and rows, first and behind the last.
+        drawn: (k, 4) int64 used parts of the map of bodies: columns and rows, first and one past the last.
         parts: (1,) int64 number of those parts.
         slope: (2,) shift towards the sun per metre of height [1].
         window: (4,) int64: first square in x and y of the map of the town, and of that of bodies.
@@ -199,7 +199,7 @@ def _draw_tile(maps: ShadowMaps, tile: NDArray[np.int16], mesh: Mesh, cells: Cel
     for cell in range(len(cells.ranges)):
         if _shades(maps, cells.low[cell], cells.high[cell], column, row):
             for k in range(cells.ranges[cell, 0], cells.ranges[cell, 1]):
-                if mesh.instances[k] == TOWN:  # the shadow of a landmark would tell of one that is out of view
+                if mesh.instances[k] == TOWN:  # the shadow of a landmark would reveal one that is out of view
                     _cast(maps, tile, mesh, k, column * _TILE, row * _TILE, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -226,7 +226,7 @@ def _draw_bodies(
     bodies: RecordArray[PlacementRecord],
     lowest: float,
 ) -> None:
-    """Draws the map of bodies, those near its middle whose shadows may be seen on surfaces from a height on [m]."""
+    """Draws the map of bodies, those near its centre whose shadows may be seen on surfaces above a height [m]."""
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
     first, reach, box = maps.window, 0.5 * _BODIES * TEXEL, maps.corners
     _empty_bodies(maps)
@@ -243,7 +243,7 @@ def _draw_bodies(
 
 @inlined
 def _empty_bodies(maps: ShadowMaps) -> None:
-    """Empties the map of bodies: most of it is empty anyway."""
+    """Clears the used parts of the map of bodies, most of which is empty."""
     if maps.parts[0] > _PARTS:
         for y in range(_BODIES):
             _empty(maps.bodies[y])
@@ -288,7 +288,7 @@ def _cast(
     maps: ShadowMaps, target: NDArray[np.int16], mesh: Mesh, k: int, left: int, top: int, x: float, y: float, z: float,
     c: float, s: float,
 ) -> None:  # fmt: skip
-    """Draws a triangle that is turned and moved, if it faces the sun, to a part of a map from a square on."""
+    """Draws a rotated and translated triangle, if it faces the sun, to the part of a map that starts at a square."""
     slope, corners = maps.slope, maps.corners
     nx, ny = mesh.normals[k, 0] * c - mesh.normals[k, 1] * s, mesh.normals[k, 0] * s + mesh.normals[k, 1] * c
     rise = nx * slope[0] + ny * slope[1] + mesh.normals[k, 2]  # of the height, seen from the sun
@@ -365,8 +365,8 @@ def sunlit(
         town_y: first row.
         bodies_x: first column of the map of bodies.
         bodies_y: first row.
-        column: square whose middle is left of the place.
-        row: square whose middle is above the place.
+        column: square whose centre is left of the place.
+        row: square whose centre is above the place.
         a: distance from there to the right [squares].
         b: distance from there downwards [squares].
         level: height above which surfaces cast a shadow on the place [1/50 m].

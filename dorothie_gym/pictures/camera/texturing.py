@@ -80,7 +80,7 @@ def sample_texture(
 
 @inlined
 def _mixed_texel(texels: NDArray[np.uint32], first: int, width: int, height: int, x: float, y: float) -> int:
-    """Returns the bilinear mean of four texels at a place [1/256 texel]: red, blue, green, own light from bit 0 on."""
+    """Returns the bilinear mean of four texels at a place [1/256 texel]: red (lowest bits), blue, green, own light."""
     i, j = math.floor(x) + 128, math.floor(y) + 128
     a, b = i & 255, j & 255
     right, above = (i >> 8) & (width - 1), (j >> 8) & (height - 1)

@@ -88,6 +88,6 @@ class SessionScene:
 
     @cached_property
     def overlay(self) -> Mesh:
-        """Signals and landmarks; the rows of signals come first."""
+        """Signals and landmarks, the rows of signals first."""
         town = self.town
         return joined([town.signals, build_landmarks(self.landmarks, town.lots, town.ground)])

@@ -1,10 +1,10 @@
 """Camera whose pictures determine the roles' perception, and the required numbers of visible pixels.
 
 By Ricco's law, as in `sim.sensing.visibility`, a small target is detected by its area times its contrast: a loss of
-contrast by air, darkness or a fault has to be compensated by proportionally more pixels. Only unhidden pixels count.
+contrast by air, darkness or a fault must be compensated by proportionally more pixels. Only unhidden pixels count.
 
-Johnson (Image Intensifier Symposium, 1958) found how many pairs of lines across the smallest dimension of a target half
-of all observers need: 1 to detect that something is there, 6.4 to identify it. A pair of lines is two pixels.
+Johnson (Image Intensifier Symposium, 1958) measured the number of line pairs across the smallest dimension of a target
+that half of all observers need: 1 to detect an object, 6.4 to identify it. A pair of lines is two pixels.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ PERCEPTION_CAMERA: Final = CameraConfig(outputs=(CameraOutput.BOXES,), antialias
 """Camera of the perception, with the usual size and mount; it does not depend on `EnvConfig.camera`."""
 
 BODY_PIXELS: Final = 8
-"""Visible pixels, at full contrast, from which a body is seen: those of a person at `visibility.CLEAR_SIGHT`, up to
-which the symbolic model sees everything on a clear day. Johnson's criterion is 2 x 2 pixels. Detectors need more: KITTI
-(Geiger et al., CVPR 2012) ignores objects less than 25 pixels high at a focal length of 721 pixels, such as a person
-beyond 50 m, and COCO (Lin et al., ECCV 2014) calls less than 32 x 32 pixels small.
+"""Minimum number of visible pixels of a perceived body, at full contrast: that of a person at `visibility.CLEAR_SIGHT`,
+up to which the symbolic model perceives all bodies on a clear day. Johnson's criterion is 2 x 2 pixels. Detectors need
+more: KITTI (Geiger et al., CVPR 2012) ignores objects less than 25 pixels high at a focal length of 721 pixels,
+such as a person beyond 50 m, and COCO (Lin et al., ECCV 2014) calls less than 32 x 32 pixels small.
 """
 
 LANDMARK_PIXELS: Final = 400

@@ -232,7 +232,7 @@ def _lines(town: Town, samples: TownSamples, kinds: NDArray[np.int64], gap: Arra
     after = _followers(town, samples, runs, edge)
     used = [False] * len(runs)
     followed = frozenset(after.values())
-    # lines with a beginning first; the rest are rings
+    # open lines first; the rest are rings
     for head in (*(k for k in range(len(runs)) if k not in followed), *range(len(runs))):
         chain: list[_Run] = []
         number = head

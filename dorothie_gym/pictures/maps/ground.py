@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.palette import Colour
 
-# Larger holes between connectors are islands (such as the middle of a roundabout), not asphalt [m2].
+# Larger holes between connectors are islands (such as the centre of a roundabout), not asphalt [m2].
 _LARGEST_HOLE = 160.0
 _CLOSING = 2.5  # [m]
-_MOUTH = 6.0  # [m] of the lanes before and behind a junction that belong to its asphalt
+_MOUTH = 6.0  # [m] of the lanes before and after a junction that belong to its asphalt
 _INSET = 0.1  # [m] by which lanes are narrowed: rasterization widens them
 _OUTLINE_SMOOTHING = 5
 _RIM = 2.6  # [m]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 BRIDGE_CLEARANCE = 3.0
-"""Smallest difference of height of a lane that passes over another [m]."""
+"""Minimum height of a lane above another one that it crosses [m]."""
 
 _NEAR = 6.0  # [m] within which samples of two lanes that cross are found
 _REACH = 12.0  # [m] of road drawn as a bridge before and after a crossing, at least
@@ -98,7 +98,7 @@ def _covered(
     """Yields the parts under streets as (lane, start, end): exact for straight roads, independent of the sampling."""
     offset = samples.centre[lower, :2] - samples.centre[upper, :2]
     aside = (offset * right_of(samples.heading[upper])).sum(axis=1)
-    slope = pn.sin(samples.heading[lower] - samples.heading[upper])  # how fast one gets aside
+    slope = pn.sin(samples.heading[lower] - samples.heading[upper])  # rate of the lateral offset along the lane
     slope = np.where(slope < 0.0, -1.0, 1.0) * np.maximum(np.abs(slope), _SKEWEST)
     middle = samples.station[lower] - aside / slope
     reach = samples.half_width[upper] / np.abs(slope) + _COVER

@@ -97,7 +97,7 @@ class MapLayers:
         stretches: bridges and tunnels.
         raised: lookup of the positions on bridges and in tunnels.
         arrows: turn arrows before junctions.
-        pockets: beginnings of turn lanes.
+        pockets: starts of turn lanes.
         ruled: control at the end of each lane that has one.
         stops: station of the (possible) stop line of each lane that leads to a junction [m].
         posts: lights and signs.

@@ -153,7 +153,7 @@ def sheet_painter(
     Args:
         town: town to paint.
         size: width and height of the sheet [px]; by default that of `sheet_size`.
-        street_names: names by street index; the town's own where absent.
+        street_names: names by street index; the town's own if omitted.
 
     Raises:
         ValueError: the size is too small for a title and a map.
@@ -194,7 +194,7 @@ def town_picture(
         town: town to paint.
         path: PNG file; its folder must exist.
         size: width and height [px]; by default that of `sheet_size`.
-        street_names: names by street index; the town's own where absent.
+        street_names: names by street index; the town's own if omitted.
         time: simulated time of the light colours [s]; by default all lamps are on.
         fold: fold of the town, shown beside the figures ("seen", "unseen").
 
@@ -223,7 +223,7 @@ def _measures(town: Town, street_names: Sequence[str], width: int) -> tuple[floa
 
 
 def _unit(width: float) -> float:
-    """Returns the unit of everything around the map [px]: about the height of small type."""
+    """Returns the unit of lengths around the map [px]: about the height of small type."""
     return max(9.0, width / 110.0)
 
 

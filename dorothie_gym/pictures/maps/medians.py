@@ -60,7 +60,7 @@ def held(line: Border, places: LevelLookup, wanted: bool = True) -> Iterator[NDA
 
 
 def flat_strip(line: Border, run: NDArray[np.int64], further: float = 3.0) -> Iterator[Array]:
-    """Yields polygons (n, 2) [m] from the edge to slightly beyond the middle of a median, extended by `further` [m]."""
+    """Yields polygons (n, 2) [m] from the edge to slightly beyond the centre of a median, extended by `further` [m]."""
     edge, inner = line.points[run, :2], line.shifted(-line.gap / 2.0 - 0.1)[run]
     if further:
         edge, inner = longer(edge, further), longer(inner, further)
@@ -69,7 +69,7 @@ def flat_strip(line: Border, run: NDArray[np.int64], further: float = 3.0) -> It
 
 
 def _half_strip(line: Border, run: NDArray[np.int64], inset: float) -> Iterator[Array]:
-    """Yields polygons (n, 2) [m] from the edge to slightly beyond the middle of a median, with round ends."""
+    """Yields polygons (n, 2) [m] from the edge to slightly beyond the centre of a median, with round ends."""
     s = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line.points[run, :2], axis=0).T))))
     fine = np.unique(np.concatenate((np.linspace(0, s[-1], max(2, len(s))), *(_nose(end, s[-1]) for end in (0, 1)))))
     edge = np.stack([np.interp(fine, s, line.points[run, k]) for k in (0, 1)], axis=-1)
@@ -111,9 +111,9 @@ def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array,
 BACK_TO_BACK = 9.0
 """Largest distance between two turn lanes that open back to back [m]."""
 
-_TAPER = 8.0  # [m] over which the middle line crosses to the other side of the turn lane
+_TAPER = 8.0  # [m] over which the centre line crosses to the other side of the turn lane
 _SHARE = 0.3  # largest share of the turn lane for this
-_WIDE_OPENING = 2.0  # [m] width at its beginning: a lane that widens from zero needs no taper
+_WIDE_OPENING = 2.0  # [m] width at its start: a lane that widens from zero needs no taper
 _OPENING_BACK = 3.0  # [m] of asphalt before the opening
 _ISLAND_RIM = 0.7  # [m] of asphalt on both sides
 _OVERLAP = 0.2  # [m] of the lines of two adjoining islands
@@ -130,7 +130,7 @@ class Pocket:
         taper: length of the island in it [m].
         back: length of the island before it, up to half-way to the turn lane of the other direction [m]; 0 without
             one, or with a planted median.
-        aside: offset of the island to the right of the middle of the turn lane [m].
+        aside: offset of the island to the right of the centre of the turn lane [m].
     """
 
     lane: int
@@ -187,7 +187,7 @@ def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) ->
 
     Args:
         town: town to paint.
-        found: beginnings of turn lanes.
+        found: starts of turn lanes.
         pen: width of the thinnest line [m].
         fine: whether there is room for bars.
     """

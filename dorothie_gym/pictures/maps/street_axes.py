@@ -17,7 +17,7 @@ from dorothie_gym.support import portable_arrays as pn
 
 _BROADEST_STREET = 45.0  # [m]
 _AHEAD = 1.5  # [m] largest longitudinal offset of points opposite each other
-_FEW = 6  # samples without a middle line, as where turn lanes begin back to back
+_FEW = 6  # samples without a centre line, as where turn lanes begin back to back
 _NEAREST_POINTS = 64  # nearest points to consider, which include those on the same kerb
 _SMOOTHING = 9  # samples
 
@@ -28,7 +28,7 @@ class Roadway:
 
     Attributes:
         street: index of the street.
-        line: middle line (n, 2) [m].
+        line: centre line (n, 2) [m].
         heading: (n,) [rad], unwrapped.
         height: (n,) [m].
         width: (n,) [m].
@@ -131,7 +131,7 @@ def _spread(known: NDArray[np.bool_], against: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _is_second(kerbs: _Lines, number: int, length: float, facing: NDArray[np.int64]) -> bool:
-    """Returns whether the roadway is also found from the other kerb, which is longer or comes first."""
+    """Returns whether the roadway is also found from the other kerb, which takes precedence: it is longer or first."""
     other = int(np.bincount(kerbs.owner[facing]).argmax())
     longest = float(kerbs.length[kerbs.owner == other][0])
     return (longest, -other) > (length, -number)
@@ -223,7 +223,7 @@ class Axis:
 
 
 def street_axes(borders: Borders, scale: float, origin: Array) -> list[Axis]:
-    """Returns the middle lines of all roadways of a town, sorted by street and length.
+    """Returns the centre lines of all roadways of a town, sorted by street and length.
 
     Args:
         borders: borders of the lanes.

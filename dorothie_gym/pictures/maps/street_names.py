@@ -351,7 +351,7 @@ class LabelPlacer:
         return False
 
     def _window(self, axis: Axis, width: float, manner: _Manner, spacing: float) -> Array | None:
-        """Returns the best path on an axis: straight, and near the middle of a free part; None without room."""
+        """Returns the best path on an axis: straight, and near the centre of a free part; None without room."""
         count = int(np.ceil(width / axis.step)) + 1
         if count > len(axis.line):
             return None

@@ -271,7 +271,7 @@ _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
-_LEVEL_REACH = 14.0  # [m] from the middle of a lane on a bridge or in a tunnel to that of a pavement there, at most
+_LEVEL_REACH = 14.0  # [m] from the centre of a lane on a bridge or in a tunnel to that of a pavement there, at most
 _BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
 BEYOND_BRIDGE = 6.0  # [m] of asphalt and paint beyond a bridge: adjacent lanes begin theirs at different places
 
@@ -284,14 +284,14 @@ def streets(
     turn_lanes: Sequence[Pocket],
     left_out: Sequence[LevelStretch] = (),
 ) -> Iterator[Shape]:
-    """Yields everything on the ground, from the pavements to the medians; surfaces in tunnels come first.
+    """Yields all surfaces on the ground, from the pavements to the medians; surfaces in tunnels come first.
 
     Args:
         town: town of the streets.
         samples: samples of its lanes.
         lines: borders of its lanes.
         parts: bridges and tunnels.
-        turn_lanes: beginnings of turn lanes.
+        turn_lanes: starts of turn lanes.
         left_out: bridges that are left out, as if seen from below; their place looks like the floor of a tunnel.
     """
     mouths = [part for part in parts if part.level < 0]

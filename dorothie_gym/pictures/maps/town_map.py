@@ -71,7 +71,7 @@ class MapPainter:
         Args:
             town: town to paint.
             size: width and height [px].
-            street_names: names by street index; the town's own where absent.
+            street_names: names by street index; the town's own if omitted.
             margin: margin without roads [px], for all sides or as (left, top, right, bottom).
             type_sizes: largest and smallest font size of street names [px].
             label_spacing: smallest distance between two labels with the same name [px].
@@ -139,7 +139,7 @@ class MapPainter:
         )
 
     def surface(self, time: float | None = None) -> pygame.Surface:
-        """Returns a copy of the base map to draw on; with lights in their colours at a time [s] if one is given."""
+        """Returns a copy of the base map to draw on; if a time [s] is given, the lights show their colours then."""
         copy = self._surface.copy()
         if time is not None:
             self.draw_lights(copy, time)
@@ -235,7 +235,7 @@ class MapPainter:
         return found
 
     def _one_way_arrows(self) -> Iterator[Shape]:
-        """Yields arrows along one-way streets where no label or turn arrow is in the way."""
+        """Yields arrows along one-way streets where no label or turn arrow obstructs them."""
         if not self.plan.detail.arrows:
             return
         taken = np.array([*covering(self.labels), *self._turn_arrows()]).reshape(-1, 3)

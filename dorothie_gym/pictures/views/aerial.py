@@ -270,7 +270,7 @@ class AerialView:
 
 
 def _head(canvas: Canvas, pin: Pin) -> NDArray[np.float64]:
-    """Returns the middle of the head of a pin (2,) [px]."""
+    """Returns the centre of the head of a pin (2,) [px]."""
     at = np.array([pin.x, pin.y])
     return canvas.pixel(at) + PIN_LENGTH * pin_direction(at, np.array(pin.waypoint))
 

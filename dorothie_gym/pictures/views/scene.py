@@ -92,7 +92,7 @@ class Estimate:
 class SpokenLine:
     """Utterance or message: time at which it is heard, at its end [s], speaker, text, and acts in short form.
 
-    `start` is the time at which it begins [s], None where it is not known or the line was not spoken.
+    `start` is the time at which it begins [s], None if unknown or the line was not spoken.
     """
 
     time: float

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def utterances_of(session: LiveSession) -> list[SpokenLine]:
-    """Returns the utterances that are over and the messages of the Ad-Wizard, by the time at which they were heard."""
+    """Returns the finished utterances and the messages of the Ad-Wizard, by the time at which they were heard."""
     lines = [_line(utterance, session) for utterance in session.dialogue.said]
     lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in session.messages]
     return sorted(lines, key=lambda line: line.time)
@@ -46,7 +46,7 @@ def _line(utterance: Utterance, session: LiveSession) -> SpokenLine:
 
 
 def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine] = ()) -> Scene:
-    """Returns the scene of a session at the present decision.
+    """Returns the scene of a session at the current decision.
 
     Args:
         session: the session.

@@ -195,7 +195,7 @@ def draw_waypoints(canvas: Canvas, waypoints: Array) -> None:
 
 
 PIN_LENGTH = 19.0
-"""Distance between the tip of a pin and the middle of its head [px]."""
+"""Distance between the tip of a pin and the centre of its head [px]."""
 
 PIN_RADIUS = 10.0
 """Radius of the head [px]."""

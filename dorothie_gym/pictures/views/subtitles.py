@@ -70,7 +70,7 @@ class Subtitles:
 
 
 def shown_lines(scene: Scene) -> list[tuple[SpokenLine, bool]]:
-    """Returns the lines of a scene by their beginning, and whether each is being said or has just been heard."""
+    """Returns the lines of a scene by their start, and whether each is being spoken or has just been heard."""
     known = [(line, scene.time <= line.time + LINGER) for line in (*scene.utterances[-6:], *scene.speaking)]
     return sorted(known, key=lambda each: each[0].time if each[0].start is None else each[0].start)
 

@@ -1,4 +1,4 @@
-"""Scripted Co-Wizard: understands instructions, plans on its beliefs, asks when information is missing, and drives."""
+"""Scripted Co-Wizard: understands instructions, plans with its beliefs, asks for missing information, and drives."""
 
 import lazy_loader
 

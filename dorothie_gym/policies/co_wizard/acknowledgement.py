@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
-"""Actions that are carried out at once and therefore never checked."""
+"""Actions that are carried out immediately, and thus never checked with the participant."""
 
 
 def acknowledge(
     state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Acknowledges an instruction: not at all, with a word, by taking it on, by repeating it, or by checking it.
+    """Acknowledges an instruction: silently, with a word, by accepting it, by repeating it, or by checking it.
 
     Args:
         state: working copy of the state.
         view: observation.
-        action: action that was asked for.
+        action: requested action.
         words: words of the instruction.
         rng: random generator of the decision.
     """
@@ -60,7 +60,7 @@ def sign_of_hearing(topic: str) -> Remark:
     """Returns an acknowledgement.
 
     Args:
-        topic: kind of the utterance: an order ("ordered"), news ("told"), something to be seen ("seen"), an answer
+        topic: kind of the utterance: an order ("ordered"), news ("told"), something visible ("seen"), an answer
             ("answered"), a completed errand ("done"), small talk ("chat"), or a question whether it was understood
             ("align") or heard at all ("hears").
     """
@@ -68,7 +68,7 @@ def sign_of_hearing(topic: str) -> Remark:
 
 
 def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:
-    """Returns, by chance, an acceptance of the request ("will do") or an acknowledgement ("okay")."""
+    """Returns an acceptance of the request ("will do") or an acknowledgement ("okay"), drawn at random."""
     accepts = rng.random() < state.config.accepts
     function, topic = (Function.ACCEPT, "taken") if accepts else (Function.POSITIVE_FEEDBACK, "ordered")
     return intend(function, wanted, elided=act_builders.arguments_of(wanted), wording=Wording(topic=topic))
@@ -86,7 +86,7 @@ def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -
 def plan_remark(
     state: CoWizardState, view: CoWizardView, rng: np.random.Generator, *, joined: bool = False
 ) -> tuple[Remark, ...]:
-    """Returns a remark about the current plan, or none, by chance.
+    """Returns, with some probability, a remark about the current plan.
 
     Args:
         state: working copy of the state.

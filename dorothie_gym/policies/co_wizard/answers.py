@@ -48,7 +48,7 @@ _REQUEST = re.compile(r"\b(could|can|would|will) you\b(?!.*\b(know|find|see|reme
 """Words that request an action, even if the verb was misheard."""
 
 RECENT_STOP = 45.0
-"""Time after a standstill within which the reason for it can be asked for [s]."""
+"""Time after a standstill within which the participant can ask for its reason [s]."""
 
 
 def answer_yes_no(
@@ -60,7 +60,7 @@ def answer_yes_no(
     if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
         set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
     elif asked is None:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
     elif asked.predicate is Predicate.LIGHTS_ON:
         _answer_lights(state, view)
     else:
@@ -70,7 +70,7 @@ def answer_yes_no(
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
-    """Returns the proposition of a yes/no question; None if that cannot be told."""
+    """Returns the proposition of a yes/no question; None if it is unclear."""
     slots = (act.values(slot) for slot in (Slot.OBJECT, Slot.ACTION, Slot.LANDMARK, Slot.STREET))
     return words.asked or act_builders.asked_by_slots(*slots)
 
@@ -81,9 +81,9 @@ def judged(
     """Returns the answer to whether a proposition is true: yes, no, or that this is not known.
 
     Args:
-        known: what the Co-Wizard believes.
+        known: beliefs of the Co-Wizard.
         view: observation.
-        asked: the proposition; without a place, one about the goal is about the present one.
+        asked: the proposition; if it concerns the goal and names no place, the current goal is meant.
         yes: function of a yes.
     """
     if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
@@ -96,7 +96,7 @@ def judged(
 
 
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
-    """Answers a question about the head lights, which is also a request to switch them on."""
+    """Answers a question about the headlights, which is also a request to switch them on."""
     state.intentions = state.intentions.with_lights(True)
     state.say(judged(state.knowledge, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:
@@ -105,7 +105,7 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns an addition to an answer, by chance: why something is not seen, or the time to the goal."""
+    """Returns, with some probability, an addition to an answer: why something is not seen, or the time to the goal."""
     unseen = asked.predicate is Predicate.SEES and not believes(state.knowledge, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(view, rng)
@@ -115,7 +115,7 @@ def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.
 
 
 def _poor_view(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about a limited view, by chance."""
+    """Returns, with some probability, a remark about a limited view."""
     limit, fault = limit_of(view.raw), camera_fault(view.raw)
     if limit is None or rng.random() < 0.3:
         return ()
@@ -154,11 +154,11 @@ def answer_open(
     ):
         _name_street(state, view)
     else:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
 
 
 def arrival(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
-    """Returns the answer to when the car will be at its goal; one without content where that cannot be told."""
+    """Returns the answer to when the car will reach its goal, without content if that is unknown."""
     seconds = seconds_to_goal(known, view)
     if seconds is None:
         return intend(Function.UNCERTAIN_ANSWER)
@@ -167,7 +167,7 @@ def arrival(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
 
 
 def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
-    """Answers why the car stands, or has just stood."""
+    """Answers why the car stands, or stood until just now."""
     answer = why_standing(state.knowledge, view)
     if _is_held_up(state.knowledge, view):
         reason = _present_reason(state.knowledge, view)
@@ -179,7 +179,7 @@ def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def why_standing(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
-    """Returns the answer to why the car stands, or has just stood."""
+    """Returns the answer to why the car stands, or stood until just now."""
     stands, last = Proposition.of(Predicate.STANDS, action=ActionValue.STOP), known.standstill
     if _is_held_up(known, view):
         reason = _present_reason(known, view)
@@ -193,7 +193,7 @@ def why_standing(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
 
 
 def _is_held_up(known: CoWizardKnowledge, view: CoWizardView) -> bool:
-    """Returns whether the car stands, or brakes for something without having stood lately."""
+    """Returns whether the car stands, or brakes for something without a recent standstill."""
     return view.standing or (view.motion is Motion.HAZARD and view.time - known.standstill.until >= RECENT_STOP)
 
 
@@ -208,7 +208,7 @@ def why_turning_round(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
 
 
 def _explanation(effect: Proposition, cause: Proposition | None, at: int | None = None) -> Remark:
-    """Returns the answer to why something is so, or was so at a time [s]; one without content if there is no cause."""
+    """Returns the answer to why an effect holds, or held at a time [s], without content if there is no cause."""
     if cause is None:
         return intend(Function.UNCERTAIN_ANSWER)
     because = Proposition.of(Predicate.BECAUSE, effect=effect, cause=cause, at=at)

@@ -17,7 +17,7 @@ class BeliefState:
     """Beliefs about destinations, and the belief updates that the environment has not received yet.
 
     Attributes:
-        goal: landmark of the present destination.
+        goal: landmark of the current destination.
         place: believed place of the goal.
         exact: whether `place` is taken from the map; otherwise it is a guess.
         described: whether the participant has described where the goal, which is not on the map, lies.
@@ -25,7 +25,7 @@ class BeliefState:
         plan: junctions of the route as sent in the last plan update.
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
         updates: belief updates (mental actions) to be sent, the next first.
-        told: purposes of errands that the participant has stated, the latest last.
+        told: purposes of errands that the participant has stated, most recent last.
         sent_goal: landmark of the last goal update with a guessed place.
         owner: person whose house is the goal, according to the participant; None if it is not a house, or a house
             without a named owner.
@@ -84,7 +84,7 @@ class BeliefState:
         return replace(self, goal=self.goal if landmark is None else landmark, exact=False)
 
     def with_guess(self, landmark: LandmarkName, place: Place) -> BeliefState:
-        """Sets the guessed place of a landmark and queues the updates; earlier guesses are not sent any more."""
+        """Sets the guessed place of a landmark and queues the updates; earlier guesses are no longer sent."""
         where = LanePosition(lane=place[0], metres=round(place[1]))
         guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=where)
         others = (update for update in self.updates if update.action is not MentalAction.KNOWLEDGE_UPDATE)
@@ -104,7 +104,7 @@ class BeliefState:
         return replace(self, described=True)
 
     def with_place_ruled_out(self) -> BeliefState:
-        """Excludes the present place from the places of its landmark's name."""
+        """Excludes the current place as a candidate for the name of its landmark."""
         return self if self.place is None else replace(self, ruled_out=(*self.ruled_out, self.place))
 
     def without_place(self) -> BeliefState:

@@ -24,29 +24,29 @@ class CoWizardConfig:
 
     Attributes:
         turn_lead: distance to the junction at which a turn is commanded [m].
-        passed: distance behind the car from which on a place is not stopped at any more [m].
+        passed: distance behind the car at which a place counts as passed and is no longer stopped at [m].
         command_interval: time after which a command without effect is repeated [s].
         straight_on_distance: distance to the junction at which a guided car goes straight on without an answer [m].
-        pause_distance: distance before a junction at which a car that does not know the way stops [m].
+        pause_distance: distance before a junction at which a car without a known route stops [m].
         gentle_speed: speed of a gentle approach to a place or a turn [km/h].
         turn_ease_distance: distance to the junction at which a style that eases into turns slows down [m].
         gentle_distance: distance to the goal at which a gentle style slows down [m].
-        held_up_after: time after which a hazard that stops the car is a reason to stop for good [s].
+        held_up_after: time after which a hazard that stops the car is a reason to command a stop [s].
         place_sight: distance along the lanes ahead within which places are looked for [m].
-        rest_time: duration of a stop for something in the way [s].
+        rest_time: duration of a stop for an obstruction [s].
         red_light_time: longest duration of a stop for a red light [s].
         replan_after: decisions off the route after which a new one is planned.
-        red_light_extension: time that a wish is kept after a red light [s].
+        red_light_extension: time for which a requested manoeuvre is kept after a red light [s].
         roadblock_sight: distance at which an obstacle is noticed [m].
         path_width: largest distance from the waypoints at which an obstacle is on the path [m].
         detour_by_street: probability that a proposed detour is named by its street.
         detour_answer_time: time after which a detour is taken without an answer [s].
-        street_lanes: largest number of lanes of a street that are compared to find the nearest.
+        street_lanes: maximum number of lanes of a street that are compared to find the nearest.
         accepts_changes: probability that a change of tasks is accepted ("skipping Ikea") rather than only heard.
         accepts_goals: probability that a destination is accepted ("KFC it is") rather than only heard ("KFC, got it").
         search_silence: time without navigation instructions after which a described place is searched for [s].
         search_radius: distance to a guessed place at which the guess is given up [m].
-        wish_time: time after which a manoeuvre that finds no room is given up [s].
+        wish_time: time after which a requested manoeuvre that finds no room is given up [s].
         nudge_distance: distance driven for "a bit further" [m].
         recent_stop: time after a stop instruction within which the goal must be near [s].
         open_road_speed: lower requested speeds are temporary [km/h].
@@ -55,15 +55,15 @@ class CoWizardConfig:
         long_standstill: standstill after which the first reason for it no longer counts [s].
         plan_junctions: junctions of the route that are searched for turns to mention.
         close_distance: distance within which a goal is called close [m].
-        ask_distance: distance to the junction at which the way is asked for [m].
+        ask_distance: distance to the junction at which the Co-Wizard asks for the way [m].
         ask_interval: time after which a question about the way is repeated [s].
         goal_interval: time after which a question about the goal is repeated [s].
         hazard_delay: standstill after which a hazard is explained [s].
         hazard_interval: time between explanations of hazards [s].
         hazard_again: the same during one standstill [s].
-        first_word: time at the beginning that is left to the participant [s].
-        next_delay: silence after which a standing Co-Wizard asks for the next task [s].
-        start_delay: silence at the beginning after which it asks for the first one [s].
+        first_word: time at the start of a session in which the participant may speak first [s].
+        next_delay: silence after which a Co-Wizard in a stationary car asks for the next task [s].
+        start_delay: silence at the start of a session after which it asks for the first task [s].
         lost_variance: variance of the position above which the car does not know where it is [m^2].
         gps_variance: variance of the position that shows that it is not measured [m^2]; 0.02 to 0.15 while it is.
         found_variance: variance of the position below which it is measured again [m^2].
@@ -125,25 +125,25 @@ class CoWizardConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardStyle:
-    """Traits of a Co-Wizard in a session, drawn at its beginning.
+    """Traits of a Co-Wizard, drawn at the start of a session.
 
     Attributes:
         echoes: probability that an acknowledgement repeats the instruction.
         checks: probability that a place named without a street is checked.
         announces: probability that a manoeuvre of its own plan is announced.
         silent: probability that a plain instruction is not acknowledged.
-        asks: probability that the way is asked for where going straight on is possible.
-        proposes: probability that a way is proposed at a junction instead of asked for.
+        asks: probability of asking for the way where going straight on is possible.
+        proposes: probability of proposing a way at a junction instead of asking for it.
         mishears: probability that an instruction is not understood.
-        careful: probability of a stop before a junction at which the way is asked for.
+        careful: probability of a stop before a junction while asking for the way.
         chats: probability that small talk is answered.
         eases: whether the car slows down well before turns.
         gentle: whether the car slows down well before a place on the map.
-        rambles: probability that the present plan is mentioned along with another remark.
-        offers: probability that a task on the way is proposed as the first one.
+        rambles: probability that the current plan is mentioned along with another remark.
+        offers: probability of proposing to do a task on the way first.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
-        recalls: probability that the thing or person of an errand is repeated, or mentioned on arrival.
-        pace: cruise speed where nothing is said about it [km/h].
+        recalls: probability of repeating the item or person of an errand, or mentioning it on arrival.
+        pace: default cruise speed [km/h].
     """
 
     echoes: float

@@ -97,14 +97,14 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
             react(state, view, act, heard.words, rng)
     remember(state, heard, rng)
     answer = _in_one_breath(state.speech.queue)
-    before = tuple(itertools.dropwhile(_is_plain_sign, before))  # the "okay" to what was said before comes too late
+    before = tuple(itertools.dropwhile(_is_plain_sign, before))  # the "okay" to the previous utterance is too late
     if before:
         before = (replace(before[0], joined=False), *before[1:])
     state.speech = state.speech.cleared().plan(*before, *answer)
 
 
 def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
-    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled."""
+    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may answer."""
     kept: list[Remark] = []
     dropped = False
     for item in state.speech.queue:
@@ -141,7 +141,7 @@ def _is_plain_sign(item: Remark) -> bool:
 
 
 def _tells_plan(item: Remark) -> bool:
-    """Returns whether a remark states a plan without being asked."""
+    """Returns whether a remark states a plan unasked."""
     plan = any(said.predicate in _PLANS for said in item.meaning)
     return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
 
@@ -175,12 +175,12 @@ def _instruction(
     elif state.dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
     elif not act.slots:
-        state.dialogue = state.dialogue.with_orders_settled()  # perhaps another way is going to be tried
+        state.dialogue = state.dialogue.with_orders_settled()  # another route may be tried
         _senseless(state, view, act, words, asks=state.beliefs.goal is None or is_garbled(words))
 
 
 def _senseless(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, *, asks: bool) -> bool:
-    """Stops after words without sense where that is expected, or asks again; returns whether it did."""
+    """Stops after meaningless words if a stop is expected, or else asks again; returns whether it did either."""
     if is_garbled(words) and expects_stop(state, view, words):
         do_stop(state, view, act, words)
         return True
@@ -197,7 +197,7 @@ def _obey(
     words: ParsedText,
     rng: np.random.Generator,
 ) -> None:
-    """Carries out actions that were asked for, and acknowledges them."""
+    """Carries out and acknowledges requested actions."""
     if state.intentions.arrived and _STEERING & set(actions) and not words.further:
         doubt(state)
     state.dialogue = state.dialogue.with_proposal(None)
@@ -236,7 +236,7 @@ def _instructed_place(
 def _abandoned_place(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Abandons a place, in favour of another one now, another one later, or none."""
+    """Abandons a place, possibly in favour of another one, now or later."""
     landmarks = _landmarks(act)
     dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
     others = [name for name in landmarks if name is not dropped]
@@ -254,7 +254,7 @@ def _abandoned_place(
 
 
 def _accept_change(state: CoWizardState, change: Proposition, rng: np.random.Generator) -> None:
-    """Accepts a change of the tasks by repeating it, or shows that it was heard, by chance."""
+    """Acknowledges a change of the tasks: repeats it, or only shows that it was heard, drawn at random."""
     if rng.random() < state.config.accepts_changes:
         state.say(intend(Function.ACCEPT, change))
     else:
@@ -318,7 +318,7 @@ def _explanation(
 def _mentioned_place(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, name: LandmarkName, rng: np.random.Generator
 ) -> None:
-    """Assumes that a place mentioned while there is no goal is the next goal, unless the car stands at it."""
+    """Takes a place that is mentioned while there is no goal as the next goal, unless the car stands at it."""
     if name is state.beliefs.goal:
         state.say(intend(Function.NEGATIVE_FEEDBACK))
     else:
@@ -361,7 +361,7 @@ def _reply(
     """Processes an answer to an open question, or a clarification: an action, a direction or a place."""
     asked_elsewhere = view.choice is not None and state.dialogue.asked_lane not in (-1, view.choice.lane)
     if act.move is DialogueMove.REPLY_W and asked_elsewhere and state.beliefs.exact and words.turns:
-        return  # the junction that was asked about lies behind, and the way is known by now
+        return  # the car has passed the junction in question and now knows the way
     if act.values(Slot.ACTION):
         _instruction(state, view, act, words, rng)
     elif words.turns:

@@ -58,7 +58,7 @@ def drive(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _stand(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops a car that has been told to stand."""
+    """Stops a car that is meant to stand."""
     if not state.intentions.halted or view.motion is Motion.STOPPED:
         return None
     return _stop_unless_sent(state, view)
@@ -109,7 +109,7 @@ def distance_ahead(state: CoWizardState, view: CoWizardView, place: Place) -> fl
 
 
 def _carry_out_wish(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Commands the manoeuvre that the participant asked for, as soon as it is possible."""
+    """Commands the manoeuvre that the participant requested as soon as it is feasible."""
     wish = state.intentions.wish
     if wish is None:
         return None
@@ -137,7 +137,7 @@ def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _switch(state: CoWizardState, view: CoWizardView, side: LinkType) -> Physical | None:
-    # a refused command is repeated at the next decision, because there is seldom much room
+    # a refused command is repeated at the next decision, because there is rarely much room
     waited = view.time - state.commands.manoeuvre_sent_at
     ready = not view.manoeuvring and waited >= state.clock.interval and not state.town.lanes[view.lane].in_junction
     if not ready or not can_switch_lane(state.town, view.lane, view.station, side):
@@ -170,7 +170,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
         if not progress.turns_round_on(view.lane):
             return None
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
-        # never before the planned place, because the car could otherwise come out behind its goal
+        # never before the planned place, because the manoeuvre could otherwise end past its goal
         return _turn_round(state, view) if distance <= slowing_distance(view.speed) or held_up else None
     if not _needs_switch(state, view, crossing):
         return None
@@ -179,7 +179,7 @@ def _follow_route(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _needs_switch(state: CoWizardState, view: CoWizardView, crossing: RouteJunction | None) -> bool:
-    """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
+    """Returns whether a lane change must be commanded; a turn from another lane includes its own lane change."""
     progress = state.route.to_goal
     if crossing is None or progress.changes_before(crossing) or view.choice is None:
         return True
@@ -222,7 +222,7 @@ def wanted_exit(state: CoWizardState, view: CoWizardView) -> Exit | None:
 
 
 def _straight_on(state: CoWizardState, choice: Choice) -> Exit | None:
-    """Returns the way straight on for a guided car that has not asked and got no instruction in time."""
+    """Returns the exit straight on for a guided car that has not asked and received no instruction in time."""
     intentions = state.intentions
     waits = intentions.pausing or intentions.creeping or state.dialogue.asked_lane == choice.lane
     if state.beliefs.goal is None or waits or choice.distance > state.config.straight_on_distance:
@@ -250,7 +250,7 @@ def _turn(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def rest(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Decides, once for each hazard that holds up the car, whether to stop for good meanwhile."""
+    """Decides, once for each hazard that holds up the car, whether to command a stop of limited duration."""
     commands, config = state.commands, state.config
     if view.motion is not Motion.HAZARD or state.standstill.since is None:
         state.commands = commands.with_rest_decided(commands.rest_decided and view.motion is Motion.STOPPED)
@@ -273,7 +273,7 @@ def end_red_light_rest(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _rest(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops for good for the hazard for which this has been decided."""
+    """Stops for the hazard for which this has been decided."""
     resting = view.time < state.commands.rest_until and view.motion is Motion.HAZARD
     if not resting or state.intentions.halted or view.manoeuvring:
         return None
@@ -281,7 +281,7 @@ def _rest(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 
 def _pause(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Stops before a junction at which the way has been asked for, until it is known."""
+    """Stops before a junction after asking for the way, until the way is known."""
     intentions = state.intentions
     knows = (
         state.route.progress is not None
@@ -332,7 +332,7 @@ def _goal_is_close(state: CoWizardState, view: CoWizardView) -> bool:
 
 
 def _set_speed_and_lights(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Adjusts cruise speed and head lights."""
+    """Adjusts cruise speed and headlights."""
     intentions = state.intentions
     if intentions.speed < intentions.usual and view.time > intentions.slow_until and not intentions.creeping:
         intentions = state.intentions = intentions.with_speed(intentions.usual)

@@ -68,14 +68,14 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
 
 
 def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
-    """Returns what an utterance says about an errand: its item, or its person; None if it mentions neither."""
+    """Returns the item or person of an errand that an utterance mentions; None if it mentions neither."""
     if not any(act.move in _TELLING for act in heard.acts) or any(_OVER & act.slots for act in heard.acts):
         return None
     named = [value for act in heard.acts for value in act.values(Slot.LANDMARK)]
     place = act_builders.first_name(named) or state.beliefs.goal
     clause = _CLAUSE.search(heard.words.text)
     if place is None or clause is None or understand(clause["errand"]).actions:
-        return None  # "I need you to take the next right" tells of no errand
+        return None  # "I need you to take the next right" does not describe an errand
     purpose = read_purpose(clause["errand"])
     item = _OF_SPEAKER.sub("your ", purpose.items[0]) if purpose.items else None
     person = None if purpose.person is None else _OF_SPEAKER.sub("your ", purpose.person)
@@ -88,7 +88,7 @@ def told_of(state: CoWizardState, place: LandmarkName | None) -> Proposition | N
 
 
 def arrival_reminder(state: CoWizardState, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about the purpose of the stop, or none, by chance."""
+    """Returns, with some probability, a remark about the purpose of the stop."""
     told = told_of(state, state.beliefs.goal)
     stands_for_person = state.beliefs.goal is LandmarkName.PERSON and told is not None and told.get("item") is None
     if told is None or stands_for_person or rng.random() >= state.style.recalls:
@@ -97,7 +97,7 @@ def arrival_reminder(state: CoWizardState, rng: np.random.Generator) -> tuple[Re
 
 
 def kept_for_later(state: CoWizardState, place: LandmarkName) -> Remark:
-    """Returns the acceptance of a task for later, by the thing that it is about if that is known."""
+    """Returns the acceptance of a task for later; mentions its item if that is known."""
     later, told = act_builders.errand(place, GoalStatus.PENDING), told_of(state, place)
     if told is None or told.get("item") is None:
         return intend(Function.ACCEPT, later)

@@ -33,7 +33,7 @@ _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 def known_landmark(
     state: CoWizardState, view: CoWizardView, name: LandmarkName, streets: Sequence[StreetName]
 ) -> SeenLandmark | None:
-    """Returns the landmark of a name on the map, on one of the streets if any is named; None if there is none."""
+    """Returns the landmark with a name on the map, on one of the streets if any are named; None if there is none."""
     found = [mark for mark in view.landmarks if mark.name is name and mark.place not in state.beliefs.ruled_out]
     fitting = [mark for mark in found if mark.street in streets]
     if fitting:
@@ -91,7 +91,7 @@ def set_goal(
         name: the place.
         streets: streets named with it.
         rng: random generator of the decision.
-        dropped: place that is given up for it.
+        dropped: place that is abandoned for it.
         corrected: whether the name corrects a misunderstanding.
         sure: whether the name was understood; otherwise it is checked.
     """
@@ -180,7 +180,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
 
 
 def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
-    """Goes first to the place that was offered; the present goal becomes pending."""
+    """Goes first to the place that was offered; the current goal becomes pending."""
     name = state.dialogue.offer
     state.dialogue = state.dialogue.with_offer(None)
     mark = known_landmark(state, view, name, ()) if name is not None else None
@@ -193,7 +193,7 @@ def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
-    """Prepares a stop some way ahead, perhaps at a named place: approaches it slowly.
+    """Prepares a stop at a distance ahead, possibly at a named place, which the car approaches slowly.
 
     Args:
         state: working copy of the state.
@@ -223,7 +223,7 @@ def hear_description(
     landmarks: Sequence[LandmarkName],
     rng: np.random.Generator,
 ) -> None:
-    """Processes a description of the goal's place: guesses the place if possible, and acknowledges."""
+    """Processes a description of the goal's place: guesses the place if possible, and acknowledges the description."""
     goal = state.beliefs.goal
     if goal is not None and not state.beliefs.exact:
         state.beliefs = state.beliefs.with_description()
@@ -284,7 +284,7 @@ def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def abandon(state: CoWizardState, name: LandmarkName | None) -> None:
-    """Gives up a task; without a name, or if it is the present one, the car waits for the next."""
+    """Gives up a task; if it is the current one, or none is named, the car waits for the next."""
     if name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.ABANDONED)
     if name is None or name is state.beliefs.goal:
@@ -292,7 +292,7 @@ def abandon(state: CoWizardState, name: LandmarkName | None) -> None:
 
 
 def complete(state: CoWizardState, name: LandmarkName | None) -> None:
-    """Finishes a task and lets the car stand."""
+    """Finishes a task and keeps the car stationary."""
     done = name if name is not None else state.beliefs.goal
     if done is not None:
         state.beliefs = state.beliefs.with_status(done, GoalStatus.COMPLETE)

@@ -47,11 +47,11 @@ _WISHED = {
     Wish.SWITCH_LEFT: ActionValue.LANE_SWITCH,
     Wish.SWITCH_RIGHT: ActionValue.LANE_SWITCH,
 }
-"""Action of each manoeuvre that the participant may have asked for."""
+"""Action of each manoeuvre that the participant may have requested."""
 
 
 def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Queues at most one remark, if none is queued or being said; drops the reason for a standstill that is over."""
+    """Queues at most one remark, if none is queued or being spoken; drops the reason for an ended standstill."""
     if not view.standing and any(_explains_standing(item) for item in state.speech.queue):
         state.speech = state.speech.without_statements(frozenset({Predicate.BECAUSE}))
     if not state.speech.idle or view.speaking > 0.0:
@@ -120,7 +120,7 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     pausing = state.intentions.pausing or (progress is None and bool(rng.random() < state.style.careful))
     state.intentions = state.intentions.with_pause(pausing)
     if state.beliefs.goal is None and dialogue.heard_at >= 0.0 and silence > config.goal_interval:
-        # the place may have been misheard, and it helps more than the way
+        # the place may have been misheard, and asking for it helps more than asking for the way
         state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))
     elif not asked and rng.random() < state.style.proposes:
         _propose_way(state, view, choice, rng)
@@ -132,7 +132,7 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
 
 
 def _waits_for_way(state: CoWizardState, view: CoWizardView) -> bool:
-    """Returns whether the car stands before a junction because the way is unknown."""
+    """Returns whether the car stands before a junction because it does not know the way."""
     return view.motion is Motion.WAITING or (state.intentions.pausing and view.motion is Motion.STOPPED)
 
 
@@ -245,7 +245,7 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
 
 
 def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Reports that the camera fails, drives more slowly meanwhile, and asks for help; reports that it works again."""
+    """Reports a camera failure, drives more slowly and asks for help; reports when the camera works again."""
     fault, known = camera_fault(view.raw), state.dialogue.view_fault
     if fault is known:
         return
@@ -265,7 +265,7 @@ def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
 
 
 def _slower(state: CoWizardState, view: CoWizardView) -> tuple[Remark, ...]:
-    """Lowers the speed to one that suits the sight, if it is higher, and returns the announcement."""
+    """Lowers the speed to one suitable for the sight distance, if it is higher, and returns the announcement."""
     speed = suitable_speed(sight(view.raw)) - _CAUTION * state.style.gentle
     if state.intentions.speed <= speed or view.standing:
         return ()
@@ -310,7 +310,7 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
 
 
 def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, a conspicuous change of the weather, or a crowd; leaves the participant time to do so."""
+    """Mentions, with some probability, a weather change or a crowd, after leaving time to the participant."""
     if state.count % state.config.looks_every:
         return
     said, noticed = notice(
@@ -334,7 +334,7 @@ def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.rand
 def announce_action(
     state: CoWizardState, view: CoWizardView, physical: Physical | None, rng: np.random.Generator
 ) -> None:
-    """Announces a planned manoeuvre, by chance."""
+    """Announces, with some probability, a planned manoeuvre."""
     spoken = not state.speech.idle or view.speaking > 0.0
     if physical is None or spoken or state.intentions.directive is not None:
         return

@@ -40,7 +40,7 @@ Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText
 
 
 def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    """Intends the turn that was asked for."""
+    """Intends the requested turn."""
     streets, junction = act_builders.named_streets(act), junction_meant(state.town, view.here, view.choice)
     directive = Directive(
         direction=words.direction,
@@ -69,7 +69,7 @@ def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
 
 
 def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    # a car that was stopped for a place off the map and now is to turn round has gone past it
+    # a car that was stopped for a place off the map and now must turn round has passed it
     guided = state.beliefs.goal is not None and not state.beliefs.exact
     creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
     state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
@@ -92,7 +92,7 @@ def do_stop(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     state.intentions = state.intentions.started()
-    if view.motion is Motion.WAITING:  # for the way, which the instruction does not tell
+    if view.motion is Motion.WAITING:  # for the way, which the instruction leaves open
         state.dialogue = state.dialogue.asking_way_again()
 
 

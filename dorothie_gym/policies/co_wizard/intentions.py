@@ -1,4 +1,4 @@
-"""Driving goals of the scripted Co-Wizard: turns and manoeuvres that it was asked for, halts, speed and lights."""
+"""Driving goals of the scripted Co-Wizard: requested turns and manoeuvres, halts, speed and lights."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dorothie_gym.policies.policy import replace
 
 
 class Wish(enum.Enum):
-    """Manoeuvre that the participant asked for and that has not begun yet."""
+    """Manoeuvre that the participant requested and that has not begun yet."""
 
     U_TURN = "u_turn"
     SWITCH_LEFT = "switch_left"
@@ -22,7 +22,7 @@ class Wish(enum.Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Directive:
-    """Turn that the participant asked for.
+    """Turn that the participant requested.
 
     Attributes:
         direction: direction of the turn; None if only a street was named.
@@ -42,19 +42,19 @@ class Intentions:
     """Driving goals of the next seconds.
 
     Attributes:
-        directive: turn asked for.
-        wish: manoeuvre asked for.
+        directive: requested turn.
+        wish: requested manoeuvre.
         wish_until: time at which the manoeuvre is given up [s].
-        halted: whether the car is to stand.
-        nudge: place a little further on at which the car is to stop again.
+        halted: whether the car must stand.
+        nudge: place a little further on where the car must stop again.
         creeping: whether the goal is close and its guessed place is carried along ahead of the car.
         arrived: whether the car has stopped at its goal and waits for the next task.
-        sent_on: whether it has only stopped where it was told to drive to, which may be the goal.
+        sent_on: whether the stop ends a short advance on request, at a place that may be the goal.
         pausing: whether the car stops before the junction ahead until the way is known.
         speed: target cruise speed [km/h].
         slow_until: time at which a temporary speed ends [s].
         usual: cruise speed on open road [km/h].
-        lights: target state of the head lights; None if nothing was said about them.
+        lights: target state of the headlights; None if nothing was said about them.
     """
 
     directive: Directive | None = None
@@ -84,15 +84,15 @@ class Intentions:
         return replace(self, halted=True)
 
     def stopped(self) -> Intentions:
-        """Carries out an instruction to stop: lets the car stand and drops nudge and manoeuvre."""
+        """Carries out an instruction to stop: halts the car and drops nudge and manoeuvre."""
         return replace(self, halted=True, nudge=None, wish=None)
 
     def stopped_at_place(self, *, arrived: bool, sent_on: bool) -> Intentions:
-        """Lets the car stand at a place; `arrived` is true at a goal, `sent_on` at the end of a nudge."""
+        """Halts the car at a place; `arrived` is true at a goal, `sent_on` at the end of a nudge."""
         return replace(self, halted=True, nudge=None, arrived=arrived, sent_on=sent_on)
 
     def blocked(self) -> Intentions:
-        """Drops directive and nudge and lets the car stand before an obstacle."""
+        """Drops directive and nudge and halts the car before an obstacle."""
         return replace(self, directive=None, nudge=None, halted=True)
 
     def turning(self, directive: Directive) -> Intentions:
@@ -135,7 +135,7 @@ class Intentions:
         return replace(self, nudge=place, halted=False)
 
     def proceeding(self) -> Intentions:
-        """Carries out an instruction to go on along the lane."""
+        """Carries out an instruction to continue along the lane."""
         return replace(self, halted=False, arrived=False, creeping=False, wish=None)
 
     def creeping_up(self) -> Intentions:
@@ -143,7 +143,7 @@ class Intentions:
         return replace(self, creeping=True, halted=False, arrived=False, directive=None)
 
     def for_new_goal(self) -> Intentions:
-        """Drops what was intended for another goal and ends a halt."""
+        """Drops intentions for another goal and ends a halt."""
         return replace(self, directive=None, wish=None, nudge=None, halted=False, arrived=False, creeping=False)
 
     def for_unknown_goal(self) -> Intentions:
@@ -151,7 +151,7 @@ class Intentions:
         return replace(self, creeping=False, arrived=False)
 
     def without_goal(self) -> Intentions:
-        """Drops everything that was intended for the goal; a halt stays."""
+        """Drops all intentions for the goal, except a halt."""
         return replace(self, directive=None, nudge=None, wish=None, creeping=False, arrived=False)
 
     def departed(self) -> Intentions:
@@ -163,7 +163,7 @@ class Intentions:
         return replace(self, pausing=pausing)
 
     def with_speed(self, speed: int) -> Intentions:
-        """Sets the target cruise speed [km/h]; the usual one stays."""
+        """Sets the target cruise speed [km/h]; the usual speed stays unchanged."""
         return replace(self, speed=speed)
 
     def slow_longer(self, seconds: float) -> Intentions:
@@ -171,10 +171,10 @@ class Intentions:
         return replace(self, slow_until=self.slow_until + seconds)
 
     def with_asked_speed(self, speed: int, open_road: int, until: float) -> Intentions:
-        """Sets the cruise speed that was asked for [km/h].
+        """Sets the requested cruise speed [km/h].
 
         Args:
-            speed: asked for [km/h].
+            speed: requested speed [km/h].
             open_road: lower speeds are temporary [km/h].
             until: end of a temporary speed [s].
         """
@@ -182,5 +182,5 @@ class Intentions:
         return replace(self, speed=speed, usual=usual, slow_until=until)
 
     def with_lights(self, on: bool) -> Intentions:
-        """Sets the target state of the head lights."""
+        """Sets the target state of the headlights."""
         return replace(self, lights=on)

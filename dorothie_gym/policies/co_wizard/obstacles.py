@@ -28,7 +28,7 @@ _JUST_TOLD = 8.0
 
 
 def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Looks for obstacles on the path, announces a new one, and asks about a detour or takes it."""
+    """Checks the path for obstacles, announces a new one, and asks about a detour or takes it."""
     asked_at = state.dialogue.detour_asked_at
     if asked_at is not None and view.time - asked_at > state.config.detour_answer_time:
         take_detour(state, view, rng, agreed=False)
@@ -59,7 +59,7 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
 
 
 def _proposed_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> Proposition:
-    """Returns a proposed detour: over a street, by a U-turn, or in no particular way."""
+    """Returns a proposed detour: over a street, by a U-turn, or unspecified."""
     route = state.route.to_goal.replanned(state.town, view.here, state.route.blocked)
     street = first_new_street(view.raw, state.town, view.lane, route)
     if street is not None and rng.random() < state.config.detour_by_street:
@@ -81,7 +81,7 @@ def _obstacle_on_path(state: CoWizardState, view: CoWizardView) -> SeenObject | 
 
 
 def _is_behind_goal(state: CoWizardState, view: CoWizardView, thing: SeenObject) -> bool:
-    """Returns whether an obstacle lies behind the place where the car will stop."""
+    """Returns whether an obstacle lies beyond the place where the car will stop."""
     progress = state.route.progress
     return progress is not None and state.beliefs.exact and thing.distance > progress.left(view.station)
 
@@ -103,7 +103,7 @@ def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generat
         state: working copy of the state.
         view: observation.
         rng: random generator of the decision.
-        agreed: whether the participant has asked for it, or agreed to it.
+        agreed: whether the participant has requested it or agreed to it.
     """
     state.dialogue = state.dialogue.with_detour_question(None)
     state.intentions = state.intentions.resumed()

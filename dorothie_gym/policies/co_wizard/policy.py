@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class ScriptedCoWizard(Policy[CoWizardState]):
-    """Rule-based Co-Wizard: understands instructions, plans on its beliefs, drives, asks, confirms and explains.
+    """Rule-based Co-Wizard: understands instructions, plans with its beliefs, drives, asks, confirms and explains.
 
     It knows the map without hidden places. It drives to places on the map by its own route; to others it is guided by
     the participant. Mental actions record its beliefs.
@@ -59,7 +59,7 @@ class ScriptedCoWizard(Policy[CoWizardState]):
         self._config = CoWizardConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> CoWizardState:
-        """Returns the state before anything was said."""
+        """Returns the state at the start of a session."""
         rng = np.random.default_rng((seed, 0))
         persona = Persona.draw(rng, self._traits) if self._style is None else None
         style = self._style or CoWizardStyle.of(persona or Persona(), rng)
@@ -83,7 +83,7 @@ class ScriptedCoWizard(Policy[CoWizardState]):
         return None if state.persona is None else state.persona.to_json()
 
     def step(self, observation: ObservationMapping, state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
-        """Listens, looks, drives, and says something or nothing."""
+        """Processes utterances and observation, drives, and possibly speaks."""
         decision = attend(observation, state)
         updated, view = decision.state, decision.view
         rest(updated, view, decision.rng)

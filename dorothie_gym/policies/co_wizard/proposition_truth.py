@@ -34,7 +34,7 @@ DETOUR_TIME: Final = 30.0
 """Time for which an obstacle explains a U-turn [s]."""
 
 CROWD: Final = 3
-"""Least number of people or vehicles in a crowd."""
+"""Minimum number of people or vehicles in a crowd."""
 
 Judgement = Callable[[CoWizardKnowledge, CoWizardView, Proposition], bool | None]
 """Returns whether a proposition without negation is true; None if that is not known."""
@@ -48,7 +48,7 @@ def believes(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) ->
 
 
 def distance_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> float | None:
-    """Returns the way to a goal on the map [m]; None without one, or without a route."""
+    """Returns the route length to a goal on the map [m]; None without a goal or route."""
     return None if known.progress is None or not known.goal_is_on_map else known.progress.left(view.station)
 
 

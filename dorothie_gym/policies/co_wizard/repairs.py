@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.observation_parser import HeardUtterance
 
 FRAGMENT = 3
-"""Largest number of meaningless words that count as the rest of a misheard utterance."""
+"""Maximum number of meaningless words that count as the rest of a misheard utterance."""
 
 
 _REPEATABLE = act_builders.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
@@ -66,13 +66,13 @@ def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct,
 
 
 def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
-    """Returns whether words without sense probably ask to stop: the car is being guided to a place, and it is near."""
+    """Returns whether meaningless words are probably a request to stop: the car is guided to a place that is near."""
     guided = state.beliefs.goal is not None and not state.beliefs.exact and state.route.progress is None
     return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
 
 
 def repeat_last(state: CoWizardState) -> None:
-    """Repeats the last remark, or the last of some content in its utterance."""
+    """Repeats the last remark, or the last one in its utterance that has content."""
     latest = state.speech.last
     if latest is not None and latest.act.move in _WITHOUT_CONTENT and not latest.act.slots and not latest.joined:
         state.say(replace(latest, text=""))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 REPEATED: Final = 3
-"""Number of the equal order that is remarked on."""
+"""Number of equal orders at which the Co-Wizard remarks on the repetition."""
 
 MEMORY: Final = 120.0
 """Time within which orders count as repeated [s]."""
@@ -25,12 +25,12 @@ _COUNTED: Final = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 
 
 def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) -> None:
-    """Records an order that is obeyed; remarks on the third equal one, and asks for another route.
+    """Records an executed order; remarks on the third equal one, and asks for another route.
 
     Args:
         state: working copy of the state.
         view: observation.
-        action: the action asked for.
+        action: requested action.
     """
     if action not in _COUNTED:
         return

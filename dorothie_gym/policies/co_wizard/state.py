@@ -24,28 +24,28 @@ from dorothie_gym.policies.speech import SpeakingState
 
 @dataclass(frozen=True, kw_only=True)
 class DialogueState:
-    """Course of the dialogue: questions asked, and topics mentioned.
+    """State of the dialogue: questions asked, and topics mentioned.
 
     Attributes:
         heard_at: time of the last utterance of the participant [s].
         asked_at: time of the last question of the Co-Wizard [s].
         asked_lane: lane before the junction that the last question about the way referred to, -1 for none.
-        considered_lane: lane before the junction for which asking has been decided on, -1 for none.
+        considered_lane: lane before the last junction for which the Co-Wizard has decided whether to ask, -1 for none.
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
         stop_instructed_at: time of the last instruction to stop [s].
-        stop_reason: why the car stops then: it is told to, or the participant says where the place is.
+        stop_reason: reason for that stop: an instruction, or a description of the place.
         u_turn_instructed_at: time of the last instruction to turn round [s].
-        orders: latest U-turns and lane changes that the participant asked for, with their times [s].
+        orders: latest U-turns and lane changes that the participant requested, with their times [s].
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
         slower: speed that was proposed and not answered yet [km/h].
         blocked_at: time at which an obstacle across the road was last found [s].
         detour_asked_at: time of the open question about a detour [s]; None where none is open.
         hazard_explained_at: time of the last explanation of a hazard [s].
-        weather_mentioned: whether the present bad weather has been mentioned.
+        weather_mentioned: whether the current bad weather has been mentioned.
         noticed: weather and crowds that have been noticed.
-        lost_mentioned: whether the present loss of localization has been mentioned.
+        lost_mentioned: whether the current loss of localization has been mentioned.
         contradicted: destination against whose route instructions were given, and how often; it may be misheard.
         view_fault: fault of the camera that has been noticed and is not over.
     """
@@ -81,7 +81,7 @@ class DialogueState:
         return replace(self, asked_at=now)
 
     def after_considering(self, lane: int) -> DialogueState:
-        """Records that asking for the way at the end of a lane has been decided on."""
+        """Records the decision whether to ask for the way at the end of a lane."""
         return replace(self, considered_lane=lane)
 
     def after_asking_way(self, lane: int, now: float) -> DialogueState:
@@ -89,7 +89,7 @@ class DialogueState:
         return replace(self, asked_lane=lane, asked_at=now)
 
     def asking_way_again(self) -> DialogueState:
-        """Lets the way be asked for at once although it was asked for at the present junction before."""
+        """Allows another question about the way at the current junction at once."""
         return replace(self, asked_lane=-1)
 
     def after_steering(self, now: float) -> DialogueState:
@@ -110,7 +110,7 @@ class DialogueState:
         return replace(self, orders=(*recent, (action, now)))
 
     def with_orders_settled(self) -> DialogueState:
-        """Forgets the latest orders: a new goal, or another way is tried."""
+        """Forgets the latest orders, for a new goal or another route."""
         return replace(self, orders=())
 
     def busy(self, now: float) -> DialogueState:
@@ -130,7 +130,7 @@ class DialogueState:
         return replace(self, slower=speed)
 
     def with_view_fault(self, sensor: Sensor | None) -> DialogueState:
-        """Sets the fault of the camera that has been noticed; None for none."""
+        """Sets the fault of the camera that has been noticed; None if there is none."""
         return replace(self, view_fault=sensor)
 
     def after_refusal(self) -> DialogueState:
@@ -150,7 +150,7 @@ class DialogueState:
         return replace(self, hazard_explained_at=now)
 
     def with_weather_mentioned(self, mentioned: bool) -> DialogueState:
-        """Sets whether the present weather has been mentioned."""
+        """Sets whether the current weather has been mentioned."""
         return replace(self, weather_mentioned=mentioned)
 
     def with_noticed(self, noticed: Noticed) -> DialogueState:
@@ -162,7 +162,7 @@ class DialogueState:
         return replace(self, contradicted=(goal, count))
 
     def with_lost_mentioned(self, mentioned: bool) -> DialogueState:
-        """Sets whether the present loss of localization has been mentioned."""
+        """Sets whether the current loss of localization has been mentioned."""
         return replace(self, lost_mentioned=mentioned)
 
 
@@ -175,9 +175,9 @@ class CommandState:
         turn_sent_at: time of that command [s].
         manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
         stop_sent_at: time of the last Stop command [s].
-        rest_until: end of a stop because of something in the way [s].
+        rest_until: end of a stop for an obstruction [s].
         rest_for: object that the car stops for.
-        rest_decided: whether stopping at the present hazard has been decided on.
+        rest_decided: whether the Co-Wizard has decided about a stop at the current hazard.
         ready_at: time before which the Co-Wizard has not reacted to an instruction yet, except to stop [s].
     """
 
@@ -207,7 +207,7 @@ class CommandState:
         return replace(self, turn_sent=turn, turn_sent_at=now)
 
     def with_rest_decided(self, decided: bool) -> CommandState:
-        """Sets whether stopping at the present hazard has been decided on."""
+        """Sets whether the Co-Wizard has decided about a stop at the current hazard."""
         return replace(self, rest_decided=decided)
 
     def resting(self, until: float, hazard: ObjectClass) -> CommandState:
@@ -229,7 +229,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
         route: route to the goal.
         intentions: driving goals of the next seconds.
         commands: commands given to the car.
-        standstill: present or last standstill.
+        standstill: current or last standstill.
     """
 
     dialogue: DialogueState = field(default_factory=DialogueState)

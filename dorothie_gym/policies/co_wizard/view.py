@@ -30,18 +30,18 @@ class CoWizardView:
 
     Attributes:
         raw: the observation as received.
-        time: time of the session [s].
+        time: session time [s].
         speed: speed of the car [m/s].
         lane: lane of the car, corrected by the turn options.
         station: distance along the lane, corrected by the turn options [m].
         speaking: remaining duration of its own utterance [s].
         other_speaking: whether the other speaker is talking.
         motion: state of motion.
-        hazard: class of the object that the car brakes or stands for; UNLABELED for nothing.
-        manoeuvre: manoeuvre prepared or under way.
-        angle: its angle [degrees].
+        hazard: class of the object for which the car brakes or stands; UNLABELED if there is none.
+        manoeuvre: manoeuvre in preparation or in progress.
+        angle: angle of the manoeuvre [degrees].
         cruise: cruise speed [km/h].
-        lights: whether the head lights are on.
+        lights: whether the headlights are on.
         choice: next junction with a choice.
         landmarks: landmarks on the map.
         objects: objects in sight.

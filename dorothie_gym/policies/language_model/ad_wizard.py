@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 AGAIN = ("60", "20", "30", "90", "120")
-"""Times after which the model can ask to be asked again [s]."""
+"""Times after which the model can request another call [s]."""
 
 MESSAGE_LENGTH = 200
 """Longest message to the participant [characters]."""
@@ -42,7 +42,7 @@ PROPS_AHEAD = (60, 100)
 """Distances ahead on the car's path at which a prop can be placed, or actors spawned [m]."""
 
 PROP_MARGINS = (30.0, 8.0)
-"""Least distances of a prop from the beginning and the end of its lane, nearer to which it is refused [m]."""
+"""Minimum distances of a prop from the start and the end of its lane, within which it is refused [m]."""
 
 SAME_WEATHER = 0.02
 """Difference, as a share of the range of a parameter, below which the weather is so already."""
@@ -77,7 +77,7 @@ class AdWizardMemory(Memory):
     """Memory of the Ad-Wizard.
 
     Attributes:
-        order: change that is to be made; None for none.
+        order: requested change; None if there is none.
         tasks: last observed state of the tasks.
     """
 
@@ -98,7 +98,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
     def attend(
         self, observation: ObservationMapping, memory: AdWizardMemory, delay: float
     ) -> tuple[AdWizardMemory, tuple[str, ...]]:
-        """Listens to both speakers; a change of the tasks is worth a call."""
+        """Listens to both speakers; a change of the tasks triggers a call."""
         memory = replace(memory, clock=memory.clock.ticked(scalar(observation, "time")))
         memory, _ = with_heard(memory, observation, Role.PARTICIPANT, "participant")
         memory, _ = with_heard(memory, observation, Role.CO_WIZARD, "driver")

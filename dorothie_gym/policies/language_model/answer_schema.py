@@ -1,4 +1,4 @@
-"""Schema of the answers that a model is asked for, and the reading of an answer under it.
+"""Schema of the answers that are requested from a model, and the parser of an answer.
 
 Every field is a text: one of a list of labels, which are made from the action space and its mask, or free words. The
 same object writes the JSON schema and checks an answer, so that an answer that passes is an action inside the mask.
@@ -29,7 +29,7 @@ _WORDS: Final = "[A-Za-z0-9 ,.?!':;()-]"
 
 @dataclass(frozen=True, kw_only=True)
 class ChoiceField:
-    """Field that takes one of some labels; the first is the default of an answer without the field."""
+    """Field that takes one of the given labels; the first is the default of an answer without the field."""
 
     name: str
     labels: tuple[str, ...]

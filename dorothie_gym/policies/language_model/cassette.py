@@ -102,7 +102,7 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 @lru_cache(maxsize=4)
 def _recorded(path: Path, size: int, changed: int) -> Mapping[str, Reply]:
-    """Returns the replies of a file by key; a last line that was cut off does not count."""
+    """Returns the replies of a file by key; an incomplete last line is ignored."""
     if not path.exists():
         return {}
     try:

@@ -46,7 +46,7 @@ class IncompleteError(CallError):
     """Completion without a valid answer; its tokens are charged nevertheless.
 
     Attributes:
-        tokens: as of `Completion`.
+        tokens: as in `Completion`.
     """
 
     def __init__(self, fault: Fault, reason: str, tokens: tuple[int, int]) -> None:
@@ -81,7 +81,7 @@ class ChatEndpoint:
     def complete(self, request: Mapping[str, object], timeout: float) -> Completion:
         """Returns the answer to a request.
 
-        The exchange runs in a thread of its own, which is given up at the deadline: timeouts of a connection hold
+        The exchange runs in a thread of its own, which is abandoned at the deadline: timeouts of a connection hold
         between two bytes, so that a server could otherwise trickle for hours.
 
         Args:

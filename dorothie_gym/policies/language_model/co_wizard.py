@@ -43,13 +43,13 @@ REPEAT_AFTER = 3.0
 """Time after which a step that is still due is pointed out once more [s]."""
 
 JUNCTION_DISTANCE = 40.0
-"""Distance to a junction at which its turn is asked for if none is prepared [m]."""
+"""Distance to a junction at which the model is called for its turn if none is prepared [m]."""
 
 HELD_UP = 6.0
-"""Standstill before a hazard, other than a red light, that is worth a call [s]."""
+"""Standstill before a hazard, other than a red light, that triggers a call [s]."""
 
 ARRIVED = 2.0
-"""Distance to the goal at which a standing car is there [m]."""
+"""Distance to the goal at which a stationary car has arrived [m]."""
 
 ORDER_LIFETIME = 4.0
 """Time for which an action is kept that is not possible yet [s]."""
@@ -60,16 +60,16 @@ class CoWizardMemory(Memory):
     """Memory of the Co-Wizard.
 
     Attributes:
-        goal: place where the Co-Wizard is going; None for none.
+        goal: place where the Co-Wizard is going; None if there is none.
         goal_name: name of the goal in prompts.
         marks: places that were marked on the map, by landmark.
         navigator: route to the goal.
         step: next step on the route; None without a route.
-        drive: action that is to be carried out, with the time until which it is kept [s]; None for none.
-        updates: belief updates that are to be sent, the next first.
+        drive: action to be carried out, with the time until which it is kept [s]; None if there is none.
+        updates: belief updates to be sent, the next first.
         motion: state of motion at the last decision.
         standing_since: time since which the car stands [s]; None if it drives.
-        told_held_up: whether the present standstill before a hazard was pointed out.
+        told_held_up: whether the current standstill before a hazard was pointed out.
         told_step: step that was pointed out last, and when [s].
         told_junction: junction that was pointed out last.
         visited: goals at which the car has stopped.
@@ -102,7 +102,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
     def attend(
         self, observation: ObservationMapping, memory: CoWizardMemory, delay: float
     ) -> tuple[CoWizardMemory, tuple[str, ...]]:
-        """Follows the route, and detects events that are worth a call."""
+        """Follows the route, and detects events that trigger a call."""
         view = CoWizardView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
         navigator = memory.navigator.followed(memory.town, view)
@@ -164,7 +164,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         return action.encode(self.limits), memory, expired
 
 
-# --- What is worth a call ---------------------------------------------------------------------------------------------
+# --- Triggers of calls ------------------------------------------------------------------------------------------------
 
 
 def _notice_motion(memory: CoWizardMemory, view: CoWizardView) -> tuple[CoWizardMemory, list[str]]:
@@ -220,7 +220,7 @@ def _mark(memory: CoWizardMemory) -> Place | None:
 
 
 def _with_goal(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWizardMemory:
-    """Sets another goal, or none."""
+    """Sets or clears the goal."""
     if label == KEEP:
         return memory
     if label == NONE:
@@ -234,7 +234,7 @@ def _with_goal(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWiza
 
 
 def _with_mark(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWizardMemory:
-    """Marks where the goal is supposed to be; the car drives there, and slows down when it comes near."""
+    """Marks the assumed place of the goal; the car drives there, and slows down near it."""
     if label == NONE:
         return memory
     place = mark_options(view, memory.town)[label]

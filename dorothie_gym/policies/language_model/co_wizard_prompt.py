@@ -127,7 +127,7 @@ def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
 
 
 def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | None:
-    """Returns the middle of the lane of a street that is nearest to the car as the crow flies."""
+    """Returns the centre of the lane of a street that is nearest to the car as the crow flies."""
     indices, (x, y) = streets_named(view.raw["street_names"], street), view.position
     found = []
     for lane in town.lanes:
@@ -194,7 +194,7 @@ def prompt_text(
         navigator: route to the goal.
         step: next step on it.
         events: events since the last call, in words.
-        goal: name of the goal; empty for none.
+        goal: name of the goal; empty if there is none.
         talk: the conversation.
         note: note of the model to itself.
         mark: whether the place of the goal is a mark.
@@ -274,7 +274,7 @@ def _goal_line(view: CoWizardView, navigator: Navigator, goal: str, mark: bool) 
 
 
 def step_words(step: RouteStep, view: CoWizardView, town: Town) -> str:
-    """Returns a step of the route in words, beginning with the label of its action."""
+    """Returns a step of the route in words, starting with the label of its action."""
     where = f"in {step.distance:.0f} m"
     if step.action is PhysicalAction.J_TURN:
         way = next((way for way in town.exits(step.place) if way.angle == step.angle), None)

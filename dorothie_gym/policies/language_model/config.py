@@ -13,14 +13,14 @@ from urllib.parse import urlsplit
 from dorothie_gym.support.copying import shared
 
 URL_VARIABLE: Final = "OPENAI_BASE_URL"
-"""Environment variable with the address of the endpoint, where none is given; as of OpenAI's own client."""
+"""Environment variable with the address of the endpoint if none is given, as in OpenAI's client."""
 
 
 class SimulatedTime(enum.StrEnum):
     """Behaviour of the session while the model answers."""
 
     WAITS = "waits"
-    """Simulated time stands still: an answer takes effect in the decision in which it was asked for."""
+    """Simulated time stops: an answer takes effect in the decision that requested it."""
     CHARGED = "charged"
     """The session continues: an answer takes effect after as much simulated time as the call took."""
 
@@ -36,12 +36,12 @@ class LanguageModelConfig:
         model: name of the model, as the endpoint knows it.
         url: address before `/chat/completions`, such as "http://localhost:8000/v1". May be empty if `offline` is set.
         timeout: longest time of a call, retry included [s].
-        max_tokens: largest number of tokens of an answer.
+        max_tokens: maximum number of tokens of an answer.
         temperature: temperature of sampling; 0 for the most likely answer.
-        quiet_time: longest time between two calls [s]; the model may ask for a shorter one.
+        quiet_time: longest time between two calls [s]; the model may request a shorter one.
         time: behaviour of the session while the model answers.
         pictures: whether prompts contain the picture of the camera, where the role observes one.
-        cassette: file in which calls are recorded, and from which recorded ones are answered; None for none.
+        cassette: file in which calls are recorded and from which recorded calls are answered; None if there is none.
         offline: whether only recorded calls are answered; a call that is not in the cassette is an error.
         prices: price of a million tokens of prompts and of answers [US dollars]; None if unknown.
 

@@ -15,7 +15,7 @@ class Fault(enum.StrEnum):
     NO_CONNECTION = "no connection"
     """The server cannot be reached, or closes the connection; TLS errors included."""
     RATE_LIMITED = "rate limited"
-    """Status 429, also after waiting as the server asks."""
+    """Status 429, even after waiting as the server requested."""
     SERVER_ERROR = "server error"
     """Status 500 or above."""
     REJECTED = "rejected"
@@ -33,7 +33,7 @@ class Fault(enum.StrEnum):
 
 
 ABOUT_THE_ANSWER = frozenset({Fault.REFUSED, Fault.CUT_OFF, Fault.NOT_JSON, Fault.WRONG_SCHEMA})
-"""Faults of the model rather than of the server; the model is told of them and asked once more."""
+"""Faults of the model rather than of the server; the call is repeated once with a description of the fault."""
 
 WORTH_REPEATING = ABOUT_THE_ANSWER | {Fault.RATE_LIMITED, Fault.SERVER_ERROR, Fault.NOT_A_COMPLETION}
 """Faults after which a second attempt is made, if there is time."""
@@ -44,8 +44,8 @@ class CallError(Exception):
 
     Attributes:
         fault: kind of the fault.
-        reason: fault, on one line; the model reads it when it is asked once more.
-        wait: time after which the server wants to be asked again [s].
+        reason: fault, on one line; part of the repeated call.
+        wait: time after which the server allows another request [s].
     """
 
     def __init__(self, fault: Fault, reason: str, wait: float = 0.0) -> None:

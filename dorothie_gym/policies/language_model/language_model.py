@@ -40,7 +40,7 @@ class Prompt:
         system: role of the model and meanings of the answer's fields; the same in all calls of a role.
         text: current observation of the role.
         schema: schema of the answer.
-        picture: picture of the camera as the address of a PNG (`data:image/png;base64,...`); empty for none.
+        picture: picture of the camera as the address of a PNG (`data:image/png;base64,...`); empty if there is none.
         seed: seed of sampling, which also distinguishes equal prompts.
     """
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 TURN_LEAD = 85.0
-"""Distance to a junction from which on its turn is due [m]; as the scripted Co-Wizard commands it."""
+"""Distance to a junction below which its turn is due [m], as for the scripted Co-Wizard."""
 
 STOP_SIGHT = 80.0
 """Distance along the lanes ahead within which the place to stop at is looked for [m]."""
@@ -42,7 +42,7 @@ STOP_MARGIN = 0.2
 """Distance by which a stop is due early rather than late [m]."""
 
 PASSED = 2.0
-"""Distance behind the car from which on a place is not stopped at any more [m]."""
+"""Distance behind the car at which a place counts as passed and is no longer stopped at [m]."""
 
 REPLAN_AFTER = 2
 """Decisions off the route after which another one is planned."""
@@ -56,7 +56,7 @@ class RouteStep:
         action: the action.
         angle: turn angle, or 90 and -90 for a lane switch [degrees, positive left].
         distance: distance to where it takes place [m].
-        due: whether it is to be commanded now.
+        due: whether it must be commanded now.
         place: lane, which distinguishes steps of one kind.
     """
 
@@ -164,7 +164,7 @@ class Navigator:
         return self._turn(town, view, crossing)
 
     def _stop(self, town: Town, view: CoWizardView, interval: float, delay: float) -> RouteStep | None:
-        """Returns the stop at the goal if that is ahead on the default lanes and no nearer step is to come before."""
+        """Returns the stop at the goal if it is ahead on the default lanes with no other step before it."""
         if self.goal is None or view.motion is Motion.STOPPED or view.manoeuvring:
             return None
         distance = default_lane_distance(town, view.here, self.goal, STOP_SIGHT)
@@ -189,7 +189,7 @@ class Navigator:
         return RouteStep(action=PhysicalAction.U_TURN, distance=max(distance, 0.0), due=due, place=view.lane)
 
     def _needs_switch(self, town: Town, view: CoWizardView, crossing: RouteJunction | None) -> bool:
-        """Returns whether a lane change has to be commanded; a turn from another lane includes its own lane change."""
+        """Returns whether a lane change must be commanded; a turn from another lane includes its own lane change."""
         progress = self.route.to_goal
         if crossing is None or progress.changes_before(crossing) or view.choice is None:
             return True

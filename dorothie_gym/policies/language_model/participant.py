@@ -41,13 +41,13 @@ ANNOUNCED = 70.0
 """Distance to a junction at which its turn is due to be announced [m]; a car at 40 km/h takes 6 s for it."""
 
 NEAR = 60.0
-"""Distance to the place on the last stretch at which the car can be told to slow down [m]."""
+"""Distance to the place, after the last step, at which the car can be instructed to slow down [m]."""
 
 SAYING_STOP = 1.0
 """Time that it takes to say stop [s]."""
 
 LONG_STANDSTILL = 8.0
-"""Standstill that is worth a call [s]."""
+"""Standstill that triggers a call [s]."""
 
 REPLAN_AFTER = 2
 """Decisions off the route after which another one is planned."""
@@ -58,12 +58,12 @@ class ParticipantMemory(Memory):
     """Memory of the participant.
 
     Attributes:
-        guide: name of the place that it guides the car to; empty for none.
-        progress: route to that place; None for none.
-        told: step of the route that was pointed out last: kind, and lane.
+        guide: name of the place to which it guides the car; empty if there is none.
+        progress: route to that place; None if there is none.
+        told: kind and lane of the step of the route that was last pointed out.
         tasks: last observed list of tasks, with their states.
         standing_since: time since which the car stands [s]; None if it drives.
-        told_standing: whether the present standstill was pointed out.
+        told_standing: whether the current standstill was pointed out.
     """
 
     guide: str = ""
@@ -86,7 +86,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
     def attend(
         self, observation: ObservationMapping, memory: ParticipantMemory, delay: float
     ) -> tuple[ParticipantMemory, tuple[str, ...]]:
-        """Follows the route, and detects events that are worth a call."""
+        """Follows the route, and detects events that trigger a call."""
         view = ParticipantView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
         memory = replace(memory, progress=_followed(memory, view))
@@ -176,11 +176,11 @@ def _place_lines(observation: ObservationMapping, view: ParticipantView, town: T
     ]
 
 
-# --- The way ----------------------------------------------------------------------------------------------------------
+# --- Route ------------------------------------------------------------------------------------------------------------
 
 
 def _followed(memory: ParticipantMemory, view: ParticipantView) -> RouteProgress | None:
-    """Returns the progress on the route, or another route where the car has left the former one."""
+    """Returns the progress on the route, or a new route if the car has left the previous one."""
     progress = memory.progress
     if progress is None or view.turning:
         return progress
@@ -220,7 +220,7 @@ def _left_words(progress: RouteProgress, view: ParticipantView) -> str:
 
 
 def _notice_step(memory: ParticipantMemory, view: ParticipantView) -> tuple[ParticipantMemory, list[str]]:
-    """Notices a step of the route that is to be announced."""
+    """Notices a step of the route that is due for announcement."""
     step = _next_step(memory, view)
     if step is None or not step[2] or step[0] == memory.told:
         return memory, []

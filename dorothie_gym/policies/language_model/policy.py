@@ -77,8 +77,8 @@ class LanguageModelState:
 class LanguageModelPolicy(Policy[LanguageModelState]):
     """Plays a role by calling a language model after events.
 
-    A call that brings no answer, for whatever reason, is a silent action with a name (`Fault`): the role continues as
-    before, and the model is asked again at the next event. With equal replies, as from a cassette, equal sessions
+    A call without an answer, for any reason, becomes a silent action with a name (`Fault`): the role continues as
+    before, and the model is called again at the next event. With equal replies, as from a cassette, equal sessions
     follow.
     """
 

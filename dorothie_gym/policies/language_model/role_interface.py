@@ -50,7 +50,7 @@ LONGEST_YIELD: Final = 4.0
 """Time for which a role lets the other speaker finish before it speaks [s]."""
 
 AGAIN: Final = ("10", "1", "2", "3", "5", "20", "30")
-"""Times after which a model can ask to be asked again [s]."""
+"""Times after which a model can request another call [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +71,9 @@ class Memory:
         clock: times of the decisions.
         talk: utterances that were said and heard, the latest last.
         note: note of the model to itself.
-        again_at: time at which the model wants to be asked again [s].
+        again_at: time at which the model has requested another call [s].
         speech: spans that are still to be spoken.
-        yields_since: time since which the role waits for the other speaker to finish [s]; None if it does not.
+        yields_since: start of a wait for the other speaker to finish [s]; None if the role does not wait.
     """
 
     town: Town
@@ -99,7 +99,7 @@ class RoleInterface(ABC, Generic[M]):
     patience: ClassVar[float] = 1.0
 
     def __init__(self, limits: SpaceLimits) -> None:
-        """Prepares the interface for spaces of some sizes."""
+        """Prepares the interface for spaces of given sizes."""
         self.limits = limits
 
     @property
@@ -120,7 +120,7 @@ class RoleInterface(ABC, Generic[M]):
             memory: memory of the decision before.
             delay: simulated time that an answer takes [s].
 
-        Returns: The memory, and the events that are worth a call, in words.
+        Returns: The memory, and the events that trigger a call, in words.
         """
 
     @abstractmethod
@@ -138,8 +138,8 @@ class RoleInterface(ABC, Generic[M]):
         """Processes an answer of the schema.
 
         Args:
-            observation: observation of the role at present.
-            memory: memory at present.
+            observation: current observation of the role.
+            memory: current memory.
             answer: value of each field.
 
         Returns:
@@ -198,7 +198,7 @@ def next_speech(observation: ObservationMapping, memory: M) -> tuple[Speech | No
 
 
 def with_heard(memory: M, observation: ObservationMapping, speaker: Role, called: str) -> tuple[M, str]:
-    """Adds an utterance that has ended to the talk; returns its words, empty for none."""
+    """Adds an utterance that has ended to the talk; returns its words, empty if there are none."""
     words = str(observation[f"{speaker}_text"]).strip()
     if not words:
         return memory, ""

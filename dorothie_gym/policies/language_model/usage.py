@@ -16,7 +16,7 @@ Amount: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e12)]
 
 
 class UsagePage(TypedDict):
-    """Usage in JSON types; fields as of `ModelUsage`."""
+    """Usage in JSON types; fields as in `ModelUsage`."""
 
     model: str
     calls: Count
@@ -121,7 +121,7 @@ class ModelUsage:
 
     @classmethod
     def total(cls, parts: Sequence[ModelUsage]) -> ModelUsage:
-        """Returns the usage of several sessions, at least one, in all; of the first model, by name."""
+        """Returns the total usage of one or more sessions, under the name of the first model."""
         silences: dict[str, int] = {}
         for part in parts:
             for name, count in part.silences.items():

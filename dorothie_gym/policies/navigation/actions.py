@@ -51,7 +51,7 @@ class NavigationAction(enum.IntEnum):
     FASTER = 7
     SLOWER = 8
     LIGHTS = 9
-    """Switches the head lights."""
+    """Switches the headlights."""
     TURN_BACK = 10
     TURN_SHARP_RIGHT = 11
     TURN_RIGHT = 12
@@ -108,7 +108,7 @@ def physical_of(action: NavigationAction, driver: DriverArrays) -> Physical | No
 
 @compiled
 def order_of(driver: DriverArrays, action: int) -> tuple[int, int]:
-    """Returns the `PhysicalAction` that a `NavigationAction` stands for, or 0 for none, and its angle [degrees]."""
+    """Returns the `PhysicalAction` of a `NavigationAction`, 0 if it has none, and its angle [degrees]."""
     order, angle = LANE_FOLLOW, 0
     if action == _NOTHING or prepares(driver, action):
         order = 0
@@ -186,7 +186,7 @@ _FEASIBLE = (
 # --- estimated mask ---------------------------------------------------------------------------------------------------
 
 END_TOLERANCE = 0.5
-"""Distance by which a U-turn may begin behind the end of its lane [m]."""
+"""Distance past the end of its lane at which a U-turn may still begin [m]."""
 
 _OFF_LINE = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN)
 _SIDES = {

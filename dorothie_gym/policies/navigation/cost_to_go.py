@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 REACHED_BEHIND = 2.0
-"""Largest distance behind the car at which a goal counts as reached instead of passed [m]."""
+"""Largest distance behind the car at which a goal counts as reached rather than passed [m]."""
 
 ROWS = 512
 """Rows of costs that a process keeps: one takes 4 to 30 KB."""
@@ -51,7 +51,7 @@ def cost_from(
         passed = ahead < 0.0 and int(station / size) == int(goal_station / size)
     k = min(int(max(station, 0.0) / size), row.cells - 1)
     share = min(max(station, 0.0) / size - k, 1.0)
-    # in the goal's own cell but behind the goal, the cost follows from the end of the cell
+    # in the goal's own cell but past the goal, the cost follows from the end of the cell
     here = math.inf if passed else float(costs[row.first + k])
     if k + 1 < row.cells:
         after = float(costs[row.first + k + 1])
@@ -115,7 +115,7 @@ class CostToGo:
 
     @property
     def rows(self) -> tuple[RecordArray[RoutingLane], Array]:
-        """Lanes and costs for `cost_from`; no costs where there is no goal."""
+        """Lanes and costs for `cost_from`; no costs if there is no goal."""
         if self._table is None:
             return routing_graph(self._town).lanes, np.zeros(0)
         return self._table.lanes, self._table.costs

@@ -53,7 +53,7 @@ class Demonstration(NamedTuple):
 class DemonstrationRecorder:
     """Converts the decisions of another Co-Wizard in a session to demonstrations.
 
-    Two kinds of decisions are left out: those at which a driver would not be asked, see `has_nothing_to_do`, and stops
+    Two kinds of decisions are left out: those at which a driver has nothing to decide (`has_nothing_to_do`), and stops
     without an instruction, because scripted Co-Wizards stop before a junction to ask for the way, or behind obstacles.
     """
 

@@ -66,10 +66,10 @@ class DriverView:
     light_distance: Float
     junction_ahead: Flag  # whether turn options are observed
     junction: Int32  # lane before the next junction with a choice, or -1
-    exit_lane: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # lane behind the exit in each sector, or -1
+    exit_lane: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # lane after the exit in each sector, or -1
     exit_angle: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # its angle [degrees, positive left]
     exit_street: Annotated[NDArray[np.int32], "i4", (_SECTORS,)]  # id of the `StreetName` of its street
-    lights: Flag  # whether the head lights are on
+    lights: Flag  # whether the headlights are on
 
 
 class HeardRecord:
@@ -90,7 +90,7 @@ class HeardRecord:
 
 
 class CostRecord:
-    """Costs of the routes to the goal [m at 40 km/h], infinite where there is none."""
+    """Costs of the routes to the goal [m at 40 km/h], infinite if there is none."""
 
     here: Float
     back: Float  # after a U-turn

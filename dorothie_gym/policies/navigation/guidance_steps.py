@@ -113,7 +113,7 @@ def instruct(
         graph: routing graph of the town.
         search: scratch space for route searches.
         sectors: sector of each exit of `tables`, or -1.
-        guide: the instructor; `now`, the subgoals and the static bodies in sight describe the present decision.
+        guide: the instructor; `now`, the subgoals and the static bodies in sight describe the current decision.
     """
     view, route, said = guide.now[0], guide.route[0], guide.said[0]
     _choose_goal(graph, search, guide)
@@ -146,7 +146,7 @@ def instruct(
 
 @compiled
 def _choose_goal(graph: RoutingGraph, search: RouteSearch, guide: InstructorArrays) -> None:
-    """Keeps the present subgoal while it is open; otherwise chooses the closest one that may be reached now."""
+    """Keeps the current subgoal while it is open; otherwise chooses the closest one that may be done now."""
     route, subgoals = guide.route[0], guide.subgoals
     if route.subgoal >= 0:
         now = subgoals[route.subgoal]
@@ -189,7 +189,7 @@ def _take_route(search: RouteSearch, guide: InstructorArrays) -> None:
 
 @compiled
 def _note_roadblocks(graph: RoutingGraph, search: RouteSearch, guide: InstructorArrays) -> None:
-    """Adds the roadblocks that have come into sight, and plans around them."""
+    """Adds roadblocks that have become visible, and plans around them."""
     view, route = guide.now[0], guide.route[0]
     if view.things == 0:
         return
@@ -207,7 +207,7 @@ def _note_roadblocks(graph: RoutingGraph, search: RouteSearch, guide: Instructor
             continue
         one, two = guide.closed[route.closed], guide.closed[route.closed + 1]
         one.lane, one.station = lane, station
-        # its cell and the one behind it, because the car's own cell counts as free
+        # its cell and the next one, because the car's own cell counts as free
         two.lane, two.station = lane, min(station + CELL_BEHIND, graph.lanes[lane].length)
         route.closed += 2
         _find_route(graph, search, guide, route.landmark)
@@ -216,7 +216,7 @@ def _note_roadblocks(graph: RoutingGraph, search: RouteSearch, guide: Instructor
 
 @compiled
 def _place_on(graph: RoutingGraph, lanes: NDArray[np.int32], count: int, x: float, y: float) -> tuple[int, float]:
-    """Returns the first of some lanes on which a point lies (-1: none), and the distance along it [m]."""
+    """Returns the first of the given lanes on which a point lies (-1: none), and the distance along it [m]."""
     points = graph.points
     for n in range(count):
         best, at, share = math.inf, 0, 0.0
@@ -276,7 +276,7 @@ def _send_on(waits: bool, distance: float) -> Step:
 
 @compiled
 def _next_step(tables: RouteTables, sectors: NDArray[np.int32], guide: InstructorArrays) -> Step:
-    """Returns the next step on the route if it is near; a stopped car is sent on."""
+    """Returns the next step on the route if it is near; a stopped car is instructed to continue."""
     view, route, legs = guide.now[0], guide.route[0], guide.legs
     if route.astray:
         return _nothing()
@@ -322,7 +322,7 @@ def _manoeuvre_step(guide: InstructorArrays, entry: int, distance: float) -> Ste
 
 @compiled
 def _stop_after_manoeuvre(guide: InstructorArrays) -> Step:
-    """Returns a stop for a goal right behind the manoeuvre under way, while there is time to stop."""
+    """Returns a stop for a goal right after the manoeuvre in progress, while there is time to stop."""
     view, mark = guide.now[0], guide.marks[guide.route[0].landmark]
     left = mark.station - view.station  # a car in a manoeuvre is reported at the manoeuvre's end
     if mark.lane == view.lane and -_ARRIVED_WITHIN <= left <= _STOP_DISTANCE:
@@ -332,7 +332,7 @@ def _stop_after_manoeuvre(guide: InstructorArrays) -> Step:
 
 @compiled
 def _stop_step(guide: InstructorArrays, left: float) -> Step:
-    """Returns a stop in so many metres; a car that stands elsewhere than at the goal is sent on."""
+    """Returns a stop at a distance [m]; a car that stands elsewhere than at the goal is instructed to continue."""
     view, row = guide.now[0], guide.route[0].landmark
     if view.waits:
         return _nothing() if abs(left) <= _ARRIVED_WITHIN else _send_on(True, left)

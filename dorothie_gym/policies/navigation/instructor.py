@@ -40,7 +40,7 @@ class NavigationInstruction:
     Attributes:
         act: move and slots: the action, and the street or landmark where one is named.
         sector: direction, as an index of `junction_exits.SECTORS`; None where the act has no direction.
-        distance: distance to the place where it is to be carried out, as said [m].
+        distance: stated distance to the place of the action [m].
         time: time at which it was given [s].
     """
 
@@ -51,7 +51,7 @@ class NavigationInstruction:
 
     @property
     def action(self) -> ActionValue | None:
-        """Action asked for."""
+        """Requested action."""
         return next((value for value in self.act.slots if isinstance(value, ActionValue)), None)
 
     @property
@@ -72,7 +72,7 @@ class GuidanceStep(NamedTuple):
         key: identity of the step; two steps with the same key are the same instruction, repeated.
         values: slot values.
         sector: direction as an index of `junction_exits.SECTORS`, or None.
-        distance: distance to where it is to be carried out [m].
+        distance: distance to the place of the action [m].
     """
 
     key: tuple[object, ...]

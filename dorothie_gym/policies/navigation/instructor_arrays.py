@@ -21,16 +21,16 @@ from dorothie_gym.support.compilation.records import (
 )
 
 CLOSED_PLACES = 64
-"""Most places closed by roadblocks that an instructor remembers; every roadblock closes two."""
+"""Maximum number of places closed by roadblocks that an instructor remembers; every roadblock closes two."""
 
 LEGS_AHEAD = 6
 """Number of legs on which roadblocks are looked for."""
 
 LEGS = 96
-"""Most legs of a route that an instructor keeps; of a longer one, the first. Routes through the towns have some 30."""
+"""Maximum number of legs that an instructor keeps of a route, the first. Routes through the towns have about 30."""
 
 LEGS_LEFT = 12
-"""Number of legs from which on the rest of a longer route is planned."""
+"""Number of legs after which the rest of a longer route is planned separately."""
 
 
 class StepKind(enum.IntEnum):
@@ -54,7 +54,7 @@ class ViewRecord:
     station: Float  # place of the car [m]
     speed: Float  # [m/s]
     time: Float  # [s]
-    turning: Float  # remaining length of the lane switch or U-turn under way [m], else 0
+    turning: Float  # remaining length of the lane switch or U-turn in progress [m], else 0
     lane: Int32
     things: Int32  # number of rows of `InstructorArrays.things` in use
     waits: Flag  # whether the car was instructed to stop, and stands
@@ -92,10 +92,10 @@ class ThingRecord:
 class RouteRecord:
     """Goal of the instructor, and progress on the route to it; -1 stands for none."""
 
-    subgoal: Int32  # present subgoal
+    subgoal: Int32  # current subgoal
     landmark: Int32  # its landmark
     legs: Int32  # number of legs of the route; 0 without a route
-    leg: Int32  # the present leg
+    leg: Int32  # the current leg
     astray: Int32  # number of decisions for which the car has been off the route
     closed: Int32  # number of rows of `InstructorArrays.closed` in use
     cut: Flag  # whether the route has more legs than there is room for
@@ -104,7 +104,7 @@ class RouteRecord:
 class InstructionRecord:
     """Last instruction, as `NavigationInstruction`; -1 stands for none."""
 
-    distance: Float  # to the place where it is to be carried out, as said [m]
+    distance: Float  # stated distance to the place of the action [m]
     time: Float  # at which it was given [s]
     kind: Int32  # `StepKind`; with `first` and `second` it identifies the step: equal steps are repetitions
     first: Int32
@@ -152,7 +152,7 @@ def instructor_arrays(*, subgoals: int, landmarks: int, streets: int, things: in
         subgoals: most subgoals.
         landmarks: most landmarks.
         streets: most streets.
-        things: most static bodies in sight.
+        things: maximum number of static bodies in sight.
     """
     arrays = InstructorArrays(
         now=argument(empty_records(ViewRecord, 1)),

@@ -33,7 +33,7 @@ class SectorExit:
 
     Attributes:
         angle: angle of the exit, from the car's own lane where that has one [degrees, positive left].
-        lane: lane behind the junction.
+        lane: lane beyond the junction.
         own: whether the exit can be reached from the car's lane; otherwise the car has to change lanes before.
         connectors: lanes across the junction that lead to the exit, from all lanes of the direction.
     """
@@ -46,7 +46,7 @@ class SectorExit:
 
 @shared
 class JunctionExits:
-    """Lookup of the exits behind each lane of a town; computed on first use.
+    """Lookup of the exits after each lane of a town; computed on first use.
 
     Every exit has one of the eight `SECTORS`: the one closest to its angle, or a neighbour where another exit fits
     that one better. Lanes of one direction share their exits, so that a sector means the same on all of them.
@@ -61,14 +61,14 @@ class JunctionExits:
         self._lanes = _lanes_by_exits(town)
 
     def by_sector(self, lane: int) -> tuple[SectorExit | None, ...]:
-        """Returns the exits behind a lane (8,), by sector."""
+        """Returns the exits after a lane (8,), by sector."""
         found = self._found.get(lane)
         if found is None:
             found = self._found[lane] = self._find(lane)
         return found
 
     def choice_ahead(self, observation: ObservationMapping) -> int | None:
-        """Returns the lane before the next junction with a choice; None where the car comes to none.
+        """Returns the lane before the next junction with a choice; None if the car reaches none.
 
         The turn options of the Co-Wizard's observation identify the lane, even where the position has drifted. The
         position decides only where several lanes have the same options, or more than are observed.
@@ -115,7 +115,7 @@ class ExitArrays(NamedTuple):
     """Exits of a town's junctions in arrays.
 
     Attributes:
-        lane: (lanes, 8) int32 lane behind the exit in each sector behind a lane, -1 for none.
+        lane: (lanes, 8) int32 lane after the exit in each sector after a lane, -1 for none.
         angle: (lanes, 8) int32 its angle [degrees, positive left].
         street: (lanes,) int32 number of each lane's street.
         ahead: (lanes,) int32 lane before the next junction with a choice on the default lanes, -1 for none.
@@ -156,12 +156,12 @@ def exit_arrays(town: Town) -> ExitArrays:
 
 
 def nearest_sector(angle: float) -> int:
-    """Returns the number of the sector whose middle is closest to an angle [degrees, positive left]."""
+    """Returns the number of the sector whose centre is closest to an angle [degrees, positive left]."""
     return round((angle + 180.0) / SECTOR_WIDTH) % len(SECTORS)
 
 
 def _lanes_by_exits(town: Town) -> dict[tuple[tuple[int, int], ...], list[int]]:
-    """Returns the lanes before junctions with a choice by their exits: lane behind the junction and angle of each."""
+    """Returns the lanes before junctions with a choice by their exits: lane beyond the junction and angle of each."""
     found: dict[tuple[tuple[int, int], ...], list[int]] = {}
     for lane in town.lanes:
         if is_choice(town, lane.id) and not lane.in_junction:
@@ -170,7 +170,7 @@ def _lanes_by_exits(town: Town) -> dict[tuple[tuple[int, int], ...], list[int]]:
 
 
 def _assign_sectors(angles: dict[int, int]) -> dict[int, int]:
-    """Assigns a sector to each road by the angle of its exit, best fit first; roads beyond the eighth get none."""
+    """Assigns a sector to each road by the angle of its exit, in order of fit; roads beyond the eighth get none."""
     count = len(SECTORS)
 
     def misfit(road: int, sector: int) -> float:

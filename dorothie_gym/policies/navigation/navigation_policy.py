@@ -76,14 +76,14 @@ class InstructionState:
 
 
 def destination(state: CoWizardState) -> Place | None:
-    """Returns the place to which the car finds its own way: a place on its map, or its guess of one."""
+    """Returns the place to which the car can drive unguided: a place on its map, or a guessed one."""
     if state.beliefs.stop_place is not None:
         return state.beliefs.stop_place
     return state.route.progress.goal if state.route.progress is not None else None
 
 
 def next_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) -> GuidanceStep | None:
-    """Returns the step to carry out now; None where there is no other than those given already.
+    """Returns the step to carry out now; None if there is none besides those already given.
 
     It is the step that the instructor of `Navigation-v0` would give: turns shortly before they are due, destinations
     by name, Stop with the distance to the stopping place.
@@ -120,7 +120,7 @@ def _manoeuvre_step(state: CoWizardState, view: CoWizardView, wish: Wish) -> Gui
 
 
 def _turn_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) -> GuidanceStep | None:
-    """Returns the turn asked for at the next junction, once that is near."""
+    """Returns the requested turn at the next junction, once the junction is near."""
     choice, way = view.choice, wanted_exit(state, view)
     if choice is None or way is None or choice.distance > _GUIDANCE.turn_distance:
         return None
@@ -164,7 +164,7 @@ Choose: TypeAlias = Callable[[Vector, NDArray[np.bool_]], int]
 """Driver: chooses one of the 18 actions from an observation of `Navigation-v0` (161,) and a mask (18,)."""
 
 PLAIN_STYLE = CoWizardStyle(echoes=0.0, checks=0.0, announces=0.0, silent=0.0, asks=1.0)
-"""Traits of the Co-Wizard that talks for a driver: acknowledges instructions, asks for unknown ways, and answers."""
+"""Traits of the Co-Wizard that talks for a driver: it acknowledges instructions, asks for unknown ways, and answers."""
 
 _EPSILON = 1e-6
 
@@ -178,7 +178,7 @@ class NavigationPolicyState:
         instructions: instructions heard.
         observation: observation of the Co-Wizard at the last decision; None before the first.
         decided_at: time of the last decision of the driver [s].
-        speed: cruise speed that was asked for and has been set [km/h].
+        speed: requested cruise speed that has been set [km/h].
     """
 
     co_wizard: CoWizardState
@@ -242,8 +242,8 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
     """Co-Wizard whose physical actions are chosen by a driver of `Navigation-v0`.
 
     The driver receives the observations of that environment. The rules of the scripted Co-Wizard interpret the
-    utterances, talk, and send belief updates. Cruise speed and lights, which are not asked for in `Navigation-v0`, are
-    set as the participant asks.
+    utterances, talk, and send belief updates. Cruise speed and lights, which `Navigation-v0` leaves out, are
+    set as the participant requests.
     """
 
     def __init__(
@@ -268,14 +268,14 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
         self._inputs: dict[Town, DriverInputs] = {}
 
     def initial_state(self, seed: int, town: Town) -> NavigationPolicyState:
-        """Returns the state before anything was said."""
+        """Returns the state at the start of a session."""
         co_wizard = self._scripted.initial_state(seed, town)
         return NavigationPolicyState(co_wizard=co_wizard, speed=co_wizard.intentions.speed)
 
     def step(
         self, observation: ObservationMapping, state: NavigationPolicyState
     ) -> tuple[ActionDict, NavigationPolicyState]:
-        """Listens and looks, drives, and says something or nothing."""
+        """Processes utterances and observation, drives, and possibly speaks."""
         decision = attend(observation, state.co_wizard)
         inputs = self._inputs_of(decision.state.town)
         updated = inputs.update(state, decision.state, decision.view, dict(observation))
@@ -303,7 +303,7 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
 def _set_speed_and_lights(
     state: NavigationPolicyState, view: CoWizardView
 ) -> tuple[Physical | None, NavigationPolicyState]:
-    """Sets cruise speed and lights as the participant asked, once; afterwards they are left to the driver."""
+    """Sets cruise speed and lights once, as the participant requested; afterwards the driver controls them."""
     wanted = state.co_wizard.intentions
     if wanted.speed != state.speed:
         if abs(view.cruise - wanted.speed) > CRUISE_TOLERANCE:

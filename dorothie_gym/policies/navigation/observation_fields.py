@@ -47,7 +47,7 @@ DISTANCE_UNIT = 100.0
 """Unit of distances to junctions, instructions and hazards [m]."""
 
 CLOSE_UNIT = 10.0
-"""Second, finer unit of distances that have to be met to the metre [m]."""
+"""Second, finer unit for distances that matter to the metre [m]."""
 
 DETOUR_UNIT = 200.0
 """Unit of differences between routes [m]."""

@@ -309,7 +309,7 @@ class NavigationEncoder:
         Args:
             seen: observation of the Co-Wizard.
             heard: last instruction.
-            blocked: places behind the roadblocks known.
+            blocked: places beyond the known roadblocks.
 
         Returns:
             Vector (n,) of `navigation_space`.

@@ -1,4 +1,4 @@
-"""Scripted participant: knows the tasks and all places, and gets the tasks done by dialogue."""
+"""Scripted participant: knows the tasks and all places, and completes the tasks through dialogue."""
 
 import lazy_loader
 

@@ -33,7 +33,7 @@ REACTION = 1.8
 """Time after which a car that has heard an instruction to stop begins to brake [s]."""
 
 PASSED = 15.0
-"""Distance behind the place up to which a stop instruction that was not obeyed is repeated [m]."""
+"""Distance past the place up to which a stop instruction that was not obeyed is repeated [m]."""
 
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
@@ -54,7 +54,7 @@ REWORDINGS = 4
 """Number of draws of other words for a stop instruction that is repeated."""
 
 BEHIND_CORNER = 5.0
-"""Distance from the beginning of a lane within which a car has just turned and is about to speed up [m]."""
+"""Distance from the start of a lane within which a car has just turned and is about to accelerate [m]."""
 
 STANDING_RANGE = 45.0
 """Distance to the place within which a standing car gets its next instruction [m]."""
@@ -97,7 +97,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 
 
 def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
-    """Repeats a stop instruction to a car that has not heeded it and drives past the place."""
+    """Repeats a stop instruction to a car that has not obeyed it and drives past the place."""
     progress, since = state.route.to_goal, view.time - state.guidance.stopped_at
     unheeded = _stop_repeat(state, view) < since < STOP_REPEAT and not view.standing
     if unheeded and -PASSED < progress.left(view.station) <= 0.0 and state.speech.idle and view.speaking <= 0.0:
@@ -144,7 +144,7 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
 
 
 def _announce_place(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
-    """Announces the place with its distance [m], or asks the car to slow down where the time is too short for that."""
+    """Announces the place with its distance [m], or requests a lower speed if there is no time for an announcement."""
     goal, speed = state.task.goal, max(view.speed, state.config.soon_speed)
     if goal is None:
         return
@@ -182,7 +182,7 @@ def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float
 
 
 def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay: float) -> bool:
-    """Returns whether the car has just turned, or comes out of a turn within a delay [s], and drives slowly."""
+    """Returns whether the car drives slowly and has just turned, or will finish a turn within a delay [s]."""
     lane = state.town.lanes[view.lane]
     out = lane.length - view.station < delay * view.speed if lane.in_junction else view.station < BEHIND_CORNER
     warned = state.guidance.slowed_early or state.guidance.approach_announced
@@ -192,7 +192,7 @@ def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay:
 def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
     """Returns the distance before the place at which the car stops [m]: instructed now, and at the next decision.
 
-    Negative distances lie behind the place. The words take effect when they end; until then the present
+    Negative distances lie past the place. The words take effect when they end; until then the present
     acceleration is extrapolated.
     """
     interval, config = state.clock.interval, state.config
@@ -225,8 +225,8 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place.
 
-    A car that does not move is asked why instead of being told a third time; then it is told to go straight on, in case
-    it waits before a junction, and to start.
+    A third unsuccessful instruction is replaced by the question why the car stands; then the car is told to go straight
+    on, in case it waits before a junction, and to start.
     """
     since = view.time if state.motion.standing_since is None else state.motion.standing_since
     state.guidance = state.guidance.after_nudging(view.time, since)
@@ -246,5 +246,5 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
 
 
 def straight_on() -> Remark:
-    """Returns the instruction to go straight on, across a junction as well."""
+    """Returns the instruction to go straight on, also across a junction."""
     return order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, Wording(direction=Direction.STRAIGHT))

@@ -32,56 +32,56 @@ class ParticipantConfig(GuidanceConfig):
         wait_distance: distance to the goal within which the car is not halted for news about tasks [m].
         thinking_time: duration of such a halt [s].
         report_delay: range of the delay before the completion of a task is reported [s].
-        next_task_delay: pause before the next task where it does not follow at once [s].
-        goes_first: probability that a new task on the way is done before the present one.
+        next_task_delay: pause before the next task if it does not follow at once [s].
+        goes_first: probability that a new task on the way is done before the current one.
         announces_ahead: probability that the change of a later task is mentioned at once.
-        tells_message: probability that the sender and the reason of a message are told with the change.
+        tells_message: probability that the sender and the reason of a message are mentioned with the change.
         leaves_route: probability that the choice of the route is left to the car in words.
-        unanswered_after: silence after which the car is asked whether it has understood [s].
+        unanswered_after: silence after which the participant asks whether the car has understood [s].
         guides_at_once: probability that guidance to an unknown place begins right after its description.
         describes_looks: probability that a place is also described by an object there.
         near_landmark: distance between a landmark and the goal within which it helps to describe the goal [m].
         turn_late_distance: distance at which a turn is announced even if the car has not asked [m].
         switch_time: time that the car is given for a lane change before the next instruction [s].
         take_over_distance: distance to a described goal at which guidance begins [m].
-        corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
+        corner_distance: distance to a junction within which a goal right after it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
-        careful_speeds: speeds asked for where the goal is easily missed [km/h].
-        manoeuvre_cost: extra cost of each lane change and U-turn on a route that has to be described in words [m].
-        run_up: least distance from a U-turn to the goal [m].
+        careful_speeds: speeds requested where the goal is easily missed [km/h].
+        manoeuvre_cost: extra cost of each lane change and U-turn on a route that must be described in words [m].
+        run_up: minimum distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
-        omits_straight: least probability that driving straight across a junction is not announced.
+        omits_straight: lowest probability of leaving out the announcement to drive straight across a junction.
         states_distance: probability that a place ahead is announced by a statement, not by an instruction.
         way_round_cost: extra cost of each lane change and U-turn after failures [m].
         off_route: number of decisions off the route after which a new one is planned.
         missed_within: distance to the goal below which leaving the route counts as a miss [m].
         wrong_turn_detour: increase of the distance after which a wrong turn is pointed out [m].
-        lost_detour: increase over the least distance after which the car counts as lost [m].
+        lost_detour: increase over the minimum distance after which the car counts as lost [m].
         lost_standstill: standstill after which guidance takes over [s].
         top_speed: largest speed expected of the car [m/s].
         slow_distance: distance to the goal within which an announced stop is timed [m].
-        slow_speed: speed below which slowing down is not asked for [m/s].
+        slow_speed: speed below which the participant does not ask for less speed [m/s].
         soon_speed: speed expected of a car that has just started or turned [m/s].
         short_stop: distance before the goal at which the car is stopped after a miss [m].
-        pull: acceleration expected of a car that comes out of a turn [m/s^2].
+        pull: expected acceleration of a car after a turn [m/s^2].
         ready_time: standstill after which a car near the goal gets its next instruction [s].
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
             rolls on [m].
         nudge_time: time after an instruction to drive on a little in which no other follows [s].
-        late_stop: distance behind the goal beyond which the stop instruction is shortened [m].
+        late_stop: distance past the goal beyond which the stop instruction is shortened [m].
         arrival_distance: distance to the goal within which other remarks are dropped [m].
         elsewhere_distance: distance to the goal beyond which a standing car is elsewhere [m].
         explains_order: probability that the order of two tasks is explained by naming the first one.
-        nods_first: probability that a remark begins with an acknowledgement of utterances heard meanwhile.
+        nods_first: probability that a remark starts by acknowledging utterances that were heard before it.
         just_said: time after an answer within which the same question needs no other one [s].
         unsure: probability that a yes is preceded by hesitation.
         checked_within: time within which a question refers to the last instruction [s].
         repeat_memory: time within which a repetition by the car refers to the last utterance [s].
-        usual_speed: speed asked for when the weather has cleared up [km/h].
+        usual_speed: speed requested when the weather has cleared up [km/h].
         weather_notice: time that the car is given to mention the weather first [s].
-        long_stop: standstill after which the reason may be asked for [s].
-        wonder_interval: least time between questions about unexpected behaviour [s].
+        long_stop: standstill after which the participant may ask for the reason [s].
+        wonder_interval: minimum time between questions about unexpected behaviour [s].
         asks_unseen: probability that a question about objects names one that may not be in sight.
         excuse_time: time for which an explanation excuses a standstill [s].
     """
@@ -147,14 +147,14 @@ class ParticipantConfig(GuidanceConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantStyle:
-    """Traits of a participant in a session, drawn at its beginning.
+    """Traits of a participant, drawn at the start of a session.
 
     Attributes:
         guides: probability of guidance to a place that the car may know.
         names_goal: probability that the goal is named before guidance.
         names_street: probability that a street is added to a place or a turn.
         hurries: probability that the next task follows in the same breath as the report of the last.
-        patience: standstill after which the reason is asked for [s].
+        patience: standstill after which the participant asks for the reason [s].
         chat: mean time between remarks unrelated to the task [s].
         waits: probability that a turn is announced only if the car asks, or shortly before the junction.
         hints: probability that a step is phrased as an explanation instead of an instruction.
@@ -163,10 +163,10 @@ class ParticipantStyle:
         nods: probability that explanations of the car are acknowledged.
         curious: probability of a question why the car does something unexpected.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
-        puzzled: probability that words of the car said during the participant's utterance have to be repeated.
+        puzzled: probability that the participant has missed words that the car said during its own utterance.
         points_out: probability that a car is stopped by the statement that this is the place.
         thanks: probability that an answer of the car is acknowledged.
-        verifies: probability that a destination is followed by the question whether the car knows it.
+        verifies: probability of asking whether the car knows a destination after naming it.
     """
 
     guides: float

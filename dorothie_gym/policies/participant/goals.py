@@ -123,7 +123,7 @@ def _has_to_wait(state: ParticipantState, view: ParticipantView, subgoal: SeenSu
 def _is_on_the_way(
     state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark
 ) -> bool:
-    """Returns whether a new subgoal may be reached now and is nearer than the announced target."""
+    """Returns whether a new subgoal may be done now and is nearer than the announced target."""
     task, progress = state.task, state.route.progress
     if task.goal is None or progress is None or not task.announced or not subgoal.allowed:
         return False
@@ -133,7 +133,7 @@ def _is_on_the_way(
 
 
 def route_length(state: ParticipantState, view: ParticipantView, landmark: SeenLandmark) -> float:
-    """Returns the length of the route to a landmark [m]; infinity where there is none."""
+    """Returns the length of the route to a landmark [m]; infinity if there is none."""
     route = router(state.town).route(view.place, landmark.place, state.route.blocked)
     return route.length if route is not None else math.inf
 
@@ -158,7 +158,7 @@ def _go_first(
 
 
 def switch_target(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
-    """Postpones the target in favour of another subgoal, which the car already knows or is about to hear of."""
+    """Postpones the target in favour of another subgoal, which the car knows or is about to be told."""
     state.task = state.task.put_off_target()
     state.forget_target()
     _aim_at(state, view, subgoal, landmark)
@@ -167,7 +167,7 @@ def switch_target(state: ParticipantState, view: ParticipantView, subgoal: SeenS
 
 
 def resume_after_wait(state: ParticipantState, view: ParticipantView) -> None:
-    """Instructs a waiting car to start when its time to wait is over."""
+    """Instructs a waiting car to start when its waiting time has ended."""
     if view.time < state.task.resume_at or not state.speech.idle:
         return
     state.task = state.task.waiting_until(math.inf)
@@ -244,7 +244,7 @@ def _line_of(subgoal: SeenSubgoal, subgoals: Sequence[SeenSubgoal], listed: str)
 def _report_more(
     state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator
 ) -> None:
-    """States further tasks at the target, or, by chance, at the place of a later errand."""
+    """States further tasks at the target, or, with some probability, at the place of a later errand."""
     if subgoal.index == state.task.target:
         state.say(*story_remark(state, view, rng))
         return
@@ -270,7 +270,7 @@ def _report_same_place(
     landmark: SeenLandmark,
     rng: np.random.Generator,
 ) -> None:
-    """States further tasks at the target, or which place of its name is meant now."""
+    """States further tasks at the target, or which of the places with its name is meant."""
     reason = story_remark(state, view, rng) if former.place == landmark.place else ()
     state.say(*(reason or (intend(Function.REQUEST, act_builders.destination(landmark.name, landmark.street)),)))
 
@@ -279,7 +279,7 @@ def _report_same_place(
 
 
 def choose_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Keeps an open target; otherwise chooses the nearest subgoal that may be reached now."""
+    """Keeps an open target; otherwise chooses the nearest subgoal that may be done now."""
     if state.task.target is not None:
         current = view.subgoals[state.task.target]
         if current.open and current.allowed:
@@ -330,7 +330,7 @@ PURPOSES = 0.75
 
 
 def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns the purpose of the target, or its reason, from the story; nothing if the story gives none."""
+    """Returns the purpose of the target, or its reason, from the story; nothing if the story has neither."""
     told, goal = purpose_of_target(state, view), state.task.goal
     if told is None or goal is None:
         return ()
@@ -340,7 +340,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         if text is not None and len(text) <= LONGEST_REASON
     }
     if told.reason is not None and refers_back(told.reason) and not _has_told_purpose(state, view, goal):
-        options.pop("reason", None)  # who "she" is has to be said first
+        options.pop("reason", None)  # the antecedent of "she" must be mentioned first
     if not options:
         return ()
     prefers = "purpose" if rng.random() < PURPOSES else "reason"
@@ -353,13 +353,13 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         if said not in state.task.told:
             break
     else:
-        return ()  # all of it has been told
+        return ()  # everything has been stated
     state.task = state.task.after_telling(said)
     return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
 
 
 def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> bool:
-    """Returns whether a recent remark has stated the target's purpose, and thereby the person or thing in question."""
+    """Returns whether a recent remark has stated the target's purpose, and thereby the person or item in question."""
     if not state.speech.has_just_spoken(view.time, _SPOKEN_OF):
         return False
     recent = (said for item in state.speech.said[-3:] for said in item.meaning)
@@ -388,7 +388,7 @@ def purpose_of(view: ParticipantView, index: int) -> Purpose | None:
 def _say_announcement(
     state: ParticipantState, view: ParticipantView, same_breath: bool, rng: np.random.Generator
 ) -> None:
-    """Names the target, perhaps with a reason, and perhaps a later task."""
+    """Names the target, possibly with a reason and a later task."""
     words = replace(announcement(state, view, rng), joined=same_breath)
     draw = rng.random()
     reason = story_remark(state, view, rng) if draw < 1.6 * state.style.reasons else ()

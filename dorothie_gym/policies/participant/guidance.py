@@ -77,13 +77,13 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         if not drove_past:
             _point_out_wrong_turn(state, view, before)
         if drove_past and not state.guidance.guiding:
-            # the car has not been told yet that it is there
+            # the car does not know yet that it has arrived
             state.guidance = state.guidance.for_new_route(state.route.to_goal.left(view.station))
     state.guidance = state.guidance.with_distance(state.route.to_goal.left(view.station))
 
 
 def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car is on its way to the lane of the turn that was announced, by lanes of its own choice."""
+    """Returns whether the car is heading for the lane of the announced turn on lanes of its own choice."""
     step = state.guidance.step
     if step is None or step[0] != "turn" or not state.guidance.guiding:
         return False
@@ -103,7 +103,7 @@ def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before
 
 
 def _wrong_way(state: ParticipantState, expires: float = math.inf) -> Remark:
-    """Returns the remark that the car has left the way to the place."""
+    """Returns the remark that the car has left the route to the place."""
     place = None if state.task.goal is None else state.task.goal.name
     wrong = Proposition.of(Predicate.RIGHT_WAY, negated=True, place=place)
     wording = Wording(topic="wrong_way")
@@ -179,7 +179,7 @@ def _is_astray(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether a step may be announced now; while the car comes close to the place, drops other remarks."""
+    """Returns whether a step may be announced now; drops other remarks as the car comes close to the place."""
     if state.guidance.guiding and about_to_arrive(state, view) and not view.standing:
         state.speech = state.speech.cleared()
     return state.speech.idle and view.speaking <= 0.0
@@ -226,7 +226,7 @@ def _is_left_to_ask(
 
 
 def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
-    """Asks the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
+    """Asks the car to slow down for a place that was missed before, or is easily missed after a manoeuvre."""
     progress, config = state.route.to_goal, state.config
     far = progress.left(view.station) > config.stop_distance
     if state.guidance.slowed_early or far or view.speed < config.slow_speed:
@@ -243,7 +243,7 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.ran
 
 
 def _is_easily_missed(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether there is hardly time to stop between the next junction or lane change and the place."""
+    """Returns whether there is too little time to stop between the next junction or lane change and the place."""
     progress, step, config = state.route.to_goal, state.guidance.step, state.config
     left = progress.left(view.station)
     crossing = progress.next_crossing(state.town, view.station)

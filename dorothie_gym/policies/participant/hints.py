@@ -1,4 +1,4 @@
-"""Hints of the participant that help to find the target, from its map and the look of the place; feelings."""
+"""Hints that help to find the target, from the participant's map and the look of the place; expressions of feelings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _SIGNS = {
 }
 
 _CLOSE, _FAR = 120.0, 220.0
-"""Route length up to which the target is called close, and from which it is called far [m]."""
+"""Largest route length to a target that is called close, and smallest to one that is called far [m]."""
 
 _MEASURED = 60.0, 350.0
 """Range of route lengths that are stated [m]."""
@@ -54,7 +54,7 @@ _FEELINGS = 0.25
 
 
 def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark that helps to find the target or expresses a feeling; nothing if all has been said."""
+    """Returns a remark that helps to find the target or expresses a feeling; nothing if there is no new one."""
     felt = _feeling(state, view)
     if felt is not None and rng.random() < _FEELINGS:
         return (_said(state, felt),)
@@ -71,7 +71,7 @@ def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
 
 
 def is_in_mind(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether "it" is understood as the target, because either speaker has just named it."""
+    """Returns whether "it" refers to the target because one of the speakers has just named it."""
     goal, speech = state.task.goal, state.speech
     recent = speech.said[-1:] if speech.has_just_spoken(view.time, _IN_MIND) else ()
     named = {value for item in (*recent, *speech.queue) for value in item.act.slots}

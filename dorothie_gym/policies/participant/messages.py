@@ -30,7 +30,7 @@ _PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this
 
 
 def refers_back(text: str) -> bool:
-    """Returns whether a text has a pronoun, whose antecedent has to be mentioned before."""
+    """Returns whether a text has a pronoun, whose antecedent must have been mentioned."""
     return _PRONOUN.search(text) is not None
 
 
@@ -46,7 +46,7 @@ def seconds_to_take_in(view: ParticipantView) -> float:
 def message_remark(
     state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
-    """Returns remarks on sender and reason of the last message about an errand; none without a reason, or by chance."""
+    """Returns, with some probability, remarks on sender and reason of the last message about an errand that has one."""
     read = _message(view)
     if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
         return ()

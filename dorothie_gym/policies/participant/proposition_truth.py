@@ -1,4 +1,4 @@
-"""Truth of propositions by what a participant knows and observes: scripted, or learned with the same records."""
+"""Truth of propositions, judged from the knowledge and observations of a scripted or learned participant."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LEFT_TO_THE_CAR: Final = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_
 """Actions that the participant leaves to the car."""
 
 JUST_DONE: Final = 12.0
-"""Time for which the last errand is what a car that asks whether it has arrived means [s]."""
+"""Time for which the question "are we there?" refers to the last errand [s]."""
 
 CLOSE_DISTANCE: Final = 120.0
 """Distance within which the target is called close [m]."""
@@ -32,7 +32,7 @@ ARRIVED_WITHIN: Final = 2.0
 
 
 def has_just_finished(state: ParticipantState, view: ParticipantView, landmarks: Collection[object]) -> bool:
-    """Returns whether the errand at one of some landmarks was done a moment ago."""
+    """Returns whether the errand at one of the given landmarks was done a moment ago."""
     place, at = state.task.finished
     return place in landmarks and view.time - at <= JUST_DONE
 
@@ -45,7 +45,7 @@ def is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def believes(state: ParticipantState, view: ParticipantView, said: Proposition) -> bool | None:
-    """Returns whether a proposition is true by what the participant knows and sees; None where nothing tells."""
+    """Returns whether a proposition is true, from what the participant knows and sees; None if it cannot be decided."""
     found = _holds(state, view, said)
     return found if found is None else found is not said.negated
 

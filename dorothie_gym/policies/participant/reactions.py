@@ -39,21 +39,21 @@ _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATI
 """Parameters of the weather that have a reaction of their own."""
 
 _HASTE, _HURRIED = 5, 0.75
-"""Speed that a hurried participant adds to the speed suitable for the sight [km/h], and the trait `hurries` from which
-it does so.
+"""Speed that a hurried participant adds to the speed suitable for the sight [km/h], and the minimum value of the trait
+`hurries` for this.
 """
 
 _SPEEDING_UP = 130.0
 """Route length to the place below which the participant does not ask for more speed [m]."""
 
 LIGHTS_INTERVAL = 25.0
-"""Time between remarks about the head lights [s]."""
+"""Time between remarks about the headlights [s]."""
 
 WHY_INTERVAL = 40.0
 """Time between questions why the car stands [s]."""
 
 WHY_DISTANCE = 45.0
-"""Distance to the place within which a standstill is not asked about [m]."""
+"""Distance to the place within which the participant does not ask about a standstill [m]."""
 
 _ROADSIDE_OBJECTS = (
     ObjectClass.BRIDGE, ObjectClass.BUILDING, ObjectClass.DYNAMIC, ObjectClass.FENCE, ObjectClass.POLE,
@@ -143,7 +143,7 @@ def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[
 
 
 def _mention_view(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Wonders, by chance, about a view that is poorer than the weather explains, if the car does not mention it."""
+    """Remarks, with some probability, on a view poorer than the weather explains, if the car does not mention it."""
     conversation, config = state.conversation, state.config
     if conversation.asked_about_view or view.time - conversation.blind_since < config.weather_notice:
         return
@@ -198,7 +198,7 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
 
 
 def _look_around(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, a conspicuous change of the weather, or a crowd."""
+    """Mentions, with some probability, a conspicuous change of the weather, or a crowd."""
     said, noticed = notice(
         state.conversation.noticed, view.raw, view.objects, rng, chance=state.style.notices, handled=_HANDLED
     )
@@ -208,7 +208,7 @@ def _look_around(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Asks for the head lights in the dark."""
+    """Asks for the headlights in the dark."""
     lit = bool(view.raw["lights"])
     if not is_dark(view.raw) or lit or view.time - state.conversation.lights_at < LIGHTS_INTERVAL:
         return
@@ -243,7 +243,7 @@ def _why(effect: Proposition) -> Remark:
 
 
 def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Asks, by chance, why the car turns round or stands for long on its own."""
+    """Asks, with some probability, why the car turns round or stands for long on its own."""
     conversation, config = state.conversation, state.config
     if state.guidance.guiding or view.time - conversation.wondered_at < config.wonder_interval:
         return
@@ -279,7 +279,7 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 
 def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
-    """Returns a general question about the drive: what the car knows, or how the drive is going."""
+    """Returns a general question: what the car knows, or how the drive is going."""
     asked = [Proposition.of(predicate) for predicate in (Predicate.SAFE, Predicate.VISIBILITY, Predicate.RIGHT_WAY)]
     asked += [Proposition.of(Predicate.LOCALISED), Proposition.of(Predicate.LOCALISED, negated=True)]
     if state.task.goal is not None and not state.guidance.guiding:

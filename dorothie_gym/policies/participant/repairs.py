@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.view import ParticipantView
 
 _WORTH_REPEATING = act_builders.QUESTIONS | {DialogueMove.EXPLAIN}
-"""Moves that the participant asks to have repeated."""
+"""Moves whose repetition the participant requests."""
 
 _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.EXPLAIN, DialogueMove.QUERY_W})
 """Moves of the car that show how it has understood an instruction."""
@@ -29,7 +29,7 @@ _SIDEWAYS = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 
 
 def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
-    """Returns whether the participant has to ask for words that were inaudible, or said while it was speaking.
+    """Returns whether the participant must ask again for words that were inaudible or said while it was speaking.
 
     Args:
         state: working copy of the state; keeps the utterance, to answer it after the clarification.
@@ -70,7 +70,7 @@ def correction(state: ParticipantState, view: ParticipantView, act: DialogueAct,
 
 
 def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None:
-    """Returns the place again if another one was taken up, or this one was given up."""
+    """Names the place again if the car has adopted another one or abandoned this one."""
     goal = state.task.destination
     named = {value for value in act.values(Slot.LANDMARK) if value.label not in ("Unknown", "Queried")}
     said = {value for item in state.speech.said for value in item.act.slots}
@@ -87,7 +87,7 @@ def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None
 
 
 def _revives(state: ParticipantState, act: DialogueAct, named: set[SlotValue]) -> bool:
-    """Returns whether the car takes up an errand that it was told to give up."""
+    """Returns whether the car resumes an errand that the participant has cancelled."""
     if act.move not in (DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM) or act.values(Slot.STATUS):
         return False
     last = next((item for item in reversed(state.speech.said) if named & set(item.act.slots)), None)

@@ -72,7 +72,7 @@ _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
 """Beginning of a question for the destination, the rest of which was not understood."""
 
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
-"""Words by which the car says that it has come to a place."""
+"""Words by which the car says that it has reached a place."""
 
 _LACKS_PLACE = re.compile(
     r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|(don't know|no idea) where (?!we|i\b)"
@@ -81,7 +81,7 @@ _LACKS_PLACE = re.compile(
 """Words by which the car says that it does not find the place, even if parts of them are misheard."""
 
 _LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
-"""Words by which the car says that it stands because it does not know the way."""
+"""Words by which the car says that it has stopped because it does not know the way."""
 
 
 def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -148,7 +148,7 @@ def _open_question(
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
-        state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
@@ -181,7 +181,7 @@ def _was_just_named(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
-    """Announces the next step, unless a stop instruction or the same answer is under way."""
+    """Announces the next step, unless a stop instruction or the same answer is being spoken."""
     step = next_step(state, view, move, rng)
     if step is None:
         return
@@ -227,7 +227,7 @@ def _answer_to_why(
 ) -> None:
     """Reacts to the car's reason for a standstill.
 
-    Denies a wrong claim of arrival, gives directions that the car asks for, and repeats the destination if it still
+    Denies a wrong claim of arrival, gives requested directions, and repeats the destination if the car still
     stands at the place of a previous errand.
     """
     goal, said, places, asked = state.task.goal, words.text.lower(), act.values(Slot.LANDMARK), state.speech.last
@@ -251,7 +251,7 @@ def _answer_to_why(
 
 
 def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
-    """Returns an acknowledgement of an explanation: a reason for a stop, something to be seen, or anything else."""
+    """Returns an acknowledgement of an explanation: of a reason for a stop, of something visible, or in general."""
     said = {value for act in heard.acts for value in act.slots}
     objects = any(isinstance(value, ObjectClass) for value in said)
     reason = ActionValue.STOP in said or (objects and view.standing)
@@ -260,13 +260,13 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
 
 
 def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
-    """Returns whether the car has answered the question that was asked last."""
+    """Returns whether the car has answered the last question."""
     last = state.speech.last
     return last is not None and last.act.move in act_builders.QUESTIONS and heard.acts[0].move in _REPLIES
 
 
 def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Shows, by chance, that the answer of the car was heard."""
+    """Acknowledges, with some probability, the answer of the car."""
     busy = not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view))
     if not busy and rng.random() < state.style.thanks:
         state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="answered")), *addition(state, view, rng))
@@ -336,7 +336,7 @@ def _confusion(
 
 
 def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated unchanged: a question, a yes or no, small talk, an action no step names."""
+    """Returns whether a remark is repeated unchanged: a question, yes or no, small talk, an action off the route."""
     if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)

@@ -49,7 +49,7 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
 
 
 def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView, step: StepKey) -> bool:
-    """Counts a turn that was announced and not taken; returns whether another route is tried because of it."""
+    """Counts an announced turn that was not taken; returns whether the participant therefore tries another route."""
     state.guidance = state.guidance.after_wrong_turn(step)
     if state.guidance.wrong_turns.count(step) < IN_VAIN:
         return False
@@ -65,7 +65,7 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     """Chooses another route after U-turns or lane changes that brought no progress."""
     progress, guidance = state.route.to_goal, state.guidance
     if any(item.act.move in _ANSWERS for item in state.speech.queue):
-        return  # what the car has asked is answered first
+        return  # questions of the car are answered first
     manoeuvre = progress.next_manoeuvre(view.station)
     if manoeuvre is None or (guidance.step is None and not guidance.u_turns):
         return

@@ -1,4 +1,4 @@
-"""Next step on the route to the participant's target: a turn, a U-turn, a lane switch, or going on."""
+"""Next step on the route to the participant's target: a turn, a U-turn, a lane switch, or driving on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class RouteStep:
     Attributes:
         key: identity.
         distance: distance to it [m].
-        action: action of the car that it asks for.
+        action: action that it requires of the car.
         direction: direction of a turn or lane switch; None for others.
         junction: junction of a turn; None for others.
     """
@@ -36,7 +36,7 @@ class RouteStep:
 
 
 def is_last_stretch(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether there is a route, and no junction or manoeuvre left on it before the target."""
+    """Returns whether there is a route without any further junction or manoeuvre before the target."""
     progress = state.route.progress
     if progress is None or progress.route is None:
         return False
@@ -78,7 +78,7 @@ def route_step(state: ParticipantState, view: ParticipantView) -> RouteStep | No
 def _needs_switch(
     progress: RouteProgress, state: ParticipantState, view: ParticipantView, crossing: RouteJunction
 ) -> bool:
-    """Returns whether the lane before a junction has to be asked for; "turn left" includes the way to a turn lane."""
+    """Returns whether a lane change before a junction needs an instruction; "turn left" includes one to a turn lane."""
     if crossing.lane in turn_lanes(state.town):
         return crossing.direction is Direction.STRAIGHT
     return progress.needs_switch(state.town, view.lane, view.station, crossing)

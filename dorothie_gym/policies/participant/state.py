@@ -30,13 +30,13 @@ class ConversationState:
 
     Attributes:
         heard_at: time of the last utterance of the car [s].
-        puzzled_by: utterance of the car that was not understood and has to be repeated.
-        asked_at: time of the last question why the car stands [s].
+        puzzled_by: utterance of the car that was not understood and needs to be repeated.
+        asked_at: time of the last question about a standstill [s].
         wondered_at: time at which unexpected behaviour was last asked about or ignored [s].
         chat_at: time of the next remark unrelated to the task [s].
-        lights_at: time at which the head lights were last mentioned [s].
+        lights_at: time at which the headlights were last mentioned [s].
         slowed: whether a lower speed for the weather has been requested or was not needed.
-        bad_weather_since: start of the present bad weather [s]; infinite in good weather.
+        bad_weather_since: start of the current bad weather [s]; infinite in good weather.
         hurried: whether the car has been asked to go faster.
         noticed: weather and crowds that have been noticed.
         blind_since: time since which the camera shows less than the weather explains [s]; infinite while it does not.
@@ -61,11 +61,11 @@ class ConversationState:
         return replace(self, heard_at=now)
 
     def with_puzzle(self, heard: HeardUtterance | None) -> ConversationState:
-        """Sets the utterance that has to be repeated; None once it has been clarified."""
+        """Sets the utterance that needs to be repeated; None once it has been clarified."""
         return replace(self, puzzled_by=heard)
 
     def after_asking_why(self, now: float) -> ConversationState:
-        """Records a question why the car stands."""
+        """Records a question about a standstill."""
         return replace(self, asked_at=now)
 
     def after_wondering(self, now: float) -> ConversationState:
@@ -77,11 +77,11 @@ class ConversationState:
         return replace(self, chat_at=at)
 
     def after_mentioning_lights(self, now: float) -> ConversationState:
-        """Records a mention of the head lights."""
+        """Records a mention of the headlights."""
         return replace(self, lights_at=now)
 
     def with_weather(self, now: float, *, bad: bool) -> ConversationState:
-        """Updates the start of the present bad weather."""
+        """Updates the start of the current bad weather."""
         since = min(self.bad_weather_since, now) if bad else math.inf
         return self if since == self.bad_weather_since else replace(self, bad_weather_since=since)
 
@@ -122,7 +122,7 @@ class TaskProgress:
         described: whether the place of the target has been described to the car.
         same_breath: whether the next task is named in the same breath as the report of the last one.
         next_at: time before which the next task is not named unless the car asks [s].
-        resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
+        resume_at: time at which a waiting car is instructed to continue [s]; infinite if it does not wait.
         put_off: interrupted subgoals, which will be resumed.
         told: statements made about the route to the target, its place, and the speaker's feelings about it.
         finished: landmark of the last completed errand, and the time of its completion [s].
@@ -144,7 +144,7 @@ class TaskProgress:
 
     @property
     def destination(self) -> SeenLandmark:
-        """Landmark of the target, for what is done with one only; raises `PolicyStateError` without a target."""
+        """Landmark of the target, for code that requires one; raises `PolicyStateError` without a target."""
         if self.goal is None:
             raise PolicyStateError("the participant has no target: none of its subgoals is open, allowed and known")
         return self.goal
@@ -186,7 +186,7 @@ class TaskProgress:
         return self if same_breath is self.same_breath else replace(self, same_breath=same_breath)
 
     def waiting_until(self, resume_at: float) -> TaskProgress:
-        """Sets the time at which a waiting car is sent on [s]; infinite for a car that does not wait."""
+        """Sets the time at which a waiting car is instructed to continue [s]; infinite if it does not wait."""
         return replace(self, resume_at=resume_at)
 
     def put_off_target(self) -> TaskProgress:
@@ -208,7 +208,7 @@ class GuidanceState:
 
     Attributes:
         guiding: whether the car is guided turn by turn.
-        best: least distance to the target so far [m].
+        best: minimum distance to the target so far [m].
         step: last step that was announced.
         step_at: time at which it was announced [s].
         repeats: number of repetitions of that step.
@@ -217,7 +217,7 @@ class GuidanceState:
         wrong_turns: turns that were announced and not taken.
         lane_changes: lanes that the car was instructed to leave, and the times of the instructions [s].
         approach_announced: whether the car has been informed that the place is near.
-        slowed_early: whether it has been asked to slow down because the place is easily missed.
+        slowed_early: whether the car has been asked to slow down because the place is easily missed.
         stop_text: words to stop the car with; empty until they are chosen.
         points_out: whether these words only state that this is the place.
         stop_said: words of the last stop instruction, which are not repeated: they may be hard to recognise.
@@ -253,16 +253,16 @@ class GuidanceState:
         return self if guiding is self.guiding else replace(self, guiding=guiding)
 
     def for_new_target(self) -> GuidanceState:
-        """Resets everything that belongs to one target."""
+        """Resets all state that belongs to one target."""
         kept = GuidanceState()
         return replace(kept, step_at=self.step_at, considered=self.considered, left_to_ask=self.left_to_ask)
 
     def with_distance(self, left: float) -> GuidanceState:
-        """Updates the least distance to the target [m]."""
+        """Updates the minimum distance to the target [m]."""
         return self if left >= self.best else replace(self, best=left)
 
     def for_new_route(self, left: float) -> GuidanceState:
-        """Restarts step and least distance on a route around a roadblock."""
+        """Restarts step and minimum distance on a route around a roadblock."""
         return replace(self, best=left, step=None)
 
     def after_step(self, step: StepKey, now: float, return_time: float) -> GuidanceState:
@@ -314,11 +314,11 @@ class GuidanceState:
         return replace(self, slowed_early=True)
 
     def with_stop_text(self, text: str, *, points_out: bool = False) -> GuidanceState:
-        """Sets the words to stop the car with, and whether they only state that this is the place."""
+        """Sets the words of the stop instruction, and whether they only state that this is the place."""
         return replace(self, stop_text=text, points_out=points_out)
 
     def after_stopping(self, now: float) -> GuidanceState:
-        """Records an instruction to stop; if it has to be repeated, it is a plain one."""
+        """Records an instruction to stop; a repetition is worded plainly."""
         return replace(self, stopped_at=now, stop_text="", stop_said=self.stop_text, points_out=False)
 
     def after_nudging(self, now: float, standing_since: float) -> GuidanceState:
@@ -337,7 +337,7 @@ class MotionState:
     Attributes:
         standing_since: start of the standstill that needs an explanation [s]; None while the car moves.
         moved_at: time at which the car was last seen to move [s].
-        excused_until: time until which a standstill is not asked about [s].
+        excused_until: time until which the participant does not ask about a standstill [s].
         speed: speed at the last decision [m/s].
     """
 
@@ -353,7 +353,7 @@ class MotionState:
         return self if self.standing_since is not None else replace(self, standing_since=now)
 
     def at_red_light(self, now: float, start_time: float) -> MotionState:
-        """Restarts the standstill at a red light and excuses the time to start afterwards [s]."""
+        """Restarts the standstill at a red light, and allows a time to start after it [s]."""
         return replace(self, standing_since=now, excused_until=max(self.excused_until, now + start_time))
 
     def excused(self, until: float) -> MotionState:

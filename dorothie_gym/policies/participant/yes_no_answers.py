@@ -70,12 +70,12 @@ def checked(state: ParticipantState, act: DialogueAct, words: ParsedText) -> Pro
 
 
 def _short(function: Function, content: Proposition) -> Remark:
-    """Returns an answer whose content goes without saying: "yes", "that's it"."""
+    """Returns an answer without explicit content: "yes", "that's it"."""
     return intend(function, content, elided=act_builders.arguments_of(content))
 
 
 def denied(content: Proposition) -> Remark:
-    """Returns the answer that a content is wrong or not wanted: "no"."""
+    """Returns the answer that the content of a question is wrong or not wanted: "no"."""
     return _short(Function.NEGATIVE_ANSWER, content.opposite)
 
 
@@ -98,7 +98,7 @@ def _fits(
 
 
 def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a hint or reason to add to an answer, or nothing, by chance."""
+    """Returns, with some probability, a hint or reason to add to an answer."""
     if rng.random() >= state.style.reasons:
         return ()
     if state.guidance.guiding or not is_in_mind(state, view) or rng.random() < 0.5:
@@ -109,7 +109,7 @@ def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 def _refuse_with_step(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Says no, and names the right step unless a stop instruction is under way."""
+    """Says no, and names the right step unless a stop instruction is being spoken."""
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     refusal = denied(checked(state, act, words))
     just_stopped = view.time - state.guidance.stopped_at < state.config.just_said
@@ -124,7 +124,7 @@ def _refuse_with_step(
 def answer_yes_no(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Answers a question that wants a yes or a no."""
+    """Answers a question that expects a yes or a no."""
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
     offered = _offered_subgoal(state, view, landmarks)
     if _asks_about_finished(state, view, act, words):
@@ -159,7 +159,7 @@ def answer_yes_no(
         place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
         asked = words.asked or place or (checked(state, act, words) if act.slots else None)
         if asked is None:
-            state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+            state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
             return
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
@@ -167,7 +167,7 @@ def answer_yes_no(
 
 
 def _asks_about_finished(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
-    """Returns whether the car, which stands, asks if it has arrived where an errand was just done."""
+    """Returns whether the stationary car asks if it has arrived where an errand was just done."""
     place = state.task.finished[0]
     if not view.standing or not has_just_finished(state, view, (place,)):
         return False
@@ -220,7 +220,7 @@ def _answer_street(state: ParticipantState, view: ParticipantView, act: Dialogue
 def _answer_proposal(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Accepts the right way, and names it otherwise."""
+    """Confirms the right way, or else names it."""
     if not _fits(state, view, act, words, rng):
         _refuse_with_step(state, view, act, words, rng)
         return
@@ -244,13 +244,13 @@ def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def correct_arrival(state: ParticipantState, view: ParticipantView, said: Proposition | None = None) -> None:
-    """Denies a question or statement (by default that it has arrived) of a car just before the target; sends it on."""
+    """Denies a question or statement (by default that it has arrived) of a car before the target; directs it on."""
     arrived = Proposition.of(Predicate.ARRIVED, place=state.task.destination.name)
     state.say_only(denied(said or arrived), replace(creep_instruction(state, view), joined=True))
 
 
 def deny_other_place(state: ParticipantState, places: Collection[SlotValue]) -> None:
-    """Corrects a car that says it has come to another place, and names the target again."""
+    """Corrects a car that claims to have reached another place, and names the target again."""
     if state.task.goal is None or not state.task.announced:
         return
     state.set_guiding(True)

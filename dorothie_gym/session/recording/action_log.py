@@ -29,7 +29,7 @@ class Decision:
     """Actions of the roles at a decision.
 
     Attributes:
-        frame: frame of the decision; the actions take effect from the next frame on.
+        frame: frame of the decision; the actions take effect in the next frame.
         actions: by role, the fields of its action that differ from those of the no-op action (JSON types).
             Arrays of 0 and 1 are stored as the indices of the ones, other arrays as numbers without trailing zeros.
             Roles with a no-op action are left out.
@@ -85,7 +85,7 @@ def read_decisions(folder: Path) -> tuple[tuple[Decision, ...] | None, bool]:
 
 
 def check_order(decisions: Sequence[Decision], where: str) -> None:
-    """Raises `SessionError`, beginning with `where`, if the frames of decisions do not rise."""
+    """Raises `SessionError`, prefixed with `where`, if the frames of decisions do not rise."""
     for number, (before, after) in enumerate(itertools.pairwise(decisions), start=2):
         if after.frame <= before.frame:
             raise SessionError(f"{where}, line {number}: frame {after.frame} after {before.frame}; frames must rise")

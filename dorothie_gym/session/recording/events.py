@@ -78,7 +78,7 @@ class EndReason(enum.StrEnum):
     ARRIVED = "arrived"
     """The destination, the last live subgoal, was reached."""
     OUT_OF_TIME = "out of time"
-    """The time of the session was over."""
+    """The time limit of the session was reached."""
     LEFT = "left"
     """A person left and did not come back in time."""
     ENDED = "ended"
@@ -151,7 +151,7 @@ class MoveRecord:
         flagged: whether it is a prediction point.
         transaction: number of the transaction; None if unknown.
         recognised: words that a speech recogniser returned for the whole utterance; None without a recogniser.
-        meaning: propositions that the speaker states, asks or asks for; empty if they are not known.
+        meaning: propositions that the speaker states, asks or requests; empty if they are unknown.
         fluent: words of this move without hesitations, restarts and withdrawn names; None if it has none.
     """
 
@@ -205,7 +205,7 @@ class InfractionRecord:
         type: the rule: one of `events.INFRACTIONS`.
         lane: lane of the car; None if not recorded, like `station`.
         station: distance along the lane [m].
-        x: x coordinate of the car [m], or None; `y` likewise.
+        x: x coordinate of the car [m], or None; `y` is the y coordinate.
         key: number of the counterpart (of a body, or of a light or sign); None without one.
         other: class of the counterpart; None without one.
         own_fault: whether the car ran into the counterpart of a collision; True for the other types.

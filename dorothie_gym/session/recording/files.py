@@ -58,16 +58,16 @@ ANNOTATIONS_FOLDER: Final = "annotations"
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, SEATS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000
-"""Most events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
+"""Maximum number of events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
 
 MAX_MOVES: Final = 10_000
-"""Most dialogue moves of a session; 15 minutes have some 300."""
+"""Maximum number of dialogue moves of a session; 15 minutes have about 300."""
 
 MAX_EXCEPTIONS: Final = 500
-"""Most exceptions of a session; most sessions have up to 4."""
+"""Maximum number of exceptions of a session; most sessions have up to 4."""
 
 MAX_FRAMES: Final = 1_000_000
-"""Most frames of a session: 9 hours at 30 Hz."""
+"""Maximum number of frames of a session: 9 hours at 30 Hz."""
 
 MAX_FRAME: Final = 2**31
 """Bound of frame numbers."""
@@ -162,7 +162,7 @@ def to_page(value: object) -> str:
 
 
 def same_json(first: object, second: object) -> bool:
-    """Returns whether two values are written alike in JSON, whatever the order of keys; 15 and 15.0 are not."""
+    """Returns whether two values have equal JSON, regardless of the order of keys; 15 and 15.0 differ."""
     return to_line(canonical(first, "value")) == to_line(canonical(second, "value"))
 
 
@@ -200,7 +200,7 @@ def read_object(path: Path) -> Fields:
 
 
 def decode_text(content: bytes, where: str) -> str:
-    """Returns the text of bytes in UTF-8; raises `SessionError`, beginning with `where`, for other bytes."""
+    """Returns the text of bytes in UTF-8; raises `SessionError`, prefixed with `where`, for other bytes."""
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:

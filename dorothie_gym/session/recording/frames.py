@@ -167,7 +167,7 @@ def _typed(
         column: the column.
         wanted: type of whole numbers or of floats.
         where: file and column, for messages.
-        unknown: whether floats may be null or NaN, which stand for an unknown value.
+        unknown: whether floats may be null or NaN for an unknown value.
 
     Raises:
         SessionError: the column holds other types than numbers, or numbers out of range.

@@ -36,7 +36,7 @@ class SeatEventKind(enum.StrEnum):
     LEFT = "left"
     """The connection of a person ended."""
     TAKEN_OVER = "taken over"
-    """A policy plays from here on: policy (its name)."""
+    """A policy takes over the seat: policy (its name)."""
     PAUSED = "paused"
     """The clock of the session stopped: reason ("experimenter", or "absence")."""
     RESUMED = "resumed"

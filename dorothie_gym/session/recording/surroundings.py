@@ -60,7 +60,7 @@ _WEATHER_NAMES: Final = frozenset(WEATHER_DTYPE.names or ())
 
 @dataclass(frozen=True, eq=False)
 class SceneTable:
-    """Rows that were recorded at some frames, any number per frame.
+    """Rows that were recorded at frames, any number per frame.
 
     Attributes:
         frames: the recorded frames (k,) int64, rising.

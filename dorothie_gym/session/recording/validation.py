@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def faults_of(session: Session) -> tuple[str, ...]:
-    """Returns one sentence for each fault, beginning with its place."""
+    """Returns one sentence for each fault, starting with its place."""
     return (*_header(session), *_events(session), *_actions(session), *_utterances(session), *_frames(session))
 
 
@@ -96,13 +96,13 @@ def _frames(session: Session) -> Iterator[str]:
 # --- Report of a reader ----------------------------------------------------------------------------------------------
 
 MAX_REPORTED_NAMES: Final = 100
-"""Most names of one kind that a report counts separately."""
+"""Maximum number of names of one kind that a report counts separately."""
 
 OTHERS: Final = "(others)"
 
 
 class ReportPage(TypedDict):
-    """Report of a reader in JSON types; fields as of `ReadReport`."""
+    """Report of a reader in JSON types; fields as in `ReadReport`."""
 
     layout: str
     unknown: dict[str, int]

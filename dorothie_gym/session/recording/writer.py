@@ -85,7 +85,7 @@ class SessionWriter:
             frames: (n, 9) float64, see `TRAJECTORY_COLUMNS`; frames must rise.
 
         Raises:
-            SessionError: an event or a row cannot be written; nothing of the batch is written then.
+            SessionError: an event or a row cannot be written; no part of the batch is written then.
         """
         self._check_open("nothing can be appended")
         lines = [encode_event(event) for event in events]
@@ -106,7 +106,7 @@ class SessionWriter:
     def add_decision(self, frame: int, actions: Mapping[Role, Mapping[str, object]]) -> None:
         """Appends the actions of the roles at a frame, see `Decision`; nothing is written without an action.
 
-        From the first call on, the session counts as one with recorded decisions.
+        After the first call, the session counts as one with recorded decisions.
 
         Raises:
             SessionError: an action cannot be written, or the frame is not above that of the decision before.
@@ -132,7 +132,7 @@ class SessionWriter:
 
     def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
         """Appends the state of each light at a frame, by id of its signal; raises `SessionError` as `add_actors`."""
-        if self._lights is None or self._lights[0] != lights:  # they seldom change
+        if self._lights is None or self._lights[0] != lights:  # they rarely change
             self._lights = dict(lights), light_rows(lights)
         self._add(LIGHTS, frame, self._lights[1])
 
@@ -172,7 +172,7 @@ class SessionWriter:
         """Writes the outcome, which completes the session, and closes it.
 
         The journal is converted into `frames.parquet` and removed; last, `session.json` is replaced atomically. A
-        finished session is on the disk: a power failure cannot take parts of it.
+        finished session is on the disk: a power failure cannot destroy parts of it.
 
         Raises:
             SessionError: the outcome holds other types than JSON's, or the session is closed.
@@ -194,7 +194,7 @@ class SessionWriter:
 
     def close(self) -> None:
         """Closes the files; an unfinished session stays incomplete. May be called again."""
-        with contextlib.ExitStack() as closing:  # all of them, also on a disk that fails
+        with contextlib.ExitStack() as closing:  # all of them, even on a failing disk
             for file in (self._events, self._journal, self._decisions):
                 if file is not None:
                     closing.callback(file.close)
@@ -216,7 +216,7 @@ class SessionWriter:
             raise SessionError(
                 f"{self.folder}: holds a session already ({', '.join(present)}); choose another folder or overwrite it"
             )
-        # The header goes first: from then on, whenever the process dies, the folder holds no session with parts of two.
+        # The header is removed first: if the process dies after that, the folder holds no session with parts of two.
         for name in present:
             (self.folder / name).unlink()
         for name in (PICTURES_FOLDER, AUDIO_FOLDER):

@@ -1,7 +1,7 @@
 """Reader of action dicts that checks each field against its space.
 
 The bounds of a space are looked up once (`ActionFieldTable`). Valid values pass with a few comparisons; every other
-value goes through slower checks that word the error message.
+value goes through slower checks that produce the error message.
 """
 
 from __future__ import annotations

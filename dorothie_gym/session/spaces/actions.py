@@ -63,7 +63,7 @@ ActionMapping: TypeAlias = Mapping[str, Any]
 """Read-only action dict, as accepted by the decoders."""
 
 MAX_SPAWNED = 16
-"""Largest number of actors in one spawn exception."""
+"""Maximum number of actors in one spawn exception."""
 
 MAX_EXTENT = 100
 """Largest half side of the square of a spawn exception [m]."""
@@ -75,8 +75,8 @@ class Speech:
 
     Attributes:
         act: the dialogue act.
-        text: its words; empty to have them generated.
-        meaning: propositions that the speaker states, asks or asks for. They are recorded, but no role observes them.
+        text: its words; if empty, they are generated.
+        meaning: propositions that the speaker states, asks or requests. They are recorded, but no role observes them.
         onset: time from the decision to the first word of an utterance [s]; a span that continues one has none.
         pace: speaking rate relative to that of the environment.
     """
@@ -306,7 +306,7 @@ _CLASSES: dict[Role, type[ParticipantAction] | type[CoWizardAction] | type[AdWiz
 
 @shared
 class ActionDecoder:
-    """Decoder of the actions of one role; looks up everything that depends on the role once."""
+    """Decoder of the actions of one role; all role-dependent look-ups are done once."""
 
     def __init__(self, role: Role, limits: SpaceLimits) -> None:
         """Looks up the field bounds of a role."""

@@ -46,7 +46,7 @@ class SharedText(spaces.Text):
 
 
 class SharedTexts(tuple[str, ...]):
-    """Texts of several environments in shared memory: a tuple of their present values.
+    """Texts of several environments in shared memory: a tuple of their current values.
 
     Like the arrays, it changes with the next step if `AsyncVectorEnv` was made with `copy=False`. Copies are
     plain tuples. The object itself is an empty tuple: code that ignored its methods would fail, not see old texts.
@@ -111,7 +111,7 @@ class SharedTexts(tuple[str, ...]):
         return tuple(self).index(text, *bounds)
 
     def count(self, text: object) -> int:
-        """Returns how many environments have a text."""
+        """Returns the number of environments with a text."""
         return tuple(self).count(text)
 
     def __deepcopy__(self, memo: dict[int, object]) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ MESSAGE_KINDS = tuple(field.name for field in fields(TaskMessages))
 """Kinds of changes of a task that a storyboard gives messages for: "trigger", "delete", "change"."""
 
 MAX_UTTERANCE = 4 * (UTTERANCE_LENGTH + 1)
-"""Greatest length of an utterance of several spans [characters]."""
+"""Largest length of an utterance of several spans [characters]."""
 
 
 class ObjectColumn(Column):
@@ -126,7 +126,7 @@ def observation_fields(role: Role, limits: SpaceLimits, observe_acts: bool = Tru
     """Returns the specifications of the observation fields of a role.
 
     The Participant observes true positions and all landmarks, the Co-Wizard estimated positions and the landmarks that
-    are not hidden, the Ad-Wizard everything. For the Co-Wizard, exit distances, the first waypoint and object positions
+    are not hidden, the Ad-Wizard all data. For the Co-Wizard, exit distances, the first waypoint and object positions
     follow from the estimated pose; distances and bearings of objects are as perceived.
 
     Args:
@@ -250,7 +250,7 @@ def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True
 def camera_perception_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
     """Returns the specifications of the additional fields of participant and Co-Wizard with perception by the camera.
 
-    The Co-Wizard's `landmarks` then also contain, behind those that are not hidden, the hidden ones that have been in
+    The Co-Wizard's `landmarks` then also contain, after those that are not hidden, the hidden ones that have been in
     view.
     """
     return (flags("landmarks_in_view", limits.landmarks, meaning="1 for landmarks that the picture shows"),)

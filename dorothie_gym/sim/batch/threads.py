@@ -31,7 +31,7 @@ _lock = threading.Lock()
 
 
 class Gate:
-    """Gate at which one thread waits until another one opens it; it shuts behind the thread that passes.
+    """Gate at which one thread waits until another one opens it; it closes once a thread has passed.
 
     The waiting thread polls for a while, without Python's lock, and then sleeps: waking it again takes 0.05 to 0.1 ms.
     """
@@ -61,7 +61,7 @@ class ThreadPool:
         """Starts threads.
 
         Args:
-            others: how many beside the caller's own.
+            others: number of threads besides the caller's own.
         """
         self._workers = [_Worker() for _ in range(others)]
         for number, worker in enumerate(self._workers):
@@ -188,10 +188,10 @@ LINE = 8
 
 
 def turns_of(count: int, threads: int) -> NDArray[np.int64]:
-    """Returns the numbers 0 to `count` - 1 in as many blocks as there are threads, none of them taken.
+    """Returns the numbers 0 to `count` - 1, all free, in as many blocks as there are threads.
 
     Returns:
-        (threads, LINE): of each block the next number and the one behind its last.
+        (threads, LINE): of each block the next number and the one after its last.
     """
     turns = np.zeros((threads, LINE), dtype=np.int64)
     borders = np.arange(threads + 1) * count // threads
@@ -207,7 +207,7 @@ def take(turns: NDArray[np.int64], home: int) -> int:
         home: number of the thread's block.
 
     Returns:
-        A number that no other thread gets, or -1 when there is none left.
+        A number that no other thread receives, or -1 if none is left.
     """
     for k in range(len(turns)):
         block = turns[(home + k) % len(turns)]

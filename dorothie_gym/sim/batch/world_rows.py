@@ -24,8 +24,8 @@ class WorldRows:
         """Makes rows.
 
         Args:
-            world: a world of the town; the rows have room for as many bodies, and more when one of them needs it.
-            rows: how many.
+            world: a world of the town; the rows have room for equally many bodies, and grow when one needs more.
+            rows: number of rows.
             threads: number of threads at most, the caller's included.
         """
         self._batch = VectorWorld(world.actors.town_arrays, world.actors.arrays, rows, threads=threads)
@@ -72,7 +72,7 @@ class WorldRows:
                 world.actors.arrays = new
 
     def step(self, rows: Sequence[int], frames: int) -> list[list[WorldEvent]]:
-        """Runs some worlds for a number of physics frames, as `World.step`; returns the events of each."""
+        """Runs the given worlds for a number of physics frames, as `World.step` does; returns the events of each."""
         worlds = [world for world in map(self._worlds.__getitem__, rows) if world is not None]
         playing = np.zeros(len(self._batch), dtype=np.bool_)
         playing[list(rows)] = True

@@ -65,7 +65,7 @@ def step_alone(
     Args:
         town: arrays of the town.
         world: arrays of the world, changed in place.
-        substeps: how many.
+        substeps: number of substeps.
         dt: time of each [s].
         acceleration: acceleration of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
@@ -79,7 +79,7 @@ def step_alone(
 def step_batch_of_one(
     town: TownArrays, batch: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
 ) -> int:
-    """As `step_alone`, of a world that is a batch already (`alone`), which saves 30 us."""
+    """Like `step_alone`, for a world that already is a batch (`alone`), which saves 30 us."""
     answers = np.full(1, NO_SPACE, dtype=np.int64)
     actions = np.array([acceleration], dtype=np.float64), np.array([steering], dtype=np.float64)
     _step_share(turns_of(1, 1), 0, town, batch, int(substeps), float(dt), *actions, answers)
@@ -94,7 +94,7 @@ class VectorWorld(CachedViews):
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
     threads have not reached yet, so that a late or busy thread does fewer. A world depends only on its own arrays: not
-    on the other worlds, its place among them, or the threads. Threads share nothing that is written to, and hold the
+    on the other worlds, its row in the batch, or the threads. Threads share no memory that they write, and hold the
     interpreter's lock between calls only.
 
     Attributes:
@@ -110,9 +110,9 @@ class VectorWorld(CachedViews):
 
         Args:
             town: arrays of the town.
-            world: a world of it; the others have room for as many bodies.
-            worlds: how many.
-            threads: how many threads at most, by default as many as there are processors for this process.
+            world: a world of the town; the others have room for equally many bodies.
+            worlds: number of worlds.
+            threads: maximum number of threads, by default the number of processors for this process.
 
         Raises:
             ValueError: there is not at least one world and one thread.
@@ -137,7 +137,7 @@ class VectorWorld(CachedViews):
         return world_of(self.arrays, range(len(self))[number])
 
     def put(self, number: int, world: WorldArrays) -> None:
-        """Makes one of the worlds the same as another world, which has room for as many bodies."""
+        """Copies another world, which has room for equally many bodies, into one of the worlds."""
         put(self.arrays, range(len(self))[number], world)
 
     def make_room(self, world: WorldArrays) -> bool:
@@ -159,17 +159,17 @@ class VectorWorld(CachedViews):
         steering: Array | float = 0.0,
         playing: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Steps worlds, as `sim.step.step` does with one; where a path needs more room, all worlds get it.
+        """Steps worlds, as `sim.step.step` does with one; if a path needs more room, the arrays of all worlds grow.
 
         Args:
-            substeps: how many.
+            substeps: number of substeps.
             dt: time of each [s].
             acceleration: (worlds,) or one for all: of vehicles of the kind `Kind.EGO` [m/s^2].
             steering: (worlds,) or one for all: angle of their front wheels, positive to the right [rad].
             playing: (worlds,) those that are stepped; None for all.
 
         Raises:
-            ValueError: the actions do not fit the number of worlds.
+            ValueError: the number of actions differs from the number of worlds.
         """
         actions = (self._one_each("acceleration", acceleration), self._one_each("steering", steering))
         answers = np.full(len(self), NO_SPACE, dtype=np.int64)

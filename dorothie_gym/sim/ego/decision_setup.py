@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 PATH_BEHIND, PATH_AHEAD = 12.0, 150.0
-"""Stretch of path behind and ahead of the ego that is written for the motion control at least [m]."""
+"""Minimum stretch of path behind and ahead of the ego that is written for the motion control [m]."""
 
 PASSED = 1.0
-"""Distance from which on a place on the path or beyond the end of a lane is left out [m]."""
+"""Distance at which a place on the path or beyond the end of a lane is left out [m]."""
 
 
 @compiled
@@ -89,7 +89,7 @@ def find_goals(town: TownArrays, world: WorldArrays) -> None:
 
 @compiled
 def insert(world: WorldArrays, place: float) -> None:
-    """Inserts a place into the sorted list of goals along the path; the farthest ones may not fit."""
+    """Inserts a place into the sorted list of goals along the path; if the list is full, the farthest is dropped."""
     car = world.car[0]
     k = int(car.goals)
     if k < len(car.goal):
@@ -106,7 +106,7 @@ def insert(world: WorldArrays, place: float) -> None:
 
 @compiled
 def place_on_path(world: WorldArrays, lane: int, station: float) -> float:
-    """Returns the distance along the path of a place on one of its lanes [m]; infinite if the path does not come to it.
+    """Returns the distance along the path of a place on one of its lanes [m]; infinite if the path does not reach it.
 
     Of several the first; manoeuvres between lanes do not count.
     """

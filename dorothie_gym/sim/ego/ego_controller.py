@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class Car(CachedViews, Vehicle):
-    """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), as of the last step of the world.
+    """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), in the state of the last step of the world.
 
     Setting its position, heading or speed moves it.
     """
@@ -74,7 +74,7 @@ class Car(CachedViews, Vehicle):
 
     @property
     def position(self) -> Array:
-        """Position of its middle (2,) [m]."""
+        """Position of its centre (2,) [m]."""
         return self._position
 
     @position.setter
@@ -129,7 +129,7 @@ class CarRecord:
 
     Attributes:
         hazard: hazard and hazard_gap: the cause of a hazard stop.
-        outcome: numbers of events, breaches of rules and collisions.
+        outcome: numbers of events, infractions and collisions.
         props: number of props that it sees.
         air: friction, wind, wind_heading and wind_phase: effects of the weather.
     """
@@ -182,7 +182,7 @@ def request_path(
     town: TownArrays, holder: ArrayHolder, action: int, *, angle: int = 0, speed: float = 0.0, lane: int = 0,
     station: float = 0.0, offset: float = 0.0,
 ) -> int:  # fmt: skip
-    """Calls `manoeuvres.request`, again with longer arrays where they have no room for the path; returns its answer."""
+    """Calls `manoeuvres.request`, again with longer arrays if they have no room for the path; returns its answer."""
     while True:
         answer = _request(
             town, holder.arrays, action, int(angle), float(speed), int(lane), float(station), float(offset)
@@ -211,7 +211,7 @@ class LocalPlanner(CachedViews):
         self._town, self._arrays, self._holder = town, arrays, holder
 
     def _look_up(self) -> np.void:
-        """Returns the plan in the present arrays."""
+        """Returns the plan in the current arrays."""
         arrays = self._holder.arrays
         if arrays is not self._shown:
             self._shown, self._row, self._car = arrays, plain(arrays.plan)[0], plain(arrays.car)[0]
@@ -226,7 +226,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def state(self) -> tuple[object, ...]:
-        """What the feasibility of navigation actions depends on besides the speed: to be compared."""
+        """Values, besides the speed, on which the feasibility of navigation actions depends, for comparison."""
         plan = self._look_up()
         props = self._holder.arrays.seen_props[: int(plan["props"])].tobytes()
         return (
@@ -240,7 +240,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def path(self) -> Path:
-        """The present path, the same object until it is replaced; every manoeuvre replaces it."""
+        """The current path, the same object until a manoeuvre replaces it."""
         plan = self._look_up()
         if plan["version"] != self._laid:
             self._laid = int(plan["version"])
@@ -261,13 +261,13 @@ class LocalPlanner(CachedViews):
 
     @property
     def roadblock(self) -> float:
-        """Distance from the ego's middle to a roadblock on the path [m], or inf."""
+        """Distance from the ego's centre to a roadblock on the path [m], or inf."""
         self._look_up()
         return float(self._car["roadblock"])
 
     @property
     def lane(self) -> int:
-        """Lane that the ego counts as being on."""
+        """Lane to which the ego is assigned."""
         return int(self._look_up()["lane"])
 
     @property
@@ -282,22 +282,22 @@ class LocalPlanner(CachedViews):
 
     @property
     def held(self) -> bool:
-        """Whether the ego stands by the action Stop."""
+        """Whether the ego stands because of the action Stop."""
         return bool(self._look_up()["held"])
 
     @property
     def waits_at_end(self) -> bool:
-        """Whether the path ends where a turn has to be chosen, or at the end of the map."""
+        """Whether the path ends where a turn must be chosen, or at the end of the map."""
         return bool(self._look_up()["open_end"])
 
     @property
     def room(self) -> float:
-        """Length of the path ahead of the ego's middle [m]."""
+        """Length of the path ahead of the ego's centre [m]."""
         return float(self._look_up()["length"]) - self.s
 
     @property
     def manoeuvre(self) -> tuple[PhysicalAction | None, int]:
-        """Planned or present manoeuvre, and its angle [degrees]."""
+        """Planned or current manoeuvre, and its angle [degrees]."""
         plan = self._look_up()
         action = int(plan["action"])
         return (PhysicalAction(action) if action else None), int(plan["angle"])
@@ -322,7 +322,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def choice(self) -> tuple[int, float]:
-        """Lane before the next junction with a choice, -1 if the path comes to none, and the distance to it [m]."""
+        """Lane before the next junction with a choice, -1 if the path reaches none, and the distance to it [m]."""
         plan = self._look_up()
         lane = int(plan["choice"])
         return lane, float(plan["choice_at"]) - self.s if lane >= 0 else 0.0
@@ -416,7 +416,7 @@ class EgoController:
 
     @property
     def lights(self) -> bool:
-        """Whether the head lights are on."""
+        """Whether the headlights are on."""
         return bool(self.planner.plan["lights"])
 
     @lights.setter

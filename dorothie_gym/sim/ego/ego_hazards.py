@@ -30,31 +30,31 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 TURN_ROUND_SPEED = 4.0
-"""Least speed assumed for oncoming vehicles before a U-turn [m/s]."""
+"""Minimum speed assumed for oncoming vehicles before a U-turn [m/s]."""
 
 EGO_ASKING = 11.5
-"""Distance before the beginning of braking at which the ego requests a junction [m]."""
+"""Distance before the start of braking at which the ego requests a junction [m]."""
 
 UPSTREAM = 50.0
-"""Distance before a lane's start up to which vehicles that come towards it are considered [m]."""
+"""Distance before a lane's start within which oncoming vehicles are considered [m]."""
 
 BEFORE_MANOEUVRE = 15.0
-"""Distance before the beginning of braking for a lane switch or U-turn at which others are considered [m]."""
+"""Distance before the start of braking for a lane switch or U-turn at which others are considered [m]."""
 
 REACHED = 0.2
-"""Overlap with the new lane from which on a switching ego is in the way there [m]."""
+"""Overlap with the new lane at which a switching ego obstructs it [m]."""
 
 BESIDE_EGO = 7.0
-"""Distance ahead and behind within which vehicles are beside the ego [m]; as are those within a second behind."""
+"""Distance ahead and behind at which vehicles count as beside the ego [m], as do vehicles up to one second behind."""
 
 BEFORE_IT = 0.5
-"""Distance before the beginning of a manoeuvre at which the ego waits [m]."""
+"""Distance before the start of a manoeuvre at which the ego waits [m]."""
 
 SLOWEST_APPROACH = 1.0
-"""Least speed assumed for the ego's approach [m/s]."""
+"""Minimum speed assumed for the ego's approach [m/s]."""
 
 IN_LINE, FACING_COSINE = 2.0, 0.5
-"""Distance from a lane [m], and cosine of the heading to it, up to which a vehicle comes along it."""
+"""Distance from a lane [m], and cosine of the heading to it, up to which a vehicle counts as driving along it."""
 
 TRAFFIC_LIGHT, TRAFFIC_SIGN = int(ObjectClass.TRAFFIC_LIGHT.value), int(ObjectClass.TRAFFIC_SIGN.value)
 
@@ -129,7 +129,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the line before a junction that the ego may not enter yet."""
     car, vehicle, course = world.car[0], world.vehicles[0], world.course
     if car.held and vehicle.speed < EGO_STANDING:
-        return best  # requests nothing that it does not use
+        return best  # requests only what it uses
     asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + EGO_ASKING
     half = 0.5 * vehicle.length
     last = point_at(world, car.s + max(asking, CRITICAL_GAP * vehicle.speed) + half)
@@ -173,7 +173,7 @@ def _holder(town: TownArrays, wait: int, lane: int) -> int:
 
 @compiled
 def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: bool) -> tuple[float, int, int]:
-    """Returns the way to the beginning of a lane switch or U-turn [m] while a body is in its way.
+    """Returns the distance to the start of a lane switch or U-turn [m] while a body obstructs it.
 
     Args:
         town: arrays of the town.
@@ -182,7 +182,7 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
         blocked: whether the ego stands behind a body: it may be waiting for the junction, which stays open then.
 
     Returns:
-        The way (infinite if the manoeuvre may begin), and key and class of the body in the way.
+        The distance (infinite if the manoeuvre may begin), and key and class of the obstructing body.
     """
     car, vehicle, course = world.car[0], world.vehicles[0], world.course
     turning = car.action == U_TURN
@@ -210,11 +210,11 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
         if body.kind != VEHICLES:
             continue
         station = _place_towards(town, world, lanes, body)
-        if turning:  # until the U-turn is over, a vehicle that stands now may have come up
+        if turning:  # a vehicle that stands now may arrive before the U-turn ends
             behind = 8.0 + 5.0 * max(body.speed, TURN_ROUND_SPEED)
         else:
             behind = 8.0 + 3.0 * max(body.speed - vehicle.speed, 0.0)
-            station += body.speed * ahead / max(vehicle.speed, SLOWEST_APPROACH)  # where it is when the car comes there
+            station += body.speed * ahead / max(vehicle.speed, SLOWEST_APPROACH)  # its position when the car arrives
         if -behind < station - meeting < 9.0:
             return max(ahead, 0.0), int(body.key), VEHICLES
     # requested last: vehicles that wait before the junction go first
@@ -225,7 +225,7 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
 
 @compiled
 def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, prop: SeenRecord) -> bool:
-    """Returns whether a lane switch would lead the ego too close to a prop on the new lane to get away from it again.
+    """Returns whether a lane switch would lead the ego too close to a prop on the new lane to leave that lane again.
 
     Args:
         town: arrays of the town.
@@ -250,7 +250,7 @@ def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, 
 
 @compiled
 def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) -> tuple[float, int]:
-    """Looks for vehicles beside the ego in a lane switch, as long as it is not in the way on its target yet.
+    """Checks for vehicles beside the ego in a lane switch, as long as the ego does not obstruct the target lane yet.
 
     Returns:
         0 if there is one, else infinite, and its key.
@@ -285,7 +285,7 @@ def _close_junctions(town: TownArrays, world: WorldArrays, start: int) -> bool:
 def _find_upstream(town: TownArrays, world: WorldArrays, target: int) -> int:
     """Writes a lane, and those that lead to it within reach of a U-turn, into the scratch arrays.
 
-    `stack` holds the lanes, `starts` their beginnings on the first one [m]; returns their number.
+    `stack` holds the lanes, `starts` where they start, measured along the first one [m]; returns their number.
     """
     stack, starts = world.stack, world.starts
     stack[0], starts[0] = target, 0.0

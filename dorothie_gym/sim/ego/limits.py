@@ -76,7 +76,7 @@ EGO_STANDING = 0.1
 """Speed below which the ego counts as standing [m/s]."""
 
 EGO_MOVING = 0.5
-"""Speed above which the way to stop matters for a manoeuvre [m/s]."""
+"""Speed above which the stopping distance matters for a manoeuvre [m/s]."""
 
 U_TURN_SPEED = 3.5
 """Speed of a U-turn [m/s]."""
@@ -85,10 +85,10 @@ APPROACH_SPEED = 14.0 * KMH
 """Speed near a goal, under the design's 15 km/h [m/s]."""
 
 APPROACH_DISTANCE = 20.0
-"""Distance to a goal from which on `APPROACH_SPEED` holds [m]."""
+"""Distance to a goal below which `APPROACH_SPEED` applies [m]."""
 
 BLIND_SPEED = 1.5
-"""Speed with hardly any sight [m/s]."""
+"""Speed when there is almost no sight [m/s]."""
 
 # --- Accelerations ----------------------------------------------------------------------------------------------------
 
@@ -99,7 +99,7 @@ PROFILE_BRAKING = 2.0
 """Deceleration towards a curve or the end of the path [m/s^2]."""
 
 SURE_BRAKING = 1.8
-"""Deceleration from which on the brake that is needed overrides the speed controller [m/s^2]."""
+"""Required deceleration at which the brake overrides the speed controller [m/s^2]."""
 
 PLANNED_BRAKING = 3.0
 """Deceleration of the action Stop, and the one that plans count on [m/s^2]."""
@@ -113,13 +113,13 @@ HALF_LENGTH = 2.5
 """Half the length of the ego [m]."""
 
 PROP_DEPTH = 1.25
-"""Half the length of the longest prop [m]: a prop is in sight when its middle is."""
+"""Half the length of the longest prop [m]: a prop is in sight when its centre is."""
 
 LEAD = 1.0
-"""Path before the beginning of a manoeuvre [m]."""
+"""Path before the start of a manoeuvre [m]."""
 
 BEGUN = 1.0
-"""Way after which a manoeuvre from a stand has begun [m]."""
+"""Distance after which a manoeuvre from a standstill counts as begun [m]."""
 
 SWITCH_TIME = 3.0
 """Duration of a lane switch [s]."""
@@ -128,7 +128,7 @@ MIN_SWITCH = 14.0
 """Length of the shortest lane switch [m]."""
 
 U_TURN_REACH = 14.0
-"""Room ahead of its middle that the ego needs for a U-turn [m]: 11 m for its middle where lanes are 3.5 m apart, 1 m
+"""Room ahead of its centre that the ego needs for a U-turn [m]: 11 m for its centre where lanes are 3.5 m apart, 1 m
 for its side, and the clearance beside it."""
 
 U_TURN_SAMPLES = 4
@@ -138,8 +138,8 @@ LANDING = 6.0
 """Oncoming lane left after a U-turn [m], so that the ego stands straight before it waits at the lane's end."""
 
 MANOEUVRE_PROP_GAP = 16.5
-"""Least distance of the ego's middle to that of a prop at the end of a lane switch or U-turn, less the way to stop [m]:
-`obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""
+"""Minimum distance between the centres of ego and prop at the end of a lane switch or U-turn [m], without the
+stopping distance: `obstacles.ROADBLOCK_GAP`, half the ego and half the prop."""
 
 
 # --- Feasibility of physical actions ----------------------------------------------------------------------------------
@@ -158,7 +158,7 @@ class FeasibleManoeuvres(NamedTuple):
         switch_left: lane switch with a positive angle.
         switch_right: lane switch with a negative angle.
         u_turn: U-turn.
-        j_turn: a turn at the next junction with a choice, if the path comes to one; refused for the turn that is
+        j_turn: a turn at the next junction with a choice, if the path reaches one; refused for the turn that is
             planned already, see `LocalPlanner.turn_ahead`.
     """
 
@@ -175,7 +175,7 @@ def may_change_cruise(cruise: float, up: bool) -> bool:
 
 
 def is_past_stopping(speed: float, room: float) -> bool:
-    """Returns whether a moving ego cannot stop within some room [m] any more, at a speed [m/s]."""
+    """Returns whether a moving ego can no longer stop within a distance [m], at a speed [m/s]."""
     return speed > EGO_MOVING and speed * speed / (2 * HARD_STOP) > room
 
 

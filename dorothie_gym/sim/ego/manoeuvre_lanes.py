@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 LEAST_PATH = 120.0
-"""Least length of path ahead [m]."""
+"""Minimum length of path ahead [m]."""
 
 LAID = 180.0
-"""Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is seldom laid again."""
+"""Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is rarely laid again."""
 
 SWITCH_COST = 20.0
 """Misfit by which an exit of the car's lane is preferred to that of an adjacent lane [degrees]."""
@@ -32,13 +32,13 @@ SETTLE = 15.0
 """Way along a newly entered lane before it is changed, where there is room [m]."""
 
 EXACT = 5.0
-"""Misfit within which an exit is the one that was asked for [degrees]."""
+"""Difference in angle within which an exit counts as the requested one [degrees]."""
 
 WAITING_ROOM = 4.5
 """Distance between the end of a lane switch and a lane's end at which the ego may have to wait [m]."""
 
 MOST_CHANGES = 3
-"""Most lane changes before a turn."""
+"""Maximum number of lane changes before a turn."""
 
 ALMOST = 1e-3
 """Shortest piece of path [m]."""
@@ -69,7 +69,7 @@ def begin_steps(world: WorldArrays, lane: int) -> bool:
 
 @compiled
 def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
-    """Begins a plan with a lane, and inside a junction with those up to the lane behind it."""
+    """Begins a plan with a lane, and inside a junction with those up to the lane after it."""
     fits = begin_steps(world, lane)
     while fits and lane >= 0 and town.lanes[lane].junction >= 0:
         lane = town.ways[lane].onward
@@ -79,7 +79,7 @@ def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
 
 @compiled
 def take_course(town: TownArrays, world: WorldArrays) -> bool:
-    """Begins a plan with the lanes of the present path from the ego's place on."""
+    """Begins a plan with the lanes of the current path ahead of the ego."""
     plan, course, last = world.plan[0], world.course, NOBODY
     plan.steps, fits = 0, True
     for k in range(plan.at, plan.points):
@@ -92,7 +92,7 @@ def take_course(town: TownArrays, world: WorldArrays) -> bool:
 
 @compiled
 def enter_exit(town: TownArrays, world: WorldArrays, number: int) -> bool:
-    """Adds the connectors of an exit, a row of `TownArrays.exits`, and the lane behind the junction."""
+    """Adds the connectors of an exit, a row of `TownArrays.exits`, and the lane beyond the junction."""
     way = town.exits[number]
     lane = way.connector
     fits = add_step(world, lane, False)
@@ -113,12 +113,12 @@ def misfit_of(town: TownArrays, number: int, angle: int) -> int:
 
 @compiled
 def find_turn(town: TownArrays, world: WorldArrays, station: float, angle: int) -> int:
-    """Adds to the plan the lanes to the exit that fits an angle best, with lane changes if that fits much better.
+    """Adds to the plan the lanes to the exit closest to an angle, with lane changes if that exit is much closer.
 
     Args:
         town: arrays of the town.
         world: arrays of the world; the steps of the plan are taken in any case.
-        station: place of the ego on the first of them [m].
+        station: position of the ego along the first of them [m].
         angle: degrees, positive left.
 
     Returns:
@@ -130,7 +130,7 @@ def find_turn(town: TownArrays, world: WorldArrays, station: float, angle: int) 
         return known
     root = int(plan.steps) - 1
     best, best_row, best_exit = math.inf, -1, -1
-    # successors come before lanes beside, so that lanes are changed as late as there is room
+    # successors come before adjacent lanes, so that lanes are changed as late as possible
     row, waiting = root, root + 1
     while row < plan.steps:
         lane, changes, follows = steps[row].lane, steps[row].changes, -1
@@ -161,10 +161,10 @@ def find_turn(town: TownArrays, world: WorldArrays, station: float, angle: int) 
 
 @compiled
 def _keep_lane(town: TownArrays, world: WorldArrays, angle: int) -> int:
-    """Keeps a lane that itself leads on as asked to its end; lanes are changed further on, if at all.
+    """Keeps a lane that leads to the requested exit until its end; lanes are changed later, if at all.
 
     Returns:
-        Row of the exit if it is the only way on there and thus the turn that was asked for, else -1; -2 if a list is
+        Row of the exit if it is the only exit there and thus the requested turn, else -1; -2 if a list is
         too long.
     """
     own = town.ways[world.steps[world.plan[0].steps - 1].lane]
@@ -179,7 +179,7 @@ def _keep_lane(town: TownArrays, world: WorldArrays, angle: int) -> int:
 
 @compiled
 def _closest_exit(town: TownArrays, lane: int, angle: int) -> int:
-    """Returns the row of the exit of a lane that fits an angle best, the first of several; -1 if there is none."""
+    """Returns the row of the exit of a lane that is closest to an angle, the first of equals; -1 if there is none."""
     ways, found = town.ways[lane], -1
     for number in range(ways.exit, ways.exit + ways.exits):
         if found < 0 or misfit_of(town, number, angle) < misfit_of(town, found, angle):
@@ -189,7 +189,7 @@ def _closest_exit(town: TownArrays, lane: int, angle: int) -> int:
 
 @compiled
 def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, station: float) -> bool:
-    """Adds the lanes next to a row of the search to which there is room to switch; returns whether they fit in."""
+    """Adds the lanes next to a row of the search that have room for a switch; returns whether the list had room."""
     step = world.steps[row]
     lane, changes = town.lanes[step.lane], step.changes
     left, right = lane.left, lane.right
@@ -227,7 +227,7 @@ def _has_room(town: TownArrays, world: WorldArrays, row: int, station: float) ->
     lane, changes = town.lanes[steps[row].lane], 1
     while steps[row].change:
         row, changes = steps[row].before, changes + 1
-    # where the lanes that lie beside one another begin
+    # where the adjacent lanes begin
     start = station if steps[row].before < 0 else 0.0
     return lane.length - start >= changes * (MIN_SWITCH + LEAD) and lane.junction < 0
 
@@ -263,10 +263,10 @@ def grow(town: TownArrays, world: WorldArrays, station: float) -> int:
     Args:
         town: arrays of the town.
         world: arrays of the world.
-        station: beginning of the path on the first lane [m].
+        station: start of the path on the first lane [m].
 
     Returns:
-        0, 1 if the path ends where a turn has to be chosen or at the end of the map, and -1 if there is no room.
+        0, 1 if the path ends where a turn must be chosen or at the end of the map, and -1 if there is no room.
     """
     plan, steps, ahead = world.plan[0], world.steps, 0.0
     for k in range(plan.steps):
@@ -290,7 +290,7 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
     Args:
         town: arrays of the town.
         world: arrays of the world.
-        station: beginning of the path on the first lane [m].
+        station: start of the path on the first lane [m].
         speed: speed of the ego [m/s], which the length of lane switches depends on.
         write: whether the points are written or only counted.
     """
@@ -326,12 +326,12 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
 def lay_head(
     town: TownArrays, world: WorldArrays, first: int, end: int, oncoming: int, begin: float, write: bool
 ) -> None:
-    """Lays the path before the steps of the plan: the rest of the manoeuvre under way, or a U-turn.
+    """Lays the path before the steps of the plan: the rest of the manoeuvre in progress, or a U-turn.
 
     Args:
         town: arrays of the town.
-        world: arrays of the world; lane and station of the ego are those on the present path.
-        first: first point of the present path that is kept.
+        world: arrays of the world; lane and station of the ego are those on the current path.
+        first: first point of the current path that is kept.
         end: the point after the last one that is kept.
         oncoming: lane on which a U-turn ends, or -1.
         begin: distance along the ego's lane at which the U-turn begins [m].

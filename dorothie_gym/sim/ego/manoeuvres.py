@@ -190,7 +190,7 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     begin = station + LEAD * (speed > EGO_MOVING) + _u_turn_braking(speed, U_TURN_SPEED * U_TURN_SPEED)
     other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other >= 0:
-        # just behind a junction: begin later, so that the turn ends before the end of the oncoming lane
+        # just beyond a junction: begin later, so that the turn ends before the end of the oncoming lane
         short = LANDING - (town.lanes[other].length - there)
         if short > 0.0:
             begin += short
@@ -267,7 +267,7 @@ def request(
 
 @compiled
 def begin(town: TownArrays, world: WorldArrays, lane: int, station: float, offset: float) -> int:
-    """Lays a first path, or a new one for an ego that has left the present one, and drops the plan.
+    """Lays a first path, or a new one for an ego that has left the current one, and drops the plan.
 
     Args:
         town: arrays of the town.
@@ -378,7 +378,7 @@ def _turn_round(town: TownArrays, world: WorldArrays, speed: float) -> int:
 @compiled
 def _turn(town: TownArrays, world: WorldArrays, angle: int, speed: float) -> int:
     plan = world.plan[0]
-    _, _, free = _under_way(world)  # after the end of a manoeuvre under way, lanes may be changed again
+    _, _, free = _under_way(world)  # after the end of a manoeuvre in progress, lanes may be changed again
     if not cross_junction(town, world, plan.lane):
         return Refusal.NO_SPACE
     number = find_turn(town, world, free, angle)
@@ -397,7 +397,7 @@ def _turn(town: TownArrays, world: WorldArrays, angle: int, speed: float) -> int
 
 @compiled
 def _under_way(world: WorldArrays) -> tuple[int, int, float]:
-    """Returns the points of a lane switch or U-turn under way that are still to come, and the station behind [m]."""
+    """Returns the points that remain of a lane switch or U-turn in progress, and the station where it ends [m]."""
     plan, course = world.plan[0], world.course
     first = int(plan.at)
     end = first
@@ -405,7 +405,7 @@ def _under_way(world: WorldArrays) -> tuple[int, int, float]:
         end += 1
     if end - first < 2:
         return 0, 0, plan.station
-    # the lane continues where it did before, just behind the end of a U-turn; else the path would turn back
+    # just after a U-turn, the lane continues at the same station; else the path would turn back
     landing = end if end < plan.points and course[end].lane == plan.lane else end - 1
     return first, end, course[landing].station
 
@@ -414,7 +414,7 @@ def _under_way(world: WorldArrays) -> tuple[int, int, float]:
 def _lay_from_here(
     town: TownArrays, world: WorldArrays, speed: float, action: int, angle: int, connector: int, way_out: int
 ) -> int:
-    """Replaces the path from the ego's place on; the rest of a lane switch or U-turn under way is kept."""
+    """Replaces the path ahead of the ego; the rest of a lane switch or U-turn in progress is kept."""
     first, end, station = _under_way(world)
     return _replace(town, world, station, speed, first, end, -1, 0.0, action, angle, connector, way_out, False, 0.0)
 
@@ -429,17 +429,17 @@ def _replace(
     Args:
         town: arrays of the town.
         world: arrays of the world, with the first steps of the plan.
-        station: beginning of the path on the first of them [m].
+        station: start of the path on the first of them [m].
         speed: speed of the ego [m/s], which the length of lane switches depends on.
-        first: first point of the present path that is kept, see `lay_head`.
-        end: the one after the last.
+        first: first point of the current path that is kept, see `lay_head`.
+        end: the point after the last one.
         oncoming: lane on which a U-turn ends, or -1.
         start: distance along the ego's lane at which the U-turn begins [m].
         action: manoeuvre of the new plan: number of a `PhysicalAction`, or 0.
         angle: angle of the manoeuvre [degrees].
-        connector: connector and lane of a turn, or -1.
-        way_out: see there.
-        fresh: whether the ego is not on the present path, but at the beginning of the new one.
+        connector: connector of a turn, or -1.
+        way_out: lane after that connector, or -1.
+        fresh: whether the ego is at the start of the new path instead of on the current one.
         offset: distance of the ego from the new path then, positive right [m].
 
     Returns:

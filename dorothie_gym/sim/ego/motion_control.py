@@ -68,16 +68,16 @@ def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
 # --- Speed and steering -----------------------------------------------------------------------------------------------
 
 HARD = 3.5
-"""Deceleration for a body ahead from which on it is a hazard stop [m/s^2]."""
+"""Deceleration for a body ahead at which a stop becomes a hazard stop [m/s^2]."""
 
 HAZARD_SPEED = 1.0
-"""Speed of ego and body below which standing before the body is a hazard stop, too [m/s]."""
+"""Speed of ego and body below which a standstill before the body also is a hazard stop [m/s]."""
 
 HAZARD_PAUSE = 15
-"""Time without anything in the way after which a hazard stop is over [substeps]."""
+"""Time without an obstruction after which a hazard stop ends [substeps]."""
 
 LIMITING = 0.5
-"""Reduction of the speed from which on a body is in the way [m/s]."""
+"""Reduction of the speed at which a body counts as an obstruction [m/s]."""
 
 CREEPING = 0.3
 """Speed below which the distance from the path is not corrected [m/s]."""
@@ -140,7 +140,7 @@ def _free_speed(world: WorldArrays) -> float:
     if car.stop_at < math.inf:  # exact near the end, where the points are too coarse
         left = car.stop_at - s
         speed = min(speed, math.sqrt(2.0 * PROFILE_BRAKING * left) if left > 0.0 else 0.0)
-    # a roadblock may come in sight at any time
+    # a roadblock may come into view at any time
     left = room(STATIC, world.eye[0].sight - 0.5 * vehicle.length - PROP_DEPTH, 0.0, False, False)
     speed = min(speed, max(safe_speed(0.0, left, car.friction), BLIND_SPEED))
     for g in range(car.goals):
@@ -157,7 +157,7 @@ def _control(world: WorldArrays, target: float, dt: float) -> None:
 
     Lateral: highway-env's bicycle moves along its heading plus the slip angle, and the slip angle follows the wheel at
     once. So its course can be laid along the path in every substep, also where the path's curvature jumps; a PID on the
-    distance from the path adds the angle to come back at. Longitudinal: a PID on speed.
+    the distance from the path adds the angle of return. Longitudinal: a PID on speed.
     """
     car, vehicle = world.car[0], world.vehicles[0]
     back = 0.0
@@ -198,7 +198,7 @@ def _brake_surely(world: WorldArrays) -> None:
 
 @inlined
 def _note_sweep(world: WorldArrays) -> None:
-    """Records the remaining part of a U-turn, to which others give way even while the ego waits in it."""
+    """Records the remaining part of a U-turn, to which others yield even while the ego waits in it."""
     car = world.car[0]
     at = int(car.at)
     car.sweeping = bool(car.action == U_TURN and world.course[at].manoeuvre and car.s >= BEGUN)
@@ -214,7 +214,7 @@ def _note_sweep(world: WorldArrays) -> None:
 
 @inlined
 def _note_hazard(world: WorldArrays, limiting: bool) -> None:
-    """Logs beginning and end of a hazard stop."""
+    """Logs the start and end of a hazard stop."""
     car, speed, frame = world.car[0], world.vehicles[0].speed, world.clock[0].frame
     if car.hazard == 0:
         stands = speed < HAZARD_SPEED and car.ahead_speed < HAZARD_SPEED

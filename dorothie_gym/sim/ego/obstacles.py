@@ -1,4 +1,4 @@
-"""Obstacles of the ego: bodies on its path, and bodies about to be there."""
+"""Obstacles of the ego: bodies on its path, and bodies about to enter it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SIDE_MARGIN = 0.35
 """Room kept beside the ego [m]."""
 
 CROSSING = 0.35
-"""Sine of the angle to the path from which on a moving body counts as crossing it."""
+"""Sine of the minimum angle to the path at which a moving body counts as crossing it."""
 
 BRAKE_DELAY = 0.4
 """Time until the brakes act [s]."""
@@ -35,7 +35,7 @@ STANDSTILL_GAP = 2.5
 """Gap left to a standing body [m]."""
 
 ROADBLOCK_GAP = 12.5
-"""Gap left to a prop [m]: room for a U-turn (`limits.U_TURN_REACH` from the ego's middle)."""
+"""Gap left to a prop [m]: room for a U-turn (`limits.U_TURN_REACH` from the ego's centre)."""
 
 EGO_LINE_GAP = 1.5
 """Gap left to the line before a junction [m]."""
@@ -44,7 +44,7 @@ TIGHT_GAP = 1.0
 """Gap left to a standing body during a U-turn or lane switch [m]."""
 
 HARD_BRAKING = 4.0
-"""Deceleration that the safe speed counts on [m/s^2]."""
+"""Deceleration assumed for the safe speed [m/s^2]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,7 @@ class PerceivedBody:
     Attributes:
         key: identifies the body, the same over time.
         kind: its object class.
-        x: position of its middle [m]; `y` likewise.
+        x, y: position of its centre [m].
         heading: [rad].
         length: [m].
         width: [m].
@@ -90,15 +90,15 @@ MOVING = 0.2
 """Speed below which a body counts as standing [m/s]."""
 
 SLOW_BODY = 0.5
-"""Speed of a body below which the ego comes close to it in a manoeuvre [m/s]."""
+"""Speed of a body below which the ego may pass close to it in a manoeuvre [m/s]."""
 
 SHORTEST_STOP = 0.05
-"""Least way to a stop that braking counts on [m]."""
+"""Minimum stopping distance assumed by the braking controller [m]."""
 
 
 @inlined
 def room(kind: int, gap: float, speed: float, tight: bool, line: bool) -> float:
-    """Returns the way to the place where the ego stops for a body or line [m]."""
+    """Returns the distance to the place where the ego stops for a body or line [m]."""
     if line:
         margin = EGO_LINE_GAP
     elif tight and speed < SLOW_BODY:
@@ -133,7 +133,7 @@ def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key:
 
 @inlined
 def bodies_ahead(town: TownArrays, world: WorldArrays, seen: int) -> float:
-    """Finds the body on the path, or soon there, that allows the least speed, and records the distance of a roadblock.
+    """Finds the body on or about to enter the path that allows the lowest speed; records the distance of a roadblock.
 
     Args:
         town: arrays of the town.
@@ -141,7 +141,7 @@ def bodies_ahead(town: TownArrays, world: WorldArrays, seen: int) -> float:
         seen: number of perceived bodies.
 
     Returns:
-        The speed that it allows [m/s], infinite if nothing is there.
+        The speed that it allows [m/s], infinite if there is none.
     """
     car, vehicle = world.car[0], world.vehicles[0]
     tight = bool(world.course[car.at].manoeuvre)
@@ -170,7 +170,7 @@ def bodies_ahead(town: TownArrays, world: WorldArrays, seen: int) -> float:
 def _meet(town: TownArrays, world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, float]:
     """Returns the first place of the path where the ego would touch a body, now or on the body's course.
 
-    Points that are nearer to one another than the body is away are skipped.
+    Skips points that are closer to each other than to the body.
 
     Returns:
         Number of the point (-1 for none), gap from the ego's nose [m], and the body's speed along the path [m/s].

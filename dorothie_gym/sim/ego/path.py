@@ -99,7 +99,7 @@ class Path:
         return float(values[k] + t * (values[k + 1] - values[k]))
 
 
-# --- Place of the ego on its path (compiled) --------------------------------------------------------------------------
+# --- Position of the ego on its path (compiled) -----------------------------------------------------------------------
 
 WIDEST_SWEEP = 2.5
 """Largest distance of the ego's corners from its path [m]: in a U-turn it is 2.4 m."""
@@ -162,18 +162,18 @@ def find_sweeps(
     length: float,
     width: float,
 ) -> None:
-    """Computes directions, and the reach of a car's corners to the left and to the right of the path of its middle.
+    """Computes directions, and the reach of a car's corners to the left and to the right of the path of its centre.
 
     highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
     where the path begins to bend its heading follows with a delay, and in a long bend its front points outwards.
-    A corner that is `along` before or behind the middle is off a path of curvature k by k / 2 along^2 more.
+    A corner that is `along` before or behind the centre is off a path of curvature k by k / 2 along^2 more.
 
     Args:
         course: points of the whole path.
-        sweeps: sweeps of the points from `first` on, which are written; the car enters the path there along its
+        sweeps: sweeps of the points, written from `first`; the car enters the path there along its
             direction.
         first: first point.
-        end: point behind the last one.
+        end: point after the last one.
         length: length of the car [m].
         width: width of the car [m].
     """
@@ -196,7 +196,7 @@ def find_sweeps(
 
 @inlined
 def take_lanes(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
-    """Makes the lanes of the path ahead the vehicle's plan, and updates its place on the first of them."""
+    """Copies the lanes of the path ahead to the vehicle's plan, and updates its station on the first of them."""
     car = world.car[0]
     r = 0
     while r + 1 < car.runs and car.run_first[r + 1] <= car.at:

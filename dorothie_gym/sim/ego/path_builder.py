@@ -1,6 +1,6 @@
 """The whole path of the ego: pieces along lanes, lane switches and U-turns, directions, speeds, places (compiled).
 
-A path is laid twice: the first time its points are only counted, so that nothing changes where there is no room.
+A path is laid twice: the first time its points are only counted, so that nothing changes if there is no room.
 """
 
 from __future__ import annotations
@@ -160,14 +160,14 @@ END_GAP = 0.8
 """Room between the nose of a waiting ego and the end of its lane [m]."""
 
 SEARCH_RANGE = 6.0
-"""Range before and behind the last place in which the ego is searched [m]."""
+"""Range around the last position in which the ego is searched [m]."""
 
 # --- Points -----------------------------------------------------------------------------------------------------------
 
 
 @inlined
 def count_points(world: WorldArrays, points: int, write: bool) -> bool:
-    """Counts the points of a piece, unless they are to be written; returns whether they are."""
+    """Counts the points of a piece, or returns True if they must be written."""
     if not write:
         world.plan[0].needed += points
     return write
@@ -311,7 +311,7 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
 
 @compiled
 def keep(town: TownArrays, world: WorldArrays, first: int, end: int, write: bool) -> None:
-    """Lays the points from `first` to before `end` of the present path, which is being replaced."""
+    """Lays the points from `first` to before `end` of the current path, which is being replaced."""
     if not count_points(world, end - first, write):
         return
     course, lane, limit = world.course, world.plan[0].lane, _limit_in_manoeuvre(town, world, first)
@@ -362,7 +362,7 @@ def find_end(world: WorldArrays) -> float:
 def find_headings(course: RecordArray[CoursePointRecord], count: int) -> None:
     """Computes the direction of a path at each of its points, unwrapped [rad].
 
-    The directions of the segments are those at their middles, between which they are interpolated; both ends
+    The directions of the segments are those at their centres, between which they are interpolated; both ends
     extrapolate the curvature.
 
     Args:
@@ -462,7 +462,7 @@ def place_of_ego(world: WorldArrays) -> tuple[float, float]:
 
 @compiled
 def enter(world: WorldArrays, x: float, y: float) -> None:
-    """Finds the ego's place at the beginning of a new path from its position [m]."""
+    """Finds the ego's place at the start of a new path from its position [m]."""
     car, course, last = world.car[0], world.course, int(world.plan[0].points) - 1
     best, s, offset = math.inf, 0.0, 0.0
     for k in range(min(point_before(world, SEARCH_RANGE) + 1, last)):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
 
 HORIZON = 80.0
-"""Range ahead and behind, beyond the own lane, in which neighbours are searched [m]."""
+"""Range ahead and behind, beyond the vehicle's own lane, in which neighbours are searched [m]."""
 LANE_MARGIN = 1.0
 """Distance outside of a lane up to which a body counts as on it [m], as in highway-env."""
 OVERHANG = 5.0
@@ -29,11 +29,11 @@ _Rest: TypeAlias = tuple[tuple[str, str, int | None], ...]
 
 
 class Chain(NamedTuple):
-    """Lanes one after the other.
+    """Sequence of lanes.
 
     Attributes:
         rows: (n,) in the network's table.
-        offsets: (n,) where each begins, from the start of the first one [m].
+        offsets: (n,) start of each, measured from the start of the first one [m].
     """
 
     rows: IntArray
@@ -52,7 +52,7 @@ class LaneChains:
 
         Args:
             index: lane to start from.
-            route: edges or lanes to come, beginning with this lane's edge or the next one.
+            route: remaining edges or lanes, starting with this lane's edge or the next one.
 
         Returns:
             Lanes that begin within `HORIZON` of the lane's end or end within it of its start; the lane itself first,
@@ -90,7 +90,7 @@ class LaneChains:
         step: Callable[[LaneIndex, _Rest], list[tuple[LaneIndex, _Rest]]],
         start: float,
     ) -> list[tuple[int, float]]:
-        """Rows and distances of the lanes that one comes to, nearest first (Dijkstra's search)."""
+        """Rows and distances of the lanes that are reached, nearest first (Dijkstra's search)."""
         seen = {self._network.row(index)}
         order = itertools.count()  # so that lanes equally far keep the order of the links
         found: list[tuple[int, float]] = []
@@ -122,7 +122,7 @@ class Neighbours(NamedTuple):
 
 
 def lane_zones(table: LaneTable) -> Array:
-    """Returns least x, least y, greatest x, greatest y [m] of the bodies that count as on each lane: (n, 4)."""
+    """Returns minimum x, minimum y, maximum x, maximum y [m] of the bodies that count as on each lane: (n, 4)."""
     widest = np.maximum.reduceat(table.points[:, WIDTH], table.offsets[:-1])
     reach = (0.5 * widest + LANE_MARGIN + OVERHANG)[:, None]
     return np.hstack((table.boxes[:, :2] - reach, table.boxes[:, 2:] + reach))
@@ -147,7 +147,7 @@ def neighbours_on(
         points: see `LaneTable`.
         offsets: see `LaneTable`.
         ends: see `LaneTable`.
-        zones: (n, 4) rectangles outside of which nothing is on a lane; see `lane_zones`.
+        zones: (n, 4) rectangles outside of which no body is on a lane; see `lane_zones`.
         rows: lanes of the chain; the first is the one to start from.
         starts: where they begin [m].
         own: one's own position (2,) [m].
@@ -185,5 +185,5 @@ def neighbours_on(
             if at < s and at > s_rear:
                 rear, s_rear = i, at
             if j == 0:
-                break  # as in highway-env; elsewhere it may be met by several ways, round a block even ahead and behind
+                break  # as in highway-env; elsewhere several routes may lead to it, round a block both ahead and behind
     return front, s_front - s, rear, s - s_rear

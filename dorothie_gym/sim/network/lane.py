@@ -50,7 +50,7 @@ class PolylineLane(AbstractLane):
     """A lane of a town for the vehicles, observations and viewer of highway-env.
 
     Stations and lateral distances are metres along and to the right of the centre line; before the start and after the
-    end, the lane is extended straight. A lane never changes after it is built, so copies of it are the lane itself.
+    end, the lane is extended straight. A lane never changes after it is built, so that copies return the lane itself.
 
     Attributes:
         town_lane: the town's lane.

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 GRID_CELL = 8.0
 """Side of a cell [m]."""
 CELL_REACH = 6.0
-"""A cell lists the lanes whose centre line comes this close to it [m]: cars on a road are settled by their cell."""
+"""A cell lists the lanes whose centre line comes this close to it [m]; for cars on a road, this list suffices."""
 SAME_LEVEL = 3.0
 """Lanes within this height [m] of a body may carry it; overpasses leave more room than that."""
 SLACK = 1e-6
@@ -49,11 +49,11 @@ in the entries (m,); and the corner of the first cell, x and y [m]. A named tupl
 
 
 class GridIndex:
-    """Lanes by square cells.
+    """Lanes listed by square grid cells.
 
-    The distance by which highway-env ranks lanes is never less than the plain distance to the centre line. So when the
-    best lane of a cell's list ranks below the reach of the list, no lane that is not listed can beat it. Where this
-    does not settle the question (off the road), all lanes are asked whose bounding boxes are closer than the best one.
+    The distance by which highway-env ranks lanes is at least the Euclidean distance to the centre line. If the best
+    lane in the list of a cell is closer than the reach of the list, unlisted lanes cannot be better. Otherwise (off
+    the road), all lanes are examined whose bounding boxes are closer than the best lane found so far.
 
     Attributes:
         origin: corner of the first cell, x and y [m].
@@ -76,7 +76,7 @@ class GridIndex:
         self._arrays: _Arrays = (*table, cells, entries, *self.origin)
 
     def closest(self, x: float, y: float, heading: float | None = None, height: float | None = None) -> int:
-        """Returns the row of the lane with the least distance, the first one of several; see `TownNetwork`."""
+        """Returns the row of the closest lane, the first one of equally close lanes; see `TownNetwork`."""
         weight = 1.0
         if heading is None:
             heading, weight = 0.0, 0.0
@@ -244,7 +244,7 @@ def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[
     nearest = math.sqrt(nearest)
     if nearest > CELL_REACH + radius + SLACK:
         return -1, -1
-    # the distance changes by no more than `radius` between the middle and anywhere in the cell, for every segment
+    # the distance changes by no more than `radius` between the centre and anywhere in the cell, for every segment
     limit = nearest + 2.0 * radius + SLACK
     low, high = last, first
     for k in range(first, last):
@@ -308,7 +308,7 @@ def value_near(points: Array, lane: LaneRecord, segment: int, column: int, stati
 
 @inlined
 def closest_segment(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, float, float]:
-    """Returns the closest segment (the first of several), its share up to the closest place, and distance^2 [m^2]."""
+    """Returns the closest segment (the first of equals), its share up to the closest place, and distance^2 [m^2]."""
     best, at, share = math.inf, first, 0.0
     ax, ay = points[first, 0], points[first, 1]
     for k in range(first, last + 1):
@@ -402,11 +402,11 @@ def closest_lane(
         town: arrays of the town.
         x: position [m].
         y: position [m].
-        heading: [rad], `cos` and `sin` its cosine and sine.
-        cos: see there.
-        sin: see there.
-        height: [m], NaN for any.
-        previous: lane that was closest before, looked at first; any lane does.
+        heading: [rad].
+        cos: cosine of the heading.
+        sin: sine of the heading.
+        height: [m], NaN for any height.
+        previous: lane to try first, usually the previous result; any lane is valid.
 
     Returns:
         The lane, and station [m], lateral distance [m] and closest segment on it.
@@ -444,7 +444,7 @@ def closest_lane(
 
 @inlined
 def _is_out_of_question(entry: CellEntryRecord, x: float, y: float, cos: float, sin: float, best: float) -> bool:
-    """Returns whether a lane runs another way than a body, or lies farther away, than the best lane is off."""
+    """Returns whether the heading or distance of a lane alone exceeds the deviation of the best lane."""
     if best <= TURNED and entry.cos * cos + entry.sin * sin < entry.limit:
         return True
     across = y * entry.cos - x * entry.sin

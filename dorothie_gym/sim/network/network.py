@@ -1,4 +1,4 @@
-"""A town as a highway-env road network, and tables of the ways on from each lane."""
+"""A town as a highway-env road network, and tables of the continuations of each lane."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class TownNetwork(RoadNetwork):
     """The lanes of a town as highway-env's graph of roads, with an index for the closest one.
 
     `graph[from][to]` lists the lanes of an edge from left to right. A network does not change after it is built, so
-    copies of it are the network itself (highway-env copies whole environments to predict and to plan).
+    copies return the network itself (highway-env copies whole environments to predict and to plan).
 
     Attributes:
         town: the town.
@@ -187,7 +187,7 @@ class TownNetwork(RoadNetwork):
                 are considered, or all lanes if there is no such lane in the town.
 
         Returns:
-            The index with the least `distance_with_heading`; the first one in the graph's order of several.
+            The index with the minimum `distance_with_heading`; of equals, the first one in the graph's order.
         """
         x, y = float(position[0]), float(position[1])
         if (
@@ -224,12 +224,12 @@ class TownNetwork(RoadNetwork):
         position: Array | None = None,
         np_random: np.random.Generator = np.random,  # type: ignore[assignment]  # highway-env's default
     ) -> LaneIndex:
-        """Returns the lane to be followed after the current one.
+        """Returns the lane that follows the current one.
 
         Args:
             current_index: lane that ends.
             route: edges or lanes to come (a lane id of None leaves the lane open); its head is dropped when it is the
-                current edge. Ignored where it is not a continuation of the current lane by a link.
+                current edge. Ignored if it is not a continuation of the current lane by a link.
             position: not needed here; part of highway-env's interface.
             np_random: source of the choice between several continuations.
 
@@ -272,7 +272,7 @@ class TownNetwork(RoadNetwork):
             _to: end of the current edge, start of the next.
             _id: current lane.
             next_to: end of the next edge.
-            next_id: lane that is wished for, or None.
+            next_id: preferred lane, or None.
             position: world position (2,) [m].
         """
         linked = [index for index in self.successors((_from, _to, _id)) if index[:2] == (_to, next_to)]
@@ -339,10 +339,10 @@ def network_of(town: Town) -> TownNetwork:
 
 
 # --- Ways on from each lane -------------------------------------------------------------------------------------------
-# Tables of the ways on from each lane, built once for each town: exits, default successors, lanes beside, oncoming.
+# Tables of the continuations of each lane, built once for each town: exits, default successors, lanes beside, oncoming.
 
 ANOTHER_WAY = 15.0
-"""Difference of angle from which on exits are different turns [degrees]."""
+"""Difference in angle at which exits count as different turns [degrees]."""
 
 SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 
@@ -351,7 +351,7 @@ class LaneExits(NamedTuple):
     """The tables.
 
     Attributes:
-        ways: ways on from each lane, by the lanes' ids.
+        ways: continuations of each lane, by the lanes' ids.
         exits: exits, those of a lane in the order of `Town.exits`.
         lists: int32 lanes beside each lane, and lanes that may be oncoming.
     """
@@ -402,6 +402,6 @@ def _is_choice(exits: tuple[Exit, ...]) -> bool:
 
 
 def ways_part(town: Town, beside: list[int]) -> bool:
-    """Returns whether the exits of lanes that lie side by side lead different ways."""
+    """Returns whether the exits of adjacent lanes lead to different directions."""
     turns = [way.angle for lane in beside for way in town.exits(lane) if way.junction_id >= 0]
     return max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0) > ANOTHER_WAY

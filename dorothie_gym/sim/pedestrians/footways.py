@@ -1,4 +1,4 @@
-"""Footways: the place of a pedestrian on one, and the ways beside streets without a pavement."""
+"""Footways: the place of a pedestrian on one, and the footways beside streets without a pavement."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 KEEP_RIGHT = 0.4
-"""Offset to the right of the middle at which pedestrians walk [m], so that they pass each other."""
+"""Offset to the right of the centre at which pedestrians walk [m], so that they pass each other."""
 
 FROM_EDGE = 0.4
-"""Least distance to the edge of the way [m]."""
+"""Minimum distance to the edge of the footway [m]."""
 
 
 @inlined
 def side_kept(way: WalkwayRecord) -> float:
-    """Returns the offset to the right of the middle of a way at which pedestrians walk [m]."""
+    """Returns the offset to the right of the centre of a footway at which pedestrians walk [m]."""
     return float(min(KEEP_RIGHT, max(way.half_width - FROM_EDGE, 0.0)))
 
 
@@ -39,7 +39,7 @@ def locate(town: TownArrays, walker: PedestrianRecord) -> float:
     """Finds the station, segment and height of a pedestrian on its footway.
 
     Returns:
-        Its offset to the right of the middle, along the way's own direction [m].
+        Its offset to the right of the centre, in the direction of the footway [m].
     """
     way, points = town.walks[walker.walk], town.walk_points
     k = min(max(walker.segment, way.first), way.last - 1)
@@ -80,9 +80,9 @@ def find_segment(town: TownArrays, walker: PedestrianRecord) -> None:
 def place_beside(
     town: TownArrays, walker: PedestrianRecord, station: float, aside: float
 ) -> tuple[float, float, float, float]:
-    """Returns a place on a pedestrian's footway, to the right of its middle as it walks [m], and the direction there.
+    """Returns a place on a pedestrian's footway, to the right of its centre as it walks [m], and the direction there.
 
-    Beyond its ends the way continues straight.
+    Beyond its ends the footway continues straight.
     """
     way, points = town.walks[walker.walk], town.walk_points
     k = min(max(walker.segment, way.first), way.last - 1)
@@ -100,7 +100,7 @@ def place_beside(
 
 @inlined
 def enter_next(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Moves a pedestrian to the next footway at the end of one, or turns it round where there is none."""
+    """Moves a pedestrian to the next footway at the end of one, or turns it round if there is none."""
     way = town.walks[walker.walk]
     end = 1 if walker.direction > 0.0 else 0
     if way.next_walk[end] < 0:
@@ -114,7 +114,7 @@ def enter_next(town: TownArrays, walker: PedestrianRecord) -> None:
 
 @compiled
 def closest_walk(town: TownArrays, kind: int, x: float, y: float, reach: float) -> tuple[int, float, int]:
-    """Returns number (-1 for none in reach), station [m] and segment of the footway of a kind closest to a place."""
+    """Returns number (-1 for none in reach), station [m] and segment of the closest footway of a kind to a place."""
     found, at, segment, best = -1, 0.0, 0, reach * reach
     points = town.walk_points
     for number in range(len(town.walks)):
@@ -143,11 +143,11 @@ STRAIGHT = 0.01
 """Change of heading below which points are left out [rad]."""
 
 EVEN = 0.05
-"""Change of the way across below which points are left out [m]."""
+"""Change of the distance across below which points are left out [m]."""
 
 
 class StreetWalk(NamedTuple):
-    """A way beside a lane.
+    """A footway beside a lane.
 
     Attributes:
         lane: its id, the rightmost one of its direction.
@@ -160,7 +160,7 @@ class StreetWalk(NamedTuple):
 
 
 def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edges: LaneEdges) -> list[StreetWalk]:
-    """Returns all ways beside lanes outside junctions, cut where another lane is in their way.
+    """Returns all footways beside lanes outside junctions, cut where another lane obstructs them.
 
     Args:
         points: (p, 6) of the lanes' centre lines, as in `TownArrays`.
@@ -192,7 +192,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
 
 
 def _beside(points: Array, lane: LaneRecord) -> Array | None:
-    """Returns x, y, station on the lane, heading, height, 0 at the kerb of a lane; None where there is no way."""
+    """Returns x, y, station on the lane, heading, height, 0 at the kerb of a lane; None if there is no footway."""
     count = int((lane.length - 2.0 * FROM_ENDS) / WALK_STEP) + 1
     if lane.right >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
         return None
@@ -200,7 +200,7 @@ def _beside(points: Array, lane: LaneRecord) -> Array | None:
 
 
 def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Array:
-    """Returns the rows of `_beside` at some stations, to the right of a lane (side 1) or to the left (-1)."""
+    """Returns the rows of `_beside` at the given stations, to the right of a lane (side 1) or to the left (-1)."""
     own = points[lane.first : lane.last + 1]
     x, y, heading, height, width = (np.interp(stations, own[:, 2], own[:, k]) for k in (0, 1, 3, 4, 5))
     lateral = side * (width / 2 + KERB)
@@ -235,7 +235,7 @@ def _far(row: Array, across: Array) -> Array:
 
 
 def _finished(row: Array, across: Array) -> Array:
-    """Returns the points of a way that are needed, with stations along itself and the distances across."""
+    """Returns the necessary points of a footway, with stations along it and distances across."""
     kept = [0]
     for k in range(1, len(row) - 1):
         last = kept[-1]

@@ -1,4 +1,4 @@
-"""Steps of pedestrians: towards a place, past one another, clear of vehicles and props."""
+"""Steps of pedestrians: towards a place, past each other, clear of vehicles and props."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FROM_ENDS = 4.0
 """Distance from the ends of a lane at which pedestrians turn back [m]."""
 
 FROM_JUNCTION = 12.0
-"""Least distance from the ends of a lane at which pedestrians stray, so that they stay out of junctions [m]."""
+"""Minimum distance from the ends of a lane at which pedestrians stray, so that they stay out of junctions [m]."""
 
 WALK_STEP = 2.0
 """Step in which a walkway is looked for [m]."""
@@ -37,13 +37,13 @@ CROSSING_RATE = 1 / 45
 """Rate at which a pedestrian begins to stray [1/s]."""
 
 PERSONAL_SPACE = 0.7
-"""Least distance of a step to a vehicle [m]."""
+"""Minimum distance of a step to a vehicle [m]."""
 
 OBSTACLE_PATIENCE = 2.0
-"""Time for which a pedestrian stands before an obstacle that does not move before it turns back [s]."""
+"""Time for which a pedestrian waits before a static obstacle until it turns back [s]."""
 
 ELBOW_ROOM = 0.3
-"""Least distance of a step to a prop [m]."""
+"""Minimum distance of a step to a prop [m]."""
 
 SAFE_TIME = 5.0
 """Time gap to vehicles before stepping out [s]."""
@@ -55,7 +55,7 @@ SAFE_DISTANCE = 14.0
 # --- Steps ------------------------------------------------------------------------------------------------------------
 
 WALK_AHEAD = 1.0
-"""Distance of the place on the way that a pedestrian walks towards [m]."""
+"""Distance ahead on the footway of the place that a pedestrian walks towards [m]."""
 
 ARRIVED = 0.05
 """Distance to that place at which it is reached [m]."""
@@ -64,16 +64,16 @@ AVOIDING = 1.6
 """Distance within which pedestrians step out of each other's way [m]."""
 
 PASSING_OFFSET = 0.05
-"""Offset of another pedestrian to the right from which on it is passed on the left [m]."""
+"""Offset to the right at which another pedestrian is passed on the left [m]."""
 
 SPACE = 0.55
-"""Least distance between pedestrians, from middle to middle [m]."""
+"""Minimum distance between pedestrians, from centre to centre [m]."""
 
 WALKER_RADIUS, WALKER_SIZE = 0.354, 0.5
 """Half the diagonal and the side of a pedestrian's outline [m], `Pedestrian.LENGTH`."""
 
 EDGE_MARGIN = 0.4
-"""Distance from the edge of the way beyond which pedestrians do not step aside [m]: cars that turn cut corners."""
+"""Distance from the edge of the footway up to which pedestrians step aside [m]: turning cars cut corners."""
 
 SIGHT = 4.0
 """Distance up to which other pedestrians matter [m]."""
@@ -105,10 +105,10 @@ def walk_towards(
         p: the pedestrian.
         x: place [m].
         y: place [m].
-        cos: direction of its way.
-        sin: see there.
-        lateral: offset to the right of the middle of that way [m].
-        half: half the width of that way [m].
+        cos: cosine of the direction of its footway.
+        sin: its sine.
+        lateral: offset to the right of the centre of that footway [m].
+        half: half the width of that footway [m].
         time: until the next decision [s].
 
     Returns:
@@ -124,7 +124,7 @@ def walk_towards(
     dx, dy = _past_others(world, p, dx / distance, dy / distance, cos, sin, lateral)
     aside = lateral + (dy * cos - dx * sin) * step
     if abs(aside) > max(half - EDGE_MARGIN, 0.0) and abs(aside) > abs(lateral):
-        # along the edge of the way instead
+        # along the edge of the footway instead
         onward = 1.0 if dx * cos + dy * sin > 0.0 else -1.0
         dx, dy = onward * cos, onward * sin
     if _bumps(world, p, dx, dy, step, time):
@@ -141,10 +141,10 @@ def walk_towards(
 def _past_others(
     world: WorldArrays, p: int, cos: float, sin: float, way_cos: float, way_sin: float, lateral: float
 ) -> tuple[float, float]:
-    """Returns the direction that leads past others in the way, on the side with more room.
+    """Returns the direction that leads past obstructing pedestrians, on the side with more room.
 
     Oncoming pedestrians, which keep to their right, are passed on the right, slower ones on the left. The arguments are
-    as of `walk_towards`; the first direction is the one to the place.
+    as in `walk_towards`; the first direction is the one to the place.
     """
     walker = world.pedestrians[p]
     x, y = cos, sin
@@ -172,7 +172,7 @@ def _past_others(
 
 @inlined
 def _push(dx: float, dy: float, radius: float, cos: float, sin: float) -> float:
-    """Returns the weight of stepping aside for a body in the way, 0 to 1."""
+    """Returns the weight of stepping aside for an obstructing body, 0 to 1."""
     gap = math.sqrt(dx * dx + dy * dy) - radius
     if gap > AVOIDING or dx * cos + dy * sin < 0.0:
         return 0.0
@@ -181,7 +181,7 @@ def _push(dx: float, dy: float, radius: float, cos: float, sin: float) -> float:
 
 @inlined
 def _bumps(world: WorldArrays, p: int, cos: float, sin: float, step: float, time: float) -> bool:
-    """Returns whether a step leads too close to another pedestrian, where it is or goes, or to a prop."""
+    """Returns whether a step leads too close to another pedestrian, at its present or next position, or to a prop."""
     walker = world.pedestrians[p]
     x, y = walker.x + step * cos, walker.y + step * sin
     for q in range(len(world.pedestrians)):

@@ -1,7 +1,7 @@
 """Pedestrians: along footways, round corners, over crosswalks, and across streets without a pavement.
 
-A pedestrian walks towards a place a little ahead on its way and decides again every `PACE` substeps, not all of them in
-the same substep; in between it walks straight on.
+A pedestrian walks towards a place a little ahead on its footway and decides again every `PACE` substeps, not all
+pedestrians in the same substep; in between it walks straight on.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ if TYPE_CHECKING:
 # Jaywalking: pedestrians beside streets without a pavement cross anywhere, away from junctions and close vehicles.
 
 OVER, BACK, THERE = 0, 1, 2
-"""Values of `mouth` while straying: on the way over, on the way back, at a far kerb without a way."""
+"""Values of `mouth` while straying: walking over, walking back, waiting at a far kerb without a footway."""
 
 FAR_KERB_WAIT = 5.0
-"""Time at a far kerb without a way before a pedestrian returns [s]."""
+"""Time at a far kerb without a footway before a pedestrian returns [s]."""
 
 JOINED = 2.5
-"""Distance to a way at the far kerb within which a pedestrian walks on there [m]."""
+"""Distance to a footway at the far kerb within which a pedestrian walks on there [m]."""
 
 CORRIDOR = 2.0
-"""Half the width of the way over [m]."""
+"""Half the width of the path across [m]."""
 
 COMING, BEYOND = 5.0, 0.5
 """Way of a straying pedestrian, and distance from the lane at its end, within which vehicles stop for it [m]."""
@@ -94,7 +94,7 @@ def _is_clear(world: WorldArrays, walker: PedestrianRecord) -> bool:
 
 @compiled
 def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
-    """Walks straight over a road, or back; back also if something does not leave the way."""
+    """Walks straight over a road, or back; also back if an obstruction stays."""
     walker, points = world.pedestrians[p], town.walk_points
     k = walker.segment
     length = points[k + 1, 2] - points[k, 2]
@@ -129,7 +129,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 @inlined
 def _arrive(town: TownArrays, walker: PedestrianRecord) -> None:
-    """Walks on at the other side of the road, or stands there for a while where there is no way."""
+    """Walks on at the other side of the road, or waits there for a while if there is no footway."""
     found, station, segment = closest_walk(town, Footway.STREET, walker.x, walker.y, JOINED)
     walker.waited, walker.speed = 0.0, 0.0
     if found < 0:
@@ -159,7 +159,7 @@ def give_way_to_strayers(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 @inlined
 def _way_to(town: TownArrays, vehicle: VehicleRecord, walker: PedestrianRecord, reach: float) -> float:
-    """Returns the way from a vehicle's front to a pedestrian in its way, or about to be [m]; inf for none."""
+    """Returns the distance from a vehicle's front to a pedestrian in or about to enter its path [m]; inf for none."""
     begin = -vehicle.station
     for k in range(int(vehicle.planned)):
         if begin > reach:
@@ -179,13 +179,13 @@ def _way_to(town: TownArrays, vehicle: VehicleRecord, walker: PedestrianRecord, 
 # --- Crosswalks -------------------------------------------------------------------------------------------------------
 
 EXPECTED_REACTION = 1.0
-"""Reaction time of drivers that pedestrians count on [s]."""
+"""Reaction time of drivers assumed by pedestrians [s]."""
 
 EXPECTED_BRAKING = 3.0
-"""Deceleration of vehicles that pedestrians count on [m/s^2]."""
+"""Deceleration of vehicles assumed by pedestrians [m/s^2]."""
 
 ROOM = 4.0
-"""Distance from the front to the crosswalk's middle line at which vehicles are expected to stop [m]."""
+"""Distance from the front to the crosswalk's centre line at which vehicles are expected to stop [m]."""
 
 VEHICLES_SIGHT = 60.0
 """Distance up to which pedestrians look for vehicles [m]."""
@@ -200,13 +200,13 @@ CROSSING_PAUSE = 5.0
 """Time after leaving a crosswalk without crossing again [s]."""
 
 PLACES, PLACES_APART = 3, 0.7
-"""Number of places beside one another for those that wait, and the distance between them [m]."""
+"""Number of adjacent waiting places, and the distance between them [m]."""
 
 FROM_KERB = 0.9
 """Distance of those places from the kerb [m]."""
 
 FROM_PAINT = 2.0
-"""Largest distance of those places beside the middle of the paint [m]."""
+"""Largest distance of those places beside the centre of the paint [m]."""
 
 READY = 1.0
 """Distance to its place from which a waiting pedestrian steps onto the crosswalk [m]."""
@@ -237,7 +237,7 @@ def comes_to_crosswalk(town: TownArrays, walker: PedestrianRecord, way: WalkwayR
 def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     """Waits at the kerb until the crosswalk may be entered, or walks on after too long a wait.
 
-    The place is where the pavement ends, also beside the paint, if not too far from it: further on, turning cars cut
+    The place is where the pavement ends, also beside the paint, if not too far from it: beyond, turning cars cut
     the corner.
     """
     walker = world.pedestrians[p]
@@ -265,7 +265,7 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
 
 @inlined
 def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
-    """Walks over a crosswalk, and back if a vehicle stays in the way."""
+    """Walks over a crosswalk, and back if a vehicle keeps obstructing it."""
     walker = world.pedestrians[p]
     crossing = town.crossings[walker.crossing]
     lateral = _advance(crossing, walker)
@@ -337,7 +337,7 @@ def _is_danger(vehicle: VehicleRecord, crossing: CrossingRecord) -> bool:
     if front < HALF_DEPTH:
         return True
     if vehicle.speed < TRAFFIC_STANDING or (dx * vehicle.cos + dy * vehicle.sin < 0.0 and front > ROOM):
-        return False  # it stands before it, or has passed
+        return False  # the vehicle waits before the crosswalk, or has passed
     return bool(
         front < ROOM + EXPECTED_REACTION * vehicle.speed + vehicle.speed * vehicle.speed / (2.0 * EXPECTED_BRAKING)
     )

@@ -1,4 +1,4 @@
-"""Arrays of the footways of a town: pavements, ways round corners, crosswalks, ways beside streets."""
+"""Arrays of the footways of a town: pavements, footways round corners, crosswalks, footways beside streets."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ SAME_END = 0.5
 """Distance within which ends of pavements are one place [m]."""
 
 LONGEST_CORNER = 45.0
-"""Longest way from the end of one pavement to one of another, if no lane lies between [m]."""
+"""Longest footway between the ends of two pavements, if no lane lies between [m]."""
 
 CORNER_WIDTH = 1.4
-"""Width of such ways round corners [m]."""
+"""Width of such footways round corners [m]."""
 
 BOWS = 0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0
-"""Offsets from the straight line at which such ways are tried [m]: round the outside of a bend they lead in a bow."""
+"""Offsets from the straight line at which such footways are tried [m]: round the outside of a bend they are curved."""
 
 LANE_CLEARANCE = 0.8
-"""Least distance of their middles from the lanes' edges [m]."""
+"""Minimum distance of their centres from the lanes' edges [m]."""
 
 STREET_HALF_WIDTH = 0.8
-"""Half the width of a way beside a street without a pavement [m]: half of `pacing.KERB`."""
+"""Half the width of a footway beside a street without a pavement [m]: half of `pacing.KERB`."""
 
 HEEDED = 8.0
-"""Distance from a crosswalk's line within which lanes end whose lights are heeded there [m]."""
+"""Distance from a crosswalk's line within which lanes end whose lights apply to the crosswalk [m]."""
 
 KERB_REACH = 6.0
 """Distance from a crosswalk's end to its pavement, at most [m]."""
@@ -57,7 +57,7 @@ CROSSWALK_DEPTH = 3.0
 
 
 _End: TypeAlias = tuple[int, int]
-"""Number of a way, and 0 for its beginning or 1 for its end."""
+"""Index of a footway, and 0 for its start or 1 for its end."""
 
 
 class Walkways(NamedTuple):
@@ -114,7 +114,7 @@ def _pavement(points: Array, width: float) -> Array:
 
 
 class _Corner(NamedTuple):
-    """A way from one end of a pavement to one of another."""
+    """A footway between the ends of two pavements."""
 
     ends: tuple[_End, _End]
     points: Array
@@ -130,7 +130,7 @@ class _Corners(NamedTuple):
 def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
     """Returns the footway from each end of a pavement to the nearest end of another one, across no lane.
 
-    Ends that are one place need no way between them. An end from which no other one is reached is a dead end.
+    Ends at the same place need no footway between them. An end without a reachable other end is a dead end.
     """
     ends = [(k, end) for k in range(len(sidewalks)) for end in (0, 1)]
     found = _Corners([], {})
@@ -167,7 +167,9 @@ def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
 
 
 def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) -> tuple[int, Array] | None:
-    """Returns the first of some ends that is reached across no lane, and the way there: straight, else in a bow."""
+    """Returns the first of the given ends that can be reached without crossing a lane, and the path to it: straight, or
+    curved if necessary.
+    """
     for bow in BOWS:
         for other in others:
             line = places[[one, other]]
@@ -215,7 +217,7 @@ def _crossings(
 
 
 def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
-    """Returns the two ends of a crosswalk (2, 2) [m], which crosses the lane closest to its middle."""
+    """Returns the two ends of a crosswalk (2, 2) [m], which crosses the lane closest to its centre."""
     middle = crosswalk.outline.mean(axis=0)[:2]
     lane = network.get_lane(network.get_closest_lane_index(middle)).town_lane
     heading = lane.heading_at(lane.project(middle)[0])
@@ -226,7 +228,7 @@ def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
 
 
 def _as_far_as(ends: Array, places: Array) -> Array:
-    """Extends the middle line of a crosswalk (2, 2) to places on the two pavements (2, 3) [m].
+    """Extends the centre line of a crosswalk (2, 2) to places on the two pavements (2, 3) [m].
 
     Pedestrians walk from pavement to pavement, not from kerb to kerb, on the paint also where a pavement ends before
     it.
@@ -263,7 +265,7 @@ def _at(walk: Sidewalk, station: float) -> Array:
 def _passages(
     town: Town, lanes: RecordArray[LaneRecord], crossings: RecordArray[CrossingRecord]
 ) -> RecordArray[PassageRecord]:
-    """Returns the passages of lanes over crosswalks, within half a crosswalk's depth of its middle line."""
+    """Returns the passages of lanes over crosswalks, within half a crosswalk's depth of its centre line."""
     found: list[tuple[float, float, float, int]] = []
     reach = crossings["length"] / 2 + CROSSWALK_DEPTH
     middles = np.column_stack((crossings["x"].mean(axis=1), crossings["y"].mean(axis=1)))

@@ -32,13 +32,13 @@ SCALE_SIGMA = 0.02
 """Relative error of the odometer, constant for a car (tyre wear, pressure)."""
 
 SLIP = 0.02
-"""Error of the way by slip [m per root of m]."""
+"""Error of the distance travelled by slip [m per root of m]."""
 
 SKID = 0.01
 """The same across [m per root of m]."""
 
 BIAS_SIGMA = math.radians(0.15)
-"""Bias of the gyro when it is switched on [rad/s]."""
+"""Initial bias of the gyro [rad/s]."""
 
 BIAS_WALK = math.radians(0.008)
 """Random walk of that bias [rad/s per root of s]."""
@@ -62,7 +62,7 @@ def measure(track: Array, k: int, draws: Array, dt: float, truth: Array) -> tupl
         truth: (2,) true scale of the odometer and true bias of the gyro [rad/s], whose random walk is continued.
 
     Returns:
-        Way ahead and to the right [m] and turn [rad]; all of them 0 if the car stands.
+        Movement ahead and to the right [m] and rotation [rad], all 0 if the car stands.
     """
     truth[1] += BIAS_WALK * math.sqrt(dt) * draws[0]
     dx, dy = track[k + 1, 0] - track[k, 0], track[k + 1, 1] - track[k, 1]
@@ -85,8 +85,8 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
 
     Args:
         mean: (5,) see `sensing_records.LOCALIZER_STATES`; written.
-        covariance: (5, 5) of it; written.
-        ahead: way ahead [m]; `right` to the right of that.
+        covariance: (5, 5) covariance of the state; written.
+        ahead: movement ahead [m].
         right: [m].
         turn: [rad].
         dt: time of a frame [s].
@@ -217,7 +217,7 @@ def correct(mean: Array, covariance: Array, axis: int, fix: float) -> None:
 
     Args:
         mean: (5,) estimate; written.
-        covariance: (5, 5) of it; written.
+        covariance: (5, 5) covariance of the state; written.
         axis: 0 for x, 1 for y.
         fix: measured coordinate [m].
     """

@@ -1,6 +1,6 @@
 """Perception of bodies by the ego: misses beyond the range of sight, and errors of place.
 
-All chance is a hash of the seed, the body and the time: it does not depend on the number or order of calls.
+All random values are hashes of the seed, the body and the time: they do not depend on the number or order of calls.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def see(
         eye: the visibility.
         x: position of the observer [m].
         y: [m].
-        frame: present frame.
+        frame: current frame.
         skip: row of the observer among the vehicles, -1 if it is not one of them.
 
     Returns:
@@ -118,7 +118,7 @@ def look_around(world: WorldArrays, frame: int, table: Array) -> int:
 
     Args:
         world: arrays of the world.
-        frame: present frame.
+        frame: current frame.
         table: (n, 9) columns `perception.BODY`, written; as long as `world.seen`.
 
     Returns:
@@ -136,7 +136,7 @@ def look_around(world: WorldArrays, frame: int, table: Array) -> int:
 
 @compiled
 def switch_lamps(eye: EyeRecord, on: bool) -> None:
-    """Switches the head lights in the visibility of an ego; air, light and clarity stay as they are."""
+    """Switches the headlights in the visibility of an ego; air, light and clarity stay as they are."""
     eye.lamps = HEAD_LIGHTS if on else 0.0
     eye.sight = sight_in(eye.fog, eye.fog_start, eye.rain, eye.light, eye.lamps, eye.clarity)
     far = gain(eye.fog, eye.fog_start, eye.rain, eye.light, eye.lamps, eye.clarity, CLEAR_SIGHT)

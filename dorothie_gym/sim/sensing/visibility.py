@@ -4,7 +4,7 @@ A body of a road user's size is seen while its signal is at least that at the ed
 
     S(d) = (CLEAR_SIGHT / d)^2 * G(d),    G(d) = clarity * exp(-tau(d)) * min(1, sqrt(E(d) / FULL_LIGHT))
 
-- (1 / d)^2: a small target is detected by its area (Ricco's law; Blackwell, J. Opt. Soc. Am. 36, 1946);
+- (1 / d)^2: the detection of a small target depends on its area (Ricco's law; Blackwell, J. Opt. Soc. Am. 36, 1946);
 - exp(-tau): contrast falls off exponentially with the air's extinction (Koschmieder 1924); the meteorological optical
   range M leaves 5 % of it, so the extinction is ln(20) / M (WMO Guide to Instruments, no. 8, chapter 9);
 - sqrt(E): below daylight the threshold contrast rises with the root of the light (Rose, J. Opt. Soc. Am. 38, 1948, and
@@ -42,7 +42,7 @@ FIVE_PERCENT = pm.log(20.0)
 """Optical depth that leaves 5 % of the contrast."""
 
 FULL_LIGHT = 300.0
-"""Illuminance from which on more light does not help [lx]: asphalt (reflectance 0.1) then has 10 cd/m^2, about where
+"""Illuminance above which more light does not help [lx]: asphalt (reflectance 0.1) then has 10 cd/m^2, about where
 Weber's law begins (Blackwell 1946)."""
 
 STREET_LIGHT = 2.0
@@ -161,8 +161,8 @@ class Visibility:
         fog: extinction by fog [1/m].
         fog_start: where the fog begins [m].
         rain: extinction by rain [1/m].
-        light: illuminance of the scene, without head lights [lx].
-        lamps: luminous intensity of the head lights [cd], 0 if they are off.
+        light: illuminance of the scene, without headlights [lx].
+        lamps: luminous intensity of the headlights [cd], 0 if they are off.
         clarity: share of the signal that the view itself leaves, in [0, 1].
     """
 
@@ -192,5 +192,5 @@ class Visibility:
 
     @functools.cached_property
     def is_clear(self) -> bool:
-        """Returns whether nothing is lost anywhere within sight of a clear noon."""
+        """Returns whether perception within the sight distance of a clear noon is without loss."""
         return self.gain(CLEAR_SIGHT) >= 1.0

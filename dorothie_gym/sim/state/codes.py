@@ -81,7 +81,7 @@ class Wait(enum.IntEnum):
     LIGHT = 1
     """Its light is red, or yellow and it can stop."""
     STOP_SIGN = 2
-    """It has not come to a stand at its stop sign."""
+    """It has not come to a standstill at its stop sign."""
     GIVING_WAY = 3
     """A vehicle with priority is coming."""
     TURN = 4
@@ -91,7 +91,7 @@ class Wait(enum.IntEnum):
     CLOSED = 6
     """The ego turns round in the junction."""
     NO_ROOM = 7
-    """There is no room behind the junction."""
+    """There is no room beyond the junction."""
 
 
 class Group(enum.IntEnum):
@@ -129,7 +129,7 @@ class EventCode(enum.IntEnum):
 
 
 class Breach(enum.IntEnum):
-    """Kind of a breach of the rules by the ego."""
+    """Kind of infraction of the traffic rules by the ego."""
 
     COLLISION = 0
     RED_LIGHT = 1
@@ -139,14 +139,14 @@ class Breach(enum.IntEnum):
 
 
 COLLISION, RED_LIGHT, STOP_SIGN, OFF_ROAD, WRONG_WAY = (int(kind) for kind in Breach)
-"""Kinds of breaches, as plain numbers."""
+"""Kinds of infractions, as plain numbers."""
 
 
 class Refusal(enum.IntEnum):
     """Answer to a navigation action: carried out, or the reason of a refusal."""
 
     NO_SPACE = -1
-    """The arrays have no room for the new path: to be repeated with longer ones, see `world_arrays.lengthened`."""
+    """The arrays have no room for the new path: repeat with longer ones, see `world_arrays.lengthened`."""
     NONE = 0
     STOPPED = 1
     NOT_STOPPED = 2

@@ -62,7 +62,7 @@ def float_field(dtype: np.dtype[np.void], name: str) -> Field[float]:
 
 
 def int_field(dtype: np.dtype[np.void], name: str) -> Field[int]:
-    """Returns a property for an integer of the view's row; of an array of them the first one."""
+    """Returns a property for an integer of the view's row; for an array, of its first element."""
     return property(*_accessors(dtype, name))
 
 
@@ -113,7 +113,7 @@ def _accessors(
 
 
 class BodyView(CachedViews, Generic[Record_co]):
-    """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
+    """A row of the arrays. Its memory address is cached until the holder has other arrays.
 
     Attributes:
         road: road of the body.
@@ -171,7 +171,7 @@ class BodyView(CachedViews, Generic[Record_co]):
 
     @property
     def position(self) -> Array:
-        """Place of the middle (2,) [m]; as in highway-env an array that changes when the body moves."""
+        """Place of the centre (2,) [m]; as in highway-env an array that changes when the body moves."""
         self.memory()
         return self._position
 
@@ -211,7 +211,7 @@ class BodyView(CachedViews, Generic[Record_co]):
         return self.lane.local_coordinates(self.position)
 
     def to_dict(self, origin_vehicle: RoadObject | None = None, observe_intentions: bool = True) -> dict[str, float]:
-        """Returns the features that highway-env observes of a vehicle; those of pedestrians and props likewise.
+        """Returns the features that highway-env observes of a vehicle, pedestrian or prop.
 
         Args:
             origin_vehicle: position and velocity are given relative to it.

@@ -24,7 +24,7 @@ class SweepRecord:
 class EgoRecord:
     """Control of the ego, the vehicle of the kind `Kind.DRIVEN`."""
 
-    first: Int32  # stretch of the path that the motion control follows: its first point, and the one behind its last
+    first: Int32  # stretch of the path that the motion control follows: its first point, and the one after its last
     points: Int32
     at: Int32  # the point at or before the ego
     s: Float  # distance along the path, and offset to its right [m]
@@ -53,11 +53,11 @@ class EgoRecord:
     wind: Float  # strength in [0, 1]
     wind_heading: Float  # direction to which it blows [rad]
     wind_phase: Annotated[NDArray[np.float64], "f8", (3,)]  # phases of its gusts [rad]
-    roadblock: Float  # distance from its middle to a prop on the path [m], or infinite
-    sweeping: Flag  # whether it is in a U-turn, and the points of it that are left
+    roadblock: Float  # distance from its centre to a prop on the path [m], or infinite
+    sweeping: Flag  # whether it is in a U-turn, and the remaining points of that
     sweep_first: Int32
     sweep_last: Int32
-    closed: Annotated[NDArray[np.int32], "i4", (CLOSED,)]  # junctions that it needs for a U-turn, and when asked
+    closed: Annotated[NDArray[np.int32], "i4", (CLOSED,)]  # junctions needed for a U-turn, and when requested
     closed_at: Annotated[NDArray[np.float64], "f8", (CLOSED,)]
     kind: Int32  # limit of its speed: `ObjectClass` or 0, gap [m], speed [m/s] and key of the body
     gap: Float
@@ -86,14 +86,14 @@ class PlanRecord:
 
     version: Int64  # number of paths laid so far
     written: Int64  # version of the path in `WorldArrays.sweeps`; 0: none, or with other goals
-    written_until: Float  # end of the stretch of it there [m]
-    action: Int32  # manoeuvre planned or under way: a `PhysicalAction` or 0
+    written_until: Float  # end of the stretch on that lane [m]
+    action: Int32  # manoeuvre planned or in progress: a `PhysicalAction` or 0
     angle: Int32  # its angle [degrees], positive left
     end: Float  # distance along the path at which it ends [m]
     connector: Int32  # connector and lane of the planned turn
     exit: Int32
     held: Flag  # whether the ego stands by the action Stop
-    lights: Flag  # whether the head lights are on
+    lights: Flag  # whether the headlights are on
     cruise: Float  # desired speed [km/h]
     manual: Flag  # whether an outside driver gives throttle, steer and brake
     throttle: Float
@@ -101,7 +101,7 @@ class PlanRecord:
     brake: Float
     goals: Int32  # rows of `goals` and `seen_props` in use
     props: Int32
-    open_end: Flag  # whether the path ends where a turn has to be chosen, or at the end of the map
+    open_end: Flag  # whether the path ends where a turn must be chosen, or at the end of the map
     points: Int32  # number of points of the path
     length: Float  # its length [m]
     limit: Float  # speed limit at its first point [m/s]
@@ -113,7 +113,7 @@ class PlanRecord:
     choice: Int32  # lane before the next junction with a choice, or -1, and its end along the path [m]
     choice_at: Float
     turning: Flag  # whether the planned turn has not begun
-    turn_at: Float  # beginning of its connector along the path [m], or infinite
+    turn_at: Float  # start of its connector along the path [m], or infinite
     steps: Int32  # rows of `steps` in use
     needed: Int32  # points of the path that is being laid; 0: a list of `steps` is too long
     last_x: Float  # the last point of a piece of path, which may be left out [m]
@@ -231,30 +231,30 @@ class LocalizerRecord:
 
 
 class LineMarkRecord:
-    """State of a line for the ego: whether it has stood there; `near` is a scratch list of the lines nearby."""
+    """State of a stop line for the ego: whether it has stood there; `near` is a scratch list of the lines nearby."""
 
     near: Int32
     stood: Flag
 
 
 class WatchRecord:
-    """Watch over the rules: breaches so far by `codes.Breach`, and the last frame of lasting ones."""
+    """State of the rule checks: infractions so far by `codes.Breach`, and the last frame of continuing ones."""
 
     counts: Annotated[NDArray[np.int64], "i8", (len(Breach),)]
     last: Annotated[NDArray[np.int64], "i8", (len(Breach),)]
 
 
 class BreachRecord:
-    """A breach of a rule by the ego, other than collisions."""
+    """An infraction by the ego other than a collision."""
 
     frame: Int64
-    x: Float  # of the car's middle [m]
+    x: Float  # of the car's centre [m]
     y: Float
     height: Float
     station: Float  # along the lane [m]
     kind: Int32  # `codes.Breach`
-    lane: Int32  # lane that was left over its end, or the nearest one, -1 for none nearby
-    signal: Int32  # id of the light or sign, -1 where there is none
+    lane: Int32  # lane that the ego left over its end, or the nearest one, -1 for none nearby
+    signal: Int32  # id of the light or sign, -1 if there is none
 
 
 # --- Bodies, clock and lights -----------------------------------------------------------------------------------------
@@ -298,14 +298,14 @@ class SizedBody(PlacedBody, Protocol):
 class VehicleRecord:
     """A car or cyclist; a free row has the kind `Kind.EMPTY`."""
 
-    x: Float  # position of its middle [m]
+    x: Float  # position of its centre [m]
     y: Float
     heading: Float  # [rad]
     cos: Float
     sin: Float
     speed: Float  # [m/s]
     height: Float  # of the road under it [m]
-    acceleration: Float  # present action: [m/s^2], and sine of the slip angle
+    acceleration: Float  # current action: [m/s^2], and sine of the slip angle
     slip: Float
     desired: Float  # desired speed [m/s]
     length: Float  # [m]
@@ -317,17 +317,17 @@ class VehicleRecord:
     own_station: Float  # on the closest lane [m]
     own_lateral: Float
     timer: Float  # since it last considered a lane change [s]
-    standing: Float  # duration of its stand, its light not being red [s]
-    stuck: Float  # the same less the time for which the light ahead was not green, also behind others [s]
+    standing: Float  # time for which it has stood while its light was not red [s]
+    stuck: Float  # the same without the time for which the light ahead was not green, also in a queue [s]
     crash_age: Float  # since it crashed [s]
     odometer: Float  # distance driven [m]
     distance: Float  # from its front to the line before the next junction [m]
-    seen: Float  # times at which it came near, asked, began to wait [s]
+    seen: Float  # times at which it came near, requested admission, began to wait [s]
     asked: Float
     since: Float
     claim_since: Float  # [s]
     claim_asked: Float
-    rerouted: Float  # time at which it last chose another way for lack of room on the planned one [s]
+    rerouted: Float  # time at which it last chose another route for lack of room on the planned one [s]
     random: Int64
     lane: Int32  # the closest lane
     segment: Int32  # the closest segment of the lane that it follows
@@ -359,7 +359,7 @@ class PedestrianRecord:
     station: Float  # along the footway or crosswalk [m]
     direction: Float  # 1 or -1
     pace: Float  # desired speed [m/s]
-    aside: Float  # offset to the right of the middle of the way [m]
+    aside: Float  # offset to the right of the centre of the footway [m]
     waited: Float
     odometer: Float
     far: Float  # while straying: distance to the other side of the road [m]
@@ -378,7 +378,7 @@ class PedestrianRecord:
 
 
 class PropRecord:
-    """A thing on the road, and the lanes that it reaches into."""
+    """A body on the road, and the lanes that it reaches into."""
 
     x: Float
     y: Float
@@ -423,7 +423,7 @@ class ClockRecord:
 
 
 class LampRecord:
-    """Present phase of a light programme, which holds until a time [s]."""
+    """Current phase of a light programme, which holds until a time [s]."""
 
     until: Float
     phase: Int32

@@ -38,16 +38,16 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 PASSING_WIDTH = 2.5
-"""Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""
+"""Two vehicles whose centres are this far apart across their lanes pass each other [m]: they are 2 m wide."""
 
 CAR_REAR = CAR_LENGTH / 2
 """Distance from the centre of a car to its rear [m]."""
 
 LEVEL_TOWN = 2.0
-"""In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
+"""In a town whose lanes are no further apart in height than this, heights have no effect [m]."""
 
 OFF_ROAD_MARGIN = 0.5
-"""Distance of the car's middle outside of all lanes, connectors included, from which on it is off the road [m]."""
+"""Distance of the car's centre from all lanes and connectors at which the car counts as off the road [m]."""
 
 WIDE_LANE = 2.0 * (CELL_REACH - 2.0 * OFF_ROAD_MARGIN - SLACK)
 """Width up to which cells list all lanes that a place is within `OFF_ROAD_MARGIN` of [m]."""
@@ -68,9 +68,9 @@ class TownArrays(NamedTuple):
     Attributes:
         points: (p, 6) x, y, station, heading, height, width of all points of centre lines, the network's own table.
         lanes: lanes by their ids.
-        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights pedestrians heed.
+        neighbours: int32 lists of lanes that follow and precede others, and of those whose lights pedestrians obey.
         relations: uint8 rows of `codes.Relation` of each connector to those of its junction.
-        siblings: lanes with a common beginning.
+        siblings: lanes with a common start.
         programmes: light programmes.
         phase_ends: ends of the phases within the cycle [s].
         colours: uint8 `codes.Colour` by programme, phase and light.
@@ -79,18 +79,18 @@ class TownArrays(NamedTuple):
         entries: lanes in the lists of the cells.
         walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column is the
             distance to the kerb across, 0 where the road is not crossed [m].
-        walks: footways: the pavements with the town's own ids, the ways between their ends, the ways beside
+        walks: footways: the pavements with the town's own ids, the paths between their ends, the paths beside
             the rightmost lanes.
         mouths: mouths of crosswalks, those of a pavement in the order of their stations.
         crossings: crosswalks.
         passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
-        junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
+        junctions: (j, 3) centre [m] of each junction's connectors, and the radius in which they lie [m].
         lines: ends of lanes with a light or stop sign, in the order of the lanes.
-        ways: ways on from each lane, by the lanes' ids.
+        ways: continuations of each lane, by the lanes' ids.
         exits: exits from the ends of lanes.
         lane_lists: int32 lists of lanes, see `ways`.
         flat: whether all lanes are so level that heights do not matter.
-        wide: whether some lane is wider than `WIDE_LANE`.
+        wide: whether any lane is wider than `WIDE_LANE`.
     """
 
     points: Array
@@ -307,7 +307,7 @@ def _exit(town: Town, connector: int) -> int:
 
 
 def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[SiblingRecord]:
-    """Lanes that begin on one lane: up to where each is in the way on the others."""
+    """Lanes with a common start: the stretch on which each obstructs the others."""
     found: list[tuple[float, int]] = []
     for lane in town.lanes:
         beside = sorted(
@@ -319,7 +319,7 @@ def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[Sibling
 
 
 def _parting(lane: Lane, other: Lane) -> float:
-    """Returns the station on the other lane from which on it is clear of a lane with the same beginning [m]."""
+    """Returns the station on the other lane at which it has separated from a lane with the same start [m]."""
     for station in np.arange(0.0, other.length, 1.0):
         if abs(lane.project(other.position(float(station)))[1]) > PASSING_WIDTH:
             return float(station) + CAR_REAR

@@ -1,4 +1,4 @@
-"""Records of a town: lanes, ways on, signals, stop lines and footways, which are never written."""
+"""Records of a town: lanes, continuations, signals, stop lines and footways, which are never written."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dorothie_gym.support.compilation.records import Flag, Float, Int32
 
 
 class LaneRecord:
-    """A lane of a town; indices are -1 where there is none."""
+    """A lane of a town; indices are -1 if there is none."""
 
     length: Float  # [m]
     limit: Float  # speed limit [m/s]
@@ -27,17 +27,17 @@ class LaneRecord:
     high_edge: Float
     first: Int32  # first and last row of its points
     last: Int32
-    rank: Int32  # place in the order of the network's lanes: settles ties
-    successor: Int32  # beginning and length of its lists in `neighbours`
+    rank: Int32  # position in the order of the network's lanes: breaks ties
+    successor: Int32  # start and length of its lists in `neighbours`
     successors: Int32
     predecessor: Int32
     predecessors: Int32
     left: Int32  # lanes that one may change to
     right: Int32
     junction: Int32  # junction that it crosses
-    exit: Int32  # of a connector: the first lane behind the junction
+    exit: Int32  # of a connector: the first lane beyond the junction
     place: Int32  # of a connector: its place among those of its junction
-    relation: Int32  # of a connector: beginning of its row of `relations`
+    relation: Int32  # of a connector: start of its row of `relations`
     control: Int32  # `TrafficControl`
     cycling: Flag  # whether cyclists use it: it is slow, and does not lead to fast lanes only
     programme: Int32  # light programme, and place of its light in it
@@ -54,7 +54,7 @@ class LaneExitsRecord:
     exit: Int32  # rows of `exits`, from right to left
     exits: Int32
     onward: Int32  # lane that follows by default, or -1: the only one, or outside junctions the straightest
-    chooses: Flag  # whether a turn has to be chosen at its end
+    chooses: Flag  # whether a turn must be chosen at its end
     offers: Flag  # whether the junction at its end offers a turn, from this lane or from one beside it
     beside: Int32  # rows of `lane_lists`: itself and the lanes that are reached from it by lane changes
     besides: Int32
@@ -87,7 +87,7 @@ class CellEntryRecord:
 
 
 class SiblingRecord:
-    """A lane with the same beginning as another one: bodies on it before `until` [m] are in the way on the other."""
+    """A lane with the same start as another one: bodies on it before `until` [m] also obstruct the other."""
 
     until: Float
     lane: Int32
@@ -125,7 +125,7 @@ class WalkwayRecord:
     next_walk: Annotated[NDArray[np.int32], "i4", (2,)]
     next_end: Annotated[NDArray[np.int32], "i4", (2,)]
     kind: Int32  # `Footway`
-    lane: Int32  # of a way beside a street: the lane, else -1
+    lane: Int32  # of a footway beside a street: the lane, else -1
 
 
 class CrossingRecord:

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
 
 PROPS = 16
-"""Most props in a world."""
+"""Maximum number of props in a world."""
 
 CAR_KEY = 0
 """Key of the ego."""
@@ -66,7 +66,7 @@ LONG_AGO = -(1 << 40)
 """A frame before all others."""
 
 BREACHES = MAX_SUBSTEPS + 2
-"""Most breaches in one call of `step`: a line each frame, and the road and the direction left once."""
+"""Maximum number of infractions in one call of `step`: a line each frame, and the road and the direction left once."""
 
 
 @by_reference
@@ -79,15 +79,15 @@ class WorldArrays(NamedTuple):
         props: props.
         nodes: nodes of the lanes' lists: two for each vehicle and four for each prop, in the lists of the lanes.
         heads: int32 first node of each lane, or -1.
-        order: int32 bodies (vehicles, pedestrians, props) as `collisions` sorts them, by `keys` [m].
-        keys: see there.
+        order: int32 bodies (vehicles, pedestrians, props) as `collisions` sorts them, by `keys`.
+        keys: their sort keys [m].
         lamps: one for each light programme.
         busy: int32 number of pedestrians on each crosswalk.
-        stack: int32 scratch of searches along lanes, with `starts` [m].
-        starts: see there.
+        stack: int32 scratch of searches along lanes.
+        starts: the starts of these lanes [m].
         clock: (1,) time and counters.
         car: (1,) control of the ego, if vehicle 0 is of the kind `Kind.DRIVEN`.
-        sweeps: directions and sweeps at the points of its path around its place, `EgoRecord.first` the first.
+        sweeps: directions and sweeps at the points of its path around its place, starting with `EgoRecord.first`.
         plan: (1,) its plan.
         course: points of its whole path.
         steps: lanes of the plan that is being made.
@@ -99,9 +99,9 @@ class WorldArrays(NamedTuple):
         poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
         events: its events in that call.
         localizer: (1,) its pose estimate.
-        watch: (1,) numbers of its breaches of the rules.
-        marks: its stands at the lines of the town.
-        breaches: its breaches in the last call of `step`, collisions left out.
+        watch: (1,) numbers of its infractions.
+        marks: stops of the ego at the lines of the town.
+        breaches: infractions of the ego in the last call of `step`, without collisions.
     """
 
     vehicles: RecordArray[VehicleRecord]
@@ -213,7 +213,7 @@ def empty_world(
     seed: int | np.random.SeedSequence = 0,
     driven: bool = False,
 ) -> WorldArrays:
-    """Returns an empty world with room for some bodies.
+    """Returns an empty world with room for the given number of bodies.
 
     Args:
         town: arrays of the town.

@@ -45,10 +45,10 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 NO_ROOM_PATIENCE = 5.0
-"""Wait for room behind a junction after which a vehicle draws another route [s]."""
+"""Wait for room beyond a junction after which a vehicle draws another route [s]."""
 
 SLOWEST_BEND = 0.5
-"""Least speed in a bend [m/s]."""
+"""Minimum speed in a bend [m/s]."""
 
 CURVES_SIGHT = 40.0
 """Distance up to which bends limit the speed [m]: braking from 14 m/s to 5 m/s takes 43 m."""
@@ -80,7 +80,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
     vehicle = world.vehicles[i]
     target, stop = vehicle.desired, math.inf
     front, gap = NOBODY, math.inf
-    begin = -vehicle.station  # of a lane, from the vehicle's middle
+    begin = -vehicle.station  # of a lane, from the vehicle's centre
     junction, line = NOBODY, 0.0
     for k in range(int(vehicle.planned)):
         if begin > HORIZON or (front >= 0 and junction >= 0 and begin > CURVES_SIGHT):
@@ -117,7 +117,7 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
 
 @compiled
 def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> float:
-    """Returns the acceleration that stops a vehicle before the ego's U-turn [m/s^2]; inf where the way is clear."""
+    """Returns the acceleration that stops a vehicle before the ego's U-turn [m/s^2]; inf if the lane is clear."""
     car, other = world.car[0], world.vehicles[0]
     if not car.sweeping:
         return math.inf
@@ -134,7 +134,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleR
                 gap = min(gap, start + station - vehicle.station)
         start += lane.length
     gap -= 0.5 * (vehicle.length + other.length)
-    # a vehicle that is in its way already drives on
+    # a vehicle that already obstructs it drives on
     return brake_to(vehicle.speed, gap) if -1.0 < gap < math.inf else math.inf
 
 
@@ -192,7 +192,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
         k: index of the lane in its plan that enters the junction, -1 for none.
         line: from its front to the start of that lane [m].
         front: node of the body in front, or -1.
-        gap: to its middle [m].
+        gap: to its centre [m].
     """
     vehicle = world.vehicles[i]
     stopping = vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING
@@ -200,13 +200,13 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
         if vehicle.approach >= 0:
             forget(vehicle)
         return math.inf
-    # the front may be over the line when the next lane begins to be followed
+    # the front may be past the line when the next lane begins to be followed
     before = vehicle.plan[k - 1] if k > 0 else vehicle.approach_lane
     announce(vehicle, before, vehicle.plan[k], line, world.clock[0].time)
     if line > stopping:
         return math.inf
     if front >= 0 and gap < line + 0.5 * vehicle.length and not _is_let_in(world, front):
-        return math.inf  # a vehicle in front waits, too, and asks first
+        return math.inf  # a vehicle in front also waits, and requests admission first
     wait = request(town, world, i, k)
     if wait == Wait.NOT:
         return math.inf
@@ -217,7 +217,7 @@ def _approach(town: TownArrays, world: WorldArrays, i: int, k: int, line: float,
 
 @compiled
 def _choose_another_way(town: TownArrays, vehicle: VehicleRecord, k: int, now: float) -> None:
-    """Draws another route beyond the first `k` planned lanes after a long wait for room behind the junction.
+    """Draws another route beyond the first `k` planned lanes after a long wait for room beyond the junction.
 
     This resolves gridlocks: rings of full lanes in which every vehicle waits for the next one.
     """
@@ -236,7 +236,7 @@ def _is_let_in(world: WorldArrays, front: int) -> bool:
 def _give_way_to_walkers(
     town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, lane: LaneRecord, begin: float
 ) -> float:
-    """Returns the acceleration that stops a vehicle before crosswalks of a lane with pedestrians in its way [m/s^2]."""
+    """Returns the acceleration that stops a vehicle before crosswalks with pedestrians in its path [m/s^2]."""
     found = math.inf
     for p in range(lane.passage, lane.passage + lane.passages):
         passage = town.passages[p]

@@ -1,7 +1,7 @@
-"""Admission to junctions: lights, signs, right of way, order of arrival, room behind the junction.
+"""Admission to junctions: lights, signs, right of way, order of arrival, room beyond the junction.
 
 Lights and signs come first, then priority, then the order of arrival. Vehicles with crossing paths are never admitted
-together: one that is on its way across clears the junction first.
+together: one that is crossing clears the junction first.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def phase_at(town: TownArrays, number: int, time: float) -> tuple[int, float]:
 
 @compiled
 def colour_at(town: TownArrays, number: int, time: float) -> int:
-    """Returns the `Colour` of the light at the end of a lane at any time [s]; -1 where there is none."""
+    """Returns the `Colour` of the light at the end of a lane at any time [s]; -1 if there is none."""
     lane = town.lanes[number]
     if lane.programme < 0:
         return -1
@@ -69,7 +69,7 @@ def colour_at(town: TownArrays, number: int, time: float) -> int:
 
 @compiled
 def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int:
-    """Returns the `Colour` of the light at the end of a lane at a time from now on; green where there is none."""
+    """Returns the `Colour` of the light at the end of a lane, now or at a later time; green if there is no light."""
     lane = town.lanes[number]
     if lane.programme < 0:
         return 0  # Colour.GREEN
@@ -88,7 +88,7 @@ def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int
 # --- Admission --------------------------------------------------------------------------------------------------------
 
 CLEAR = 0.5
-"""Distance of a vehicle's rear behind a junction at which the vehicle has left it [m]."""
+"""Distance of a vehicle's rear beyond a junction at which the vehicle has left it [m]."""
 
 
 @inlined
@@ -238,7 +238,7 @@ def _others(town: TownArrays, world: WorldArrays, i: int, now: float) -> int:
 
 @inlined
 def relation(town: TownArrays, connector: LaneRecord, other: int) -> int:
-    """Returns the `Relation` of a connector to another lane (or -1, for none)."""
+    """Returns the `Relation` of a connector to another lane, or -1 if there is none."""
     if other < 0 or town.lanes[other].junction != connector.junction:
         return 0  # Relation.APART
     return int(town.relations[connector.relation + town.lanes[other].place])
@@ -260,7 +260,7 @@ def _light_stops(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, n
 
 @compiled
 def _may_sneak(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord, now: float, let_in: bool) -> bool:
-    """Returns whether a vehicle that gave way during green may use the yellow, of which enough must be left."""
+    """Returns whether a vehicle that yielded during green may use the yellow phase, if enough of it is left."""
     if now - vehicle.since <= SNEAKING or vehicle.distance >= AT_LINE:
         return False
     if let_in:
@@ -277,7 +277,7 @@ def _has_to_stop(town: TownArrays, vehicle: VehicleRecord) -> bool:
 
 @compiled
 def _comes_first(town: TownArrays, other: VehicleRecord, own: VehicleRecord, meeting: int, now: float) -> bool:
-    """Returns whether a waiting vehicle goes before another one by its waiting time, priority aside."""
+    """Returns whether a waiting vehicle goes before another one by waiting time, regardless of priority."""
     if other.since >= own.since or now - other.asked >= LAPSE:
         return False
     if other.wait == Wait.LIGHT or other.wait == Wait.STOP_SIGN:
@@ -308,7 +308,7 @@ def _is_coming(town: TownArrays, world: WorldArrays, j: int, now: float) -> bool
         return False  # it waits for others itself
     if other.wait == Wait.CLOSED or other.wait == Wait.NO_ROOM:
         return False
-    if other.speed < TRAFFIC_STANDING:  # about to start, unless its way is occupied
+    if other.speed < TRAFFIC_STANDING:  # about to start, unless its path is occupied
         return bool(other.distance < AT_LINE) and not _is_occupied(town, world, j)
     return bool(other.distance < CRITICAL_GAP * other.speed)
 
@@ -326,9 +326,9 @@ def _is_occupied(town: TownArrays, world: WorldArrays, i: int) -> bool:
 
 @compiled
 def has_room(town: TownArrays, world: WorldArrays, i: int, k: int) -> bool:
-    """Returns whether there is room behind a junction for a vehicle and all others that are on their way there.
+    """Returns whether there is room beyond a junction for a vehicle and all others that are heading there.
 
-    They have to fit behind the first slow vehicle, and before the next junction.
+    They must fit behind the first slow vehicle, and before the next junction.
 
     Args:
         town: arrays of the town.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 PASSING = 0.5 * CAR_WIDTH + 0.2
-"""Distance to the middle of a lane within which a body is in the way of cars there [m]."""
+"""Distance to the centre of a lane within which a body obstructs cars on the lane [m]."""
 
 
 @inlined
@@ -138,7 +138,7 @@ def _insert(nodes: RecordArray[NodeRecord], heads: NDArray[np.int32], n: int) ->
 
 @inlined
 def next_on_lane(nodes: RecordArray[NodeRecord], n: int, body: int) -> int:
-    """Returns the first node from `n` on along its lane that is not of a body, or -1."""
+    """Returns the first node along the lane, starting at `n`, that does not belong to a body, or -1."""
     while n >= 0 and nodes[n].body == body:
         n = nodes[n].next
     return n

@@ -21,7 +21,7 @@ CLOSING = 2.0 * math.sqrt(-IDMVehicle.COMFORT_ACC_MAX * IDMVehicle.COMFORT_ACC_M
 """Twice the root of the product of desired acceleration and deceleration [m/s^2]."""
 
 STANDING_GAP = float(IDMVehicle.DISTANCE_WANTED - IDMVehicle.LENGTH)
-"""Room between two vehicles that stand [m]; highway-env counts it from middle to middle of vehicles of 5 m."""
+"""Gap between two stationary vehicles [m]; highway-env counts it from centre to centre of vehicles of 5 m."""
 
 TIME_WANTED = float(IDMVehicle.TIME_WANTED)
 """Desired time gap [s]."""
@@ -60,33 +60,33 @@ CAR_LENGTH, CAR_WIDTH = float(Vehicle.LENGTH), float(Vehicle.WIDTH)
 """Size of a car [m]."""
 
 AFTER_END = CAR_LENGTH / 2
-"""Distance before the end of a lane from which on the next one is followed [m], `AbstractLane.after_end`."""
+"""Distance before the end of a lane at which the next one begins to be followed [m], `AbstractLane.after_end`."""
 
 # --- Sizes of arrays, lanes -------------------------------------------------------------------------------------------
 
 PLANNED = 24
-"""Most lanes that a vehicle plans ahead, its own one included."""
+"""Maximum number of lanes that a vehicle plans ahead, its own one included."""
 
 GOALS = 16
-"""Most goals on the ego's path."""
+"""Maximum number of goals on the ego's path."""
 
 CLOSED = 4
-"""Most junctions that one U-turn reaches into."""
+"""Maximum number of junctions that one U-turn reaches into."""
 
 POINTS = 208
-"""Most points of the ego's path in the arrays: 1 m apart, half a metre in U-turns."""
+"""Maximum number of points of the ego's path in the arrays: 1 m apart, half a metre in U-turns."""
 
 COURSE, STEPS = 320, 128
 """Points of the ego's whole path and lanes of a plan for which there is room at first."""
 
 EVENTS = 32
-"""Most events of the ego within a call."""
+"""Maximum number of events of the ego within a call."""
 
 MAX_SUBSTEPS = 15
-"""Most substeps within a call of a world with a driven ego, whose path is lengthened in between."""
+"""Maximum number of substeps within a call of a world with a driven ego, whose path is lengthened in between."""
 
 STOPPED = 0.05
-"""Speed below which a braking vehicle comes to a stand [m/s]."""
+"""Speed below which a braking vehicle comes to a standstill [m/s]."""
 
 CHANGE_TIME = 3.0
 """Duration of a lane change [s]; none begins where the lane ends sooner."""
@@ -120,34 +120,34 @@ TOW_CRASHED = 3.0
 """Time after which a crashed vehicle is respawned [s]."""
 
 TOW_BLOCKED = 15.0
-"""Time after which a vehicle that stands before a prop is respawned [s]."""
+"""Time after which a vehicle that waits before a prop is respawned [s]."""
 
 TOW_FACING = 6.0
-"""Time after which a vehicle is respawned that stands before the ego while the ego stands in a U-turn [s]."""
+"""Time after which a vehicle is respawned that waits before the ego while the ego stands in a U-turn [s]."""
 
 TOW_STUCK = 60.0
-"""Time after which any vehicle that stands, not for a red light, is respawned, which resolves gridlocks [s]."""
+"""Time after which any vehicle that stands for another reason than a red light is respawned, against gridlocks [s]."""
 
 GOES_HOME = 45.0
 """Time without progress after which a pedestrian is respawned [s]; longer than the wait at a crosswalk."""
 
 CLEAR_OF_CAR = 25.0
-"""Least distance to the ego at which vehicles are added to a town [m]."""
+"""Minimum distance to the ego at which vehicles are added to a town [m]."""
 
 CLEAR_OF_WALKER = 8.0
-"""Least distance to the ego at which pedestrians are added [m]; to one another it is `CLEAR_OF_PEOPLE`."""
+"""Minimum distance to the ego at which pedestrians are added [m]; `CLEAR_OF_PEOPLE` is that between pedestrians."""
 
 CLEAR_OF_PEOPLE = 1.5
-"""Least distance between pedestrians that are added [m]."""
+"""Minimum distance between pedestrians that are added [m]."""
 
 OUT_OF_SIGHT = 60.0
-"""Least distance to the ego at which bodies respawn [m]."""
+"""Minimum distance to the ego at which bodies respawn [m]."""
 
 CLEAR_OF_OTHERS, CLEAR_BESIDE = 14.0, 2.5
-"""Least distance ahead and behind to others, no farther aside than `CLEAR_BESIDE`, for new vehicles [m]."""
+"""Minimum distance ahead and behind to others, no farther aside than `CLEAR_BESIDE`, for new vehicles [m]."""
 
 CLEAR_OF_BODIES = 6.0
-"""Least distance to the middle of others at which vehicles appear, half of it aside [m]."""
+"""Minimum distance to the centre of others at which vehicles appear, half of it aside [m]."""
 
 
 # --- Junctions --------------------------------------------------------------------------------------------------------
@@ -156,22 +156,22 @@ HARDEST_BRAKING = 6.0
 """Deceleration beyond which a vehicle no longer stops before a red light [m/s^2]."""
 
 CRITICAL_GAP = 4.5
-"""Least time gap to vehicles with priority [s] (Highway Capacity Manual 2010, permitted left turns)."""
+"""Minimum time gap to vehicles with priority [s] (Highway Capacity Manual 2010, permitted left turns)."""
 
 GIVING_WAY_PATIENCE = 30.0
 """Longest time an actor yields before it competes by arrival order [s]."""
 
 SNEAKING = 2.0
-"""Time of giving way at a green light after which a vehicle may use the yellow [s] (HCM's sneakers)."""
+"""Time of yielding at a green light after which a vehicle may use the yellow phase [s] (HCM's sneakers)."""
 
 START = 0.3
-"""Time to start for a vehicle that uses the yellow, the way to the line not included [s]."""
+"""Time to start for a vehicle that uses the yellow phase, without the distance to the line [s]."""
 
 AT_LINE = 3.5
-"""Distance of the front to the line within which a vehicle stands at it [m]."""
+"""Distance of the front to the line within which a vehicle counts as standing at it [m]."""
 
 OVER_LINE = 0.5
-"""Distance over the line from which on a vehicle no longer stops for its light [m]."""
+"""Distance past the line at which a vehicle no longer stops for its light [m]."""
 
 TRAFFIC_STANDING = 0.3
 """Speed below which a vehicle of the traffic counts as standing [m/s]."""
@@ -200,26 +200,26 @@ LINE_GAP = 1.0
 """Room left before a line [m]."""
 
 ROOM_BEHIND = 10.5
-"""Free lane that a vehicle wants behind a junction before it enters: its length, the distance that it keeps when it
+"""Free lane that a vehicle wants beyond a junction before it enters: its length, the distance that it keeps when it
 stands, and the length needed to clear the junction [m]."""
 
 ROOM_SIGHT = 60.0
-"""Distance behind a junction within which slow vehicles count against its room [m]."""
+"""Distance beyond a junction within which slow vehicles count against its room [m]."""
 
 ROOM_EACH = 10.0
 """Lane that a vehicle takes up in a queue: its length and the distance that highway-env's IDM keeps [m]."""
 
 SLOW = 4.0
-"""Speed below which a vehicle behind a junction may be in the way [m/s]; in a U-turn the ego does 3.5 m/s."""
+"""Speed below which a vehicle beyond a junction may obstruct it [m/s]; in a U-turn the ego drives at 3.5 m/s."""
 
 CROSSING_SIGHT = 40.0
-"""Distance within which traffic gives way to a U-turn of the ego [m]."""
+"""Distance within which traffic yields to a U-turn of the ego [m]."""
 
 CROSSING_MARGIN = 0.5
 """Room left beside that U-turn [m]."""
 
 STEP_AHEAD = 5.0
-"""Distance of a coming pedestrian to the middle of a lane within which vehicles stop before the crosswalk [m]."""
+"""Distance of a coming pedestrian to the centre of a lane within which vehicles stop before the crosswalk [m]."""
 
 STEP_PAST = 2.5
-"""Distance of a pedestrian past the middle of a lane within which vehicles still stop [m]."""
+"""Distance of a pedestrian past the centre of a lane within which vehicles still stop [m]."""

@@ -48,12 +48,12 @@ LOOK_EVERY = 6
 """Substeps between two checks whether a standing vehicle waits for its light."""
 
 FACING_DISTANCE = 6.0
-"""Distance from a vehicle's outline to the middle of the ego within which it stands before the ego [m]."""
+"""Distance from a vehicle's outline to the centre of the ego within which it counts as waiting before the ego [m]."""
 
 
 @inlined
 def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) -> None:
-    """Counts the time for which bodies have been crashed or stuck, and respawns those whose time is over.
+    """Counts the time for which bodies have been crashed or stuck, and respawns those whose time limit is reached.
 
     Args:
         town: arrays of the town.
@@ -85,7 +85,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
 def _may_go(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> bool:
     """Returns whether no light holds a vehicle up, at the line or in a queue, which may span junctions."""
     now = world.clock[0].time
-    # a short one follows its connector before its front is over the line
+    # a short one follows its connector before its front has passed the line
     if vehicle.approach >= 0 and town.lanes[vehicle.approach_lane].programme >= 0:
         return light(town, world, vehicle.approach_lane, now) == Colour.GREEN
     for k in range(int(vehicle.planned)):
@@ -164,7 +164,7 @@ def _come_back(town: TownArrays, world: WorldArrays, p: int) -> None:
 
 @compiled
 def new_key(world: WorldArrays) -> int:
-    """Returns a key that no body of the world has had."""
+    """Returns a key that no body of the world has ever had."""
     world.clock[0].keys += 1
     return int(world.clock[0].keys)
 

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 @inlined
 def follow_road(town: TownArrays, vehicle: VehicleRecord) -> None:
-    """Moves on to the next planned lane at the end of the present one, and extends the plan."""
+    """Moves on to the next planned lane at the end of the current one, and extends the plan."""
     while vehicle.planned > 1 and vehicle.station > town.lanes[vehicle.plan[0]].length - AFTER_END:
         for k in range(1, vehicle.planned):
             vehicle.plan[k - 1] = vehicle.plan[k]
@@ -68,7 +68,7 @@ def follow_road(town: TownArrays, vehicle: VehicleRecord) -> None:
 
 @inlined
 def keep_side(vehicle: VehicleRecord, lane: LaneRecord) -> None:
-    """Sets the offset in a lane: cyclists keep to the right edge, cars to the middle."""
+    """Sets the offset in a lane: cyclists keep to the right edge, cars to the centre."""
     if vehicle.kind == Kind.CYCLIST:
         vehicle.to_right = max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
 
@@ -162,7 +162,7 @@ def following_acceleration(speed: float, other: float, gap: float, lengths: floa
     Args:
         speed: [m/s].
         other: speed of the vehicle in front along the own heading [m/s].
-        gap: from middle to middle [m].
+        gap: from centre to centre [m].
         lengths: half of both lengths together [m].
     """
     wanted = STANDING_GAP + lengths + TIME_WANTED * speed + speed * (speed - other) / CLOSING
@@ -172,7 +172,7 @@ def following_acceleration(speed: float, other: float, gap: float, lengths: floa
 
 @compiled
 def wanted_gap(speed: float, other: float, lengths: float) -> float:
-    """Returns the desired distance to the vehicle in front, from middle to middle [m]."""
+    """Returns the desired distance to the vehicle in front, from centre to centre [m]."""
     return STANDING_GAP + lengths + TIME_WANTED * speed + speed * (speed - other) / CLOSING
 
 
@@ -267,7 +267,7 @@ GIVING_UP = 1.0
 
 @inlined
 def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
-    """Thinks of changing lanes, once in `LANE_CHANGE_DELAY`, or gives up a change that is under way."""
+    """Considers a lane change, once in `LANE_CHANGE_DELAY`, or gives up a change that is in progress."""
     vehicle = world.vehicles[i]
     if vehicle.lane != vehicle.plan[0]:
         lane = town.lanes[vehicle.lane]
@@ -321,7 +321,7 @@ def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -
 
 @compiled
 def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: float, must: bool) -> bool:
-    """Returns whether to change to a lane beside: it brings acceleration, and makes no other vehicle brake hard.
+    """Returns whether to change to an adjacent lane: this allows acceleration, and forces no vehicle to brake hard.
 
     Args:
         town: arrays of the town.

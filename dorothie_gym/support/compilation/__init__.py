@@ -51,7 +51,7 @@ def compiled(function: F) -> F:
 
 
 def concurrent(function: F) -> F:
-    """As `compiled`, without the global interpreter lock: other Python threads run meanwhile."""
+    """As `compiled`, without the global interpreter lock: other Python threads run at the same time."""
     return _compile(function, **WITHOUT_COUNTS, nogil=True)
 
 

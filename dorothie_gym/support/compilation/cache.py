@@ -33,7 +33,7 @@ from dorothie_gym.support.files import PART
 from dorothie_gym.support.user_cache import cache_folder, discard, is_private, mark_used, read_signed, write_signed
 
 # --- Fingerprints -----------------------------------------------------------------------------------------------------
-# Fingerprints of compiled functions: hashes of the code of a function and of everything in the package that it uses.
+# Fingerprints of compiled functions: hashes of the code of a function and of all code of the package that it uses.
 #
 # A function with the same fingerprint has the same machine code, wherever its file is and whenever it was written.
 # numba itself goes by the modification time of the function's own file.
@@ -161,7 +161,7 @@ def _file_hash(file: str) -> str:
 # --- Files ------------------------------------------------------------------------------------------------------------
 
 NUMBA_VARIABLE: Final = "NUMBA_CACHE_DIR"
-"""numba's own environment variable for the folder of machine code; it goes before the user's cache folder."""
+"""numba's own environment variable for the folder of machine code; it takes precedence over the user's cache folder."""
 
 KEPT: Final = 14 * 24 * 3600.0
 """Time without a read after which files of other versions of a function are deleted [s]."""
@@ -305,7 +305,7 @@ class ContentCache(FunctionCache):
         """Deletes files of other versions of the function, and parts of files, that were not used for `KEPT`."""
         for file in folder.glob(f"{self._stem()}*"):
             if file.suffix in (ENDING, _OLD_ENDING, PART) and not self._is_current(file):
-                with contextlib.suppress(OSError):  # another process deletes them, too
+                with contextlib.suppress(OSError):  # another process may also delete them
                     if time.time() - file.lstat().st_mtime > KEPT:
                         self._delete(file)
 

@@ -72,8 +72,8 @@ WITHOUT_COUNTS: dict[str, bool] = {"_nrt": False}
 """numba's option that turns reference counting off."""
 
 
-# --- Shorter ways through the compiler --------------------------------------------------------------------------------
-# Shorter ways through numba's compiler for functions that count no references: the same code in less time.
+# --- Shortcuts through the compiler -----------------------------------------------------------------------------------
+# Shortcuts through numba's compiler for functions that count no references: the same code in less time.
 #
 # numba looks for the type of every operator among all its overloads, which fails dozens of times before it succeeds;
 # after each pass it computes where variables are used for the last time, to clear them there, so that nothing is
@@ -407,7 +407,7 @@ class CompiledFunction(CPUDispatcher):
         return self._kept_in is not None and not self._kept_in.is_empty()
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Returns the signature of the part that compiled code calls with arguments of some types."""
+        """Returns the signature of the part that compiled code calls with arguments of the given types."""
         pysig, args = self._compiler.fold_argument_types(args, kws)
         args = tuple(_widest(types.unliteral(kind)) for kind in args)
         part = self._part(args)

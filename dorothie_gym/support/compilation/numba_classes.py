@@ -1,6 +1,6 @@
 """Classes and functions of numba that the compiler derives from or decorates with.
 
-numba has no type information; what is used of these is declared in the stub beside this file.
+numba has no type information; the parts in use are declared in the stub beside this file.
 """
 
 from numba.core import types

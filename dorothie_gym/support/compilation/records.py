@@ -125,14 +125,14 @@ def empty_records(kind: type[Record], count: int) -> RecordArray[Record]:
 
 
 def filled_records(kind: type[Record], rows: Sequence[tuple[object, ...]]) -> RecordArray[Record]:
-    """Returns an array of records with given fields; a single record of zeros where there are none."""
+    """Returns an array of records with given fields; a single record of zeros if there are none."""
     if not rows:
         return empty_records(kind, 1)
     return cast("RecordArray[Record]", np.array(list(rows), dtype=record_dtype(kind)).view(np.recarray))
 
 
 def argument(records: RecordArray[Record]) -> RecordArray[Record]:
-    """Returns the same records as an array that calls of compiled functions from Python pass several times faster."""
+    """Returns the same records as an array that Python passes to compiled functions several times faster."""
     return cast("RecordArray[Record]", np.ndarray.view(cast("NDArray[np.void]", records), np.ndarray))
 
 
@@ -143,7 +143,7 @@ def plain(records: RecordArray[Record]) -> NDArray[np.void]:
 
 
 def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
-    """Returns some fields of the first record as an array without axes, to be read or written at once in Python.
+    """Returns fields of the first record as an array without axes, which Python can read or write at once.
 
     ``fields(...).item()`` is a tuple of plain numbers, and ``fields(...)[()] = numbers`` takes one, either in about the
     time that a single field of `plain` takes.
@@ -159,7 +159,7 @@ def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
 # instead, to a table with the address and the shape of each array. Reading an item loads them from the table, which
 # never changes during a call, so that LLVM may keep loaded values.
 #
-# The table lies on the stack of the call from Python (or of `gives_row`), whose arguments keep the arrays alive.
+# The table is on the stack of the call from Python (or of `gives_row`), whose arguments keep the arrays alive.
 # Compiled code reads items; it cannot create such tuples, unpack them, or return them or their arrays to Python.
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -292,7 +292,7 @@ def _new_table(builder: IRBuilder, kind: Reference) -> Value:
 
 
 def _finished(builder: IRBuilder, table: Value) -> Value:
-    """Hides where the table comes from: LLVM must not move a read of it before its entries are written."""
+    """Hides the origin of the table: LLVM must not move a read of it before its entries are written."""
     pointer = ir.IntType(8).as_pointer()
     return builder.asm(ir.FunctionType(pointer, [pointer]), "", "=r,0,~{memory}", [table], side_effect=True)
 
@@ -327,8 +327,8 @@ def _unbox(kind: Reference, value: Value, c: Any) -> NativeValue:
 def gives_row(function: F) -> F:
     """Makes compiled functions compute a function (batch, number) on the spot: row `number` of each array of a tuple.
 
-    The row is a tuple passed by address, whose table lies on the stack of the function with the call: it is valid until
-    that function returns or gets there again.
+    The row is a tuple passed by address, whose table is on the stack of the calling function: it is valid until
+    that function returns or reaches the call again.
     """
 
     @type_callable(function)

@@ -41,7 +41,7 @@ ANSWERED_WITHIN: Final = 10.0
 """Longest time between a question and its answer [s]."""
 
 SAID_AGAIN_AFTER: Final = 8.0
-"""Time after which the same is said again although the participant has said nothing since [s]."""
+"""Time after which a remark may be repeated although the participant has said nothing since [s]."""
 
 _ANSWERS: Final = (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM)
 _REASONS_AND_TIMES: Final = (Predicate.BECAUSE, Predicate.STANDS, Predicate.ARRIVES_IN)
@@ -71,7 +71,7 @@ def answer_to(utterance: Utterance | None, memory: WorkingMemory, view: CoWizard
 
 
 def _verified(utterance: Utterance, memory: WorkingMemory) -> Proposition | None:
-    """Returns the proposition of a yes/no question; a check that names no more is about the present goal."""
+    """Returns the proposition of a yes/no question; a check without further content is about the current goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
     if utterance.places:
@@ -150,7 +150,7 @@ def is_sayable(
 
 
 def _waits_for_answer(utterance: Utterance, memory: WorkingMemory) -> bool:
-    """Returns whether an utterance asks something that has not been answered yet."""
+    """Returns whether an utterance contains a question that has not been answered yet."""
     return memory.spoke_at < utterance.time and any(act.move in QUESTIONS for act in utterance.heard.acts)
 
 
@@ -162,7 +162,7 @@ def _is_denied(memory: WorkingMemory, view: CoWizardView, said: Proposition) -> 
 
 
 def _is_about(answer: Proposition, utterance: Utterance) -> bool:
-    """Returns whether an answer is about the question of an utterance, as far as that was understood."""
+    """Returns whether an answer is about the question of an utterance, as it was understood."""
     asked = _asked_about(utterance)
     if not asked:
         return True

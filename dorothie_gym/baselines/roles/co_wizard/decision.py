@@ -1,4 +1,4 @@
-"""One decision of the learned Co-Wizard, up to what the network is given: the same in training and in play."""
+"""One decision of the learned Co-Wizard, up to the inputs of the network: the same in training and in play."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def perceive(
     Args:
         observation: observation of the Co-Wizard, with its action mask.
         attention: state before.
-        last: last own move, as context of what is heard.
+        last: last own move, as context of the utterance heard.
     """
     view = CoWizardView.read(observation, attention.memory.town)
     heard = just_heard(observation, Role.PARTICIPANT, last, view.time)
@@ -132,7 +132,7 @@ def finished(
         percept: perception.
         memory: memory after listening.
         physical: command that is given.
-        remarks: what was decided to say.
+        remarks: chosen remarks.
     """
     for remark in remarks:
         memory = noted(memory, remark, percept.view)

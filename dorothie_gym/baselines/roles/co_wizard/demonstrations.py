@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 CO_WIZARD: Final = Role.CO_WIZARD
 
 SHORTEST_TURN, LONGEST_TURN = 10, 80
-"""Range of the number of decisions for which teacher and player in turns drive."""
+"""Range of the number of decisions between changes of the driver, teacher or player."""
 
 PATIENCE: Final = 8
 """Number of decisions in a row with another command than the teacher's after which the teacher takes over.
@@ -76,7 +76,7 @@ class CoWizardTraining(RoundSettings):
 
 
 class Pupil:
-    """Attention that is led by the teacher: it remembers what the teacher remembers."""
+    """Attention that follows the teacher: its memory is that of the teacher."""
 
     def __init__(self, town: Town, limits: SpaceLimits, seed: int, teacher: Teacher) -> None:
         """Prepares the pupil of a teacher; the seed draws which examples are kept."""
@@ -114,7 +114,7 @@ class Pupil:
     def did(
         self, percept: CoWizardPercept, memory: WorkingMemory, physical: Physical | None, remarks: Sequence[Remark]
     ) -> None:
-        """Notes the command that was given, and what was decided to say."""
+        """Notes the command that was given and the chosen remarks."""
         self.attention = finished(percept, memory, physical, remarks)[1]
         if remarks:
             self.last = remarks[-1].act.move
@@ -191,7 +191,7 @@ class CoWizardPractice:
         return self._disagreements >= PATIENCE
 
     def begin_turn(self, rng: np.random.Generator) -> int:
-        """Draws whose turn it is; gives the player the memory that the teacher has led to, and what was said."""
+        """Draws whose turn it is; gives the player the memory that follows from the teacher, and the latest remarks."""
         left = int(rng.integers(SHORTEST_TURN, LONGEST_TURN))
         self._leads = bool(rng.random() < self._settings.share) and not self.is_stuck
         self._talks = bool(rng.random() < self._settings.talking) and self._leads
@@ -224,9 +224,9 @@ class CoWizardPractice:
         return replace(turn.action, speech=speech)
 
     def _correct(self, turn: Turn, memory: WorkingMemory, lesson: Lesson) -> None:
-        """Hands on an example of how the player's memory gets back to the teacher's, if something was just heard.
+        """Passes on an example of how the player's memory returns to the teacher's, if something was just heard.
 
-        Without anything new, the network would learn to change a memory for no reason.
+        Without a new utterance, the network would learn to change its memory without a cause.
         """
         if not turn.percept.heard:
             return

@@ -43,7 +43,7 @@ class Example:
         goal: `GoalEvent`, or their number + position of the place among `listening.rows`; `UNKNOWN` if it is missing.
         status: status given to an errand.
         command: index of the command; `UNKNOWN` if it could not be commanded.
-        remarks: forms of the first two remarks; "" for none, None if it is not trained.
+        remarks: forms of the first two remarks; "" for no remark, None if it is not trained.
         weight: number of decisions that it represents.
     """
 
@@ -105,16 +105,16 @@ def make_example(
 def correcting_example(
     percept: CoWizardPercept, listening: Inputs, acting: Inputs, led: WorkingMemory, lesson: Lesson
 ) -> Example | None:
-    """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
+    """Returns an example of how a memory that differs from the teacher's returns to it; None if it does not differ.
 
     Where the own goal is another place than the teacher's, and the utterance does not say which, the player has to
     doubt it (a place of the same name) or to give it up: it cannot know the right one, but it no longer plans a route
-    against the directions that it gets.
+    against its directions.
 
     Args:
         percept: the player's perception, with its own memory.
         listening: inputs of the first step.
-        acting: inputs of the second step, from which nothing is learnt.
+        acting: inputs of the second step, for which there is no target.
         led: memory that the teacher has led to.
         lesson: decision of the teacher.
     """

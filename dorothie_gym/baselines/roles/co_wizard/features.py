@@ -245,7 +245,7 @@ def _place(
 def command_vectors(
     commands: Sequence[Physical | None], memory: WorkingMemory, view: CoWizardView, step: RouteStep | None
 ) -> list[list[float]]:
-    """Returns a vector for each physical action that can be commanded, "none" among them."""
+    """Returns a vector for each physical action that can be commanded, including "none"."""
     meant = junction_meant(memory.town, view.here, view.choice)
     way, ways = ordered_exit(memory, view, meant), () if meant is None else meant.exits
     names = {exit_.angle: direction_of(exit_) for exit_ in (*ways, *(() if view.choice is None else view.choice.exits))}

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.observation_parser import SeenLandmark
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
-"""Turn that was asked for: none, a direction, or only a street."""
+"""Requested turn: none, a direction, or only a street."""
 
 SPEEDS: Final = tuple(range(10, 65, 5))
 """Cruise speeds that can be aimed at [km/h]."""
@@ -50,17 +50,17 @@ VARIABLES: Final[Mapping[str, int]] = MappingProxyType(
 )  # fmt: skip
 """Variables of the memory with the number of their values.
 
-`manoeuvre` is none, a U-turn, or a lane switch to the left or right that was asked for; `onto_street`: the turn leads
+`manoeuvre` is none, a U-turn, or a lane switch to the left or right that was requested; `onto_street`: the turn leads
 into the street that was named; `skip`: junctions to pass before it; `nudging`: the car goes a little further, to stop
-again; `resting`: it stops for good before a hazard; `lights`: nothing was said, on, off; `proposed`: a way that was
-proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower` likewise.
+again; `resting`: it commands a stop before a hazard; `lights`: not mentioned, on, off; `proposed`: a route that was
+proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower`: similarly.
 """
 
 CONFIG: Final = CoWizardConfig()
 """Thresholds of the judgements."""
 
 U_TURN: Final = 1
-"""Value of `manoeuvre` for a U-turn that was asked for."""
+"""Value of `manoeuvre` for a requested U-turn."""
 
 FRESH: Final = ("order", "nudging", "creeping")
 """Variables that can be set again to the same value, for each of which there is a binary output."""
@@ -82,7 +82,8 @@ class GoalEvent(enum.IntEnum):
 
 
 CREEP_SHORTFALL, CREEP_LEAST, CREEP_LEAD, CREEP_RENEW, SLOWER_DISTANCE = 12.0, 10.0, 16.0, 6.0, 30.0
-"""Place of a slow approach [m]: how much nearer than said, at least; where it is carried along; when; if not said."""
+"""Slow approach [m]: shortfall on the stated distance; least distance; lead of a place that is carried along, and
+distance at which that is renewed; distance if none is stated."""
 
 PLACE_SIGHT: Final = 80.0
 """Distance along the default lanes within which a place is looked for [m]; as that of the scripted Co-Wizard."""
@@ -116,28 +117,28 @@ class WorkingMemory:
         town: the map.
         values: value of each variable.
         changed_at: time at which each variable was last changed or set again [s].
-        goal: name of the goal; None for none.
+        goal: name of the goal; None if there is none.
         goal_mark: its row among the landmarks; -1 if it is not on the map.
         goal_at: time of its last change [s].
-        former: the goal before.
-        street: street of the turn that was asked for.
-        junction: the junction that the turn that was asked for is counted from; -1 for none.
-        target: place at which a nudge or a slow approach ends.
+        former: the previous goal.
+        street: street of the requested turn.
+        junction: the junction from which the requested turn is counted; -1 for none.
+        target: place where a nudge or a slow approach ends.
         navigator: route to the goal.
         ruled_out: places of houses and people that were visited or not meant.
         statuses: status of errands by place.
         updates: belief updates to be sent, the next first.
         plan: junctions of the route as sent last.
-        standstill: present or last standstill, and the reason for it.
+        standstill: current or last standstill, and the reason for it.
         told_to_stop_at: time at which it halted because of an utterance [s].
-        told_to_turn_round_at: last time at which an utterance told it to turn round [s].
-        physical: its last physical action; None for none.
+        told_to_turn_round_at: time of the last instruction to turn round [s].
+        physical: its last physical action; None if there is none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
         said_at: time of its last remark by predicate or, without content, by move [s].
         spoke_at: time of its last remark [s].
         asked_at: time of its last question [s].
-        asked_lane: lane before the junction whose way was asked for; -1 for none.
+        asked_lane: lane before the junction at which the Co-Wizard last asked for the way; -1 for none.
         heard_at: time of the last utterance of the participant [s].
         last: its last remark that can be repeated; None at first.
         clock: time between decisions.
@@ -357,7 +358,7 @@ _INDEX: Final[Mapping[str, int]] = MappingProxyType({name: k for k, name in enum
 
 
 def initial_values(speed: int) -> tuple[int, ...]:
-    """Returns the values at the beginning of a session, with a usual cruise speed [km/h]."""
+    """Returns the values at the start of a session, with the usual cruise speed [km/h]."""
     return tuple(speed_index(speed) if name == "speed" else 0 for name in VARIABLES)
 
 

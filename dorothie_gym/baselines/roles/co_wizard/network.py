@@ -50,7 +50,7 @@ class CoWizardLayout:
 
     @classmethod
     def of(cls, remarks: int) -> CoWizardLayout:
-        """Returns the layout of this version for a vocabulary of some size."""
+        """Returns the layout of this version for a vocabulary of a given size."""
         return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, place=PLACE_SIZE, command=COMMAND_SIZE, remarks=remarks)
 
 
@@ -109,7 +109,7 @@ class CoWizardNetwork(RoleNetwork):
         return self.command(hidden, commands, count), self.first(hidden), hidden
 
     def then(self, hidden: Tensor, first: Tensor) -> Tensor:
-        """Returns the logits of the second remark (b, r) behind a first one (b,)."""
+        """Returns the logits of the second remark (b, r) after a first one (b,)."""
         scores: Tensor = self.second(torch.cat([hidden, self.remarks(first)], dim=1))
         return scores
 

@@ -44,7 +44,7 @@ TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""
 
 KEPT_BONUS: Final = 2.0
-"""Added to the logit of each present value of the memory where nothing has just been heard.
+"""Added to the logit of each current value of the memory if no utterance has just been heard.
 
 A change that was missed is made up for at the next decision; one for no reason stays. In the second round of a
 training, 2 reduced the latter from 635 to 214, while 166 instead of 87 of 472 changes came later.
@@ -81,7 +81,7 @@ class Turn:
         action: the action.
         remarks: chosen remarks.
         queued: whether its remarks waited before.
-        silent: whether nothing new could be said.
+        silent: whether no new remark was possible.
         state: state after the decision.
     """
 
@@ -97,7 +97,7 @@ class Turn:
 class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
     """Co-Wizard whose memory, goal, commands and remarks are decided by a network.
 
-    Memory and commands are the likeliest ones; remarks are drawn. Names, numbers and words of a remark are filled in
+    Memory and commands are the most likely ones; remarks are drawn. Names, numbers and words of a remark are filled in
     (see `remarks`); belief updates say how the memory has changed.
     """
 
@@ -133,7 +133,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         Args:
             observation: observation of the Co-Wizard, with its action mask.
             state: state before.
-            silent: whether nothing is to be said.
+            silent: whether the Co-Wizard must stay silent.
         """
         rng = np.random.default_rng((state.seed, state.count))
         voice = state.voice
@@ -170,7 +170,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         )
 
     def _listen(self, percept: CoWizardPercept, inputs: Inputs) -> Update:
-        """Returns the likeliest update of the memory."""
+        """Returns the most likely update of the memory."""
         state, words, places, count = inputs.tensors()
         before = torch.tensor([percept.memory.values])
         heard = self._network.listen(state, words, places, count, before)
@@ -190,7 +190,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
     def _act(
         self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
     ) -> tuple[int, tuple[Remark, ...]]:
-        """Returns the index of the likeliest command, and the remarks that are drawn."""
+        """Returns the index of the most likely command, and the remarks that are drawn."""
         scores, first, hidden = self._network.act(*inputs.tensors())
         command = int(scores[0].argmax())
         if silent:
@@ -233,7 +233,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
 
 
 def _wording_context(view: CoWizardView, memory: WorkingMemory) -> WordingContext:
-    """Returns what the words may refer to."""
+    """Returns the possible referents of the words."""
     near = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, memory.town, view.lane)
     return WordingContext(

@@ -1,6 +1,6 @@
 """Remarks of the learned Co-Wizard: those of the corpus without their names, and where it takes the names from.
 
-Forms are explained in `learned_role.remark_forms`. What the rules answer, and what is said again, is taken as a whole.
+Forms are explained in `learned_role.remark_forms`. Answers of the rules and repetitions are taken as a whole.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _WHOLES: Final = ("answer", "again")
-"""Sources of whole remarks: the answer to what was just asked, and the last remark said again."""
+"""Sources of whole remarks: the answer to the last question, and a repetition of the last remark."""
 
 
 def sources(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utterance]) -> dict[str, object]:
@@ -68,7 +68,7 @@ def sources(memory: WorkingMemory, view: CoWizardView, utterances: Sequence[Utte
 
 
 def form_of(remark: Remark, available: Sources) -> str | None:
-    """Returns the form of a remark, a whole one where it is said by rules; None if something in it has no source."""
+    """Returns the form of a remark, a whole one if rules produce it; None if a part of it has no source."""
     answer, again = (available.get(name) for name in _WHOLES)
     if isinstance(again, Remark) and (remark.act, remark.meaning) == (again.act, again.meaning):
         return _whole_form("again")
@@ -82,12 +82,12 @@ def _whole_form(source: str) -> str:
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a form of a remark."""
     remark_forms.check_form(form, remark_forms.sources_of(form), remark_forms.filled, _example)
 
 
 def _example(source: str) -> object:
-    """Returns what a source can be."""
+    """Returns the possible values of a source."""
     if source in _WHOLES:
         return Remark(act=DialogueAct.of(DialogueMove.REPLY_U))
     if source in ("goal", "former", "near", "place0", "place1"):

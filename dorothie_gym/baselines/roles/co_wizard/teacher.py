@@ -1,4 +1,4 @@
-"""The scripted Co-Wizard as a teacher: run alongside a session, it reports what it would do, remember and say.
+"""The scripted Co-Wizard as a teacher: run alongside a session, it reports its choices of actions, memory and remarks.
 
 The teacher has the player's observations. The player's actions and remarks are copied into its state instead of its own
 (`drove`, `talked`), so that it continues from the player's situation, not from its own.
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 CALM = CoWizardStyle(
     echoes=0.3, checks=0.1, announces=0.0, silent=0.4, asks=0.6, proposes=0.0, mishears=0.0, careful=1.0, notices=0.9
 )
-"""Style of the teacher while the player plays: it understands everything, and makes no random choices."""
+"""Style of the teacher while the player plays: it understands all utterances, and makes no random choices."""
 
 _WISHES = (None, Wish.U_TURN, Wish.SWITCH_LEFT, Wish.SWITCH_RIGHT)
 
@@ -54,7 +54,7 @@ class Lesson:
     Attributes:
         update: its memory after listening and looking.
         physical: its physical action.
-        remarks: remarks that it chooses now, in one breath or the next.
+        remarks: remarks that it chooses now, for this utterance or the next.
         queued: whether remarks were waiting to be said before.
         ready: whether it has reacted to the last utterance; before, it gives no commands.
         action: the whole action.
@@ -88,7 +88,7 @@ class Teacher:
 
     @property
     def usual_speed(self) -> int:
-        """Cruise speed where nothing is said about it [km/h]."""
+        """Default cruise speed [km/h]."""
         return self._state.intentions.usual
 
     @property

@@ -1,4 +1,4 @@
-"""One decision of a learned role, up to what the network is given: the same in training and in play."""
+"""One decision of a learned role, up to the inputs of the network: the same in training and in play."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def just_heard(
     Args:
         observation: observation of the listener.
         speaker: the other speaker.
-        last: last move of the listener, as context of what is heard.
+        last: last move of the listener, as context of the utterance heard.
         now: time [s].
     """
     heard = heard_utterance(observation, speaker, last)
@@ -101,7 +101,7 @@ class Inputs:
     Attributes:
         state: state and utterances (n,).
         words: rows of the words of the latest utterance.
-        options: vectors of what is chosen among: places, commands or errands (k, m), filled with 0.
+        options: vectors of the options: places, commands or errands (k, m), padded with 0.
         rows: number of each option: row of the landmark, index of the command, or number of the subgoal.
     """
 

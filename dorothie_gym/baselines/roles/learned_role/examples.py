@@ -45,7 +45,7 @@ class ExampleBatch(ABC, Generic[Example]):
         return len(first)
 
     def rows(self, index: torch.Tensor) -> Self:
-        """Returns some examples."""
+        """Returns the examples at the given positions."""
         return type(self)(**{one.name: getattr(self, one.name)[index] for one in fields(self)})
 
     @classmethod
@@ -60,7 +60,7 @@ class ExampleBatch(ABC, Generic[Example]):
 
     @classmethod
     def joined(cls, batches: Sequence[Self]) -> Self:
-        """Returns all examples of some batches."""
+        """Returns all examples of the given batches."""
         found: dict[str, Any] = {}
         for one in fields(cls):
             found[one.name] = torch.cat([getattr(batch, one.name) for batch in batches])
@@ -75,7 +75,7 @@ class ExampleBatch(ABC, Generic[Example]):
 
     @classmethod
     def read(cls, paths: Sequence[Path], vocabulary: Sequence[str]) -> Self:
-        """Returns the examples of some files, with their remarks numbered by a vocabulary; others are not trained.
+        """Returns the examples of the given files, with their remarks numbered by a vocabulary; others are not trained.
 
         Raises:
             CheckpointError: a file is damaged.
@@ -104,11 +104,11 @@ class ExampleBatch(ABC, Generic[Example]):
 
     @classmethod
     def vocabulary_of(cls, paths: Sequence[Path], least: int) -> tuple[str, ...]:
-        """Returns the forms that occur at least some number of times in files, the most frequent first, after silence.
+        """Returns the forms that occur in files at least a given number of times: silence, then by falling frequency.
 
         Args:
             paths: files.
-            least: the number of times.
+            least: minimum number of occurrences.
         """
         counts: Counter[str] = Counter()
         for path in paths:
@@ -146,5 +146,5 @@ def word_tensor(rows: Sequence[NDArray[np.int64]]) -> torch.Tensor:
 
 
 def forms_in(remarks: Iterable[str | None]) -> tuple[str, ...]:
-    """Returns the different forms of some remarks, sorted, behind silence."""
+    """Returns the distinct forms of remarks: silence first, then the others in sorted order."""
     return ("", *sorted({form for form in remarks if form}))

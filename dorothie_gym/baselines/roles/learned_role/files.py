@@ -51,9 +51,9 @@ class ModelFiles(Generic[Network]):
         kind: kind of the model; `policy_loader` selects the loader by it.
         version: `format` of the files.
         page: class of `model.json`, which has the field `layout`.
-        layout: returns the layout of this version for a vocabulary of some size.
+        layout: returns the layout of this version for a vocabulary of a given size.
         make: returns the network of a layout, with any weights.
-        check_form: raises an error for a text that is no form of a remark.
+        check_form: raises an error for a text that is not a form of a remark.
     """
 
     kind: str
@@ -64,7 +64,7 @@ class ModelFiles(Generic[Network]):
     check_form: Callable[[str], object]
 
     def network(self, remarks: int) -> Network:
-        """Returns a network, with any weights, for a vocabulary of some size."""
+        """Returns a network, with any weights, for a vocabulary of a given size."""
         return self.make(self.layout(remarks))
 
     def save(

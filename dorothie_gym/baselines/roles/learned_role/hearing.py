@@ -72,7 +72,7 @@ class Utterance:
     def asks(self) -> DialogueMove | None:
         """Move of the first question that yes or no answers; None without one.
 
-        A question that is understood to be about a stop or U-turn, and no more, is assumed to ask why: "way did we
+        A question that is understood only to be about a stop or U-turn is assumed to ask why: "way did we
         stop?".
         """
         for act in self.heard.acts:
@@ -106,7 +106,7 @@ def _known(values: Sequence[SlotValue]) -> list[SlotValue]:
 
 
 def _explained(act: DialogueAct) -> ActionValue | None:
-    """Returns the action of an act that has a reason to be asked for."""
+    """Returns the action of an act whose reason can be asked for."""
     return next((value for value in (ActionValue.STOP, ActionValue.U_TURN) if value in act.slots), None)
 
 

@@ -1,4 +1,4 @@
-"""Layers of the networks of both roles: embedded words, hidden layers, remarks behind others, scores of options."""
+"""Layers of the networks of both roles: embedded words, hidden layers, successive remarks, scores of options."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RoleNetwork(nn.Module):
 
 
 def following_remark(remarks: int) -> nn.Sequential:
-    """Returns the layers that score the remark behind another one, (b, h + `REMARK_WIDTH`) -> (b, r)."""
+    """Returns the layers that score the remark after another one, (b, h + `REMARK_WIDTH`) -> (b, r)."""
     return nn.Sequential(nn.Linear(WIDTH + REMARK_WIDTH, WIDTH // 2), nn.ReLU(), nn.Linear(WIDTH // 2, remarks))
 
 
@@ -65,6 +65,6 @@ def option_scores(scorer: nn.Module, hidden: Tensor, options: Tensor, count: Ten
 
 
 def without_missing(scores: Tensor, count: Tensor) -> Tensor:
-    """Returns scores (b, k), almost minus infinity for the options behind their number (b,), which are filled in."""
+    """Returns scores (b, k), almost minus infinity for the options that are padding, those from number (b,) upwards."""
     missing = torch.arange(scores.shape[1])[None, :] >= count[:, None]
     return scores.masked_fill(missing, -1e9)

@@ -32,11 +32,11 @@ def is_held_out(header: SessionHeader) -> bool:
 
 
 class Turns(Protocol):
-    """Player and teacher of one role, who act in turns."""
+    """Player and teacher of one role, who act alternately."""
 
     @property
     def is_stuck(self) -> bool:
-        """Whether the present turn ends early."""
+        """Whether the current turn ends early."""
         ...
 
     def begin_turn(self, rng: np.random.Generator) -> int:
@@ -49,7 +49,7 @@ class Turns(Protocol):
 
 
 def play_in_turns(role: Role, turns: Turns, others: Mapping[Role, AnyPolicy], engine: SessionEngine, seed: int) -> None:
-    """Plays a session to its end, in which player and teacher of a role act in turns.
+    """Plays a session to its end, in which player and teacher of a role act alternately.
 
     Args:
         role: the role.
@@ -77,6 +77,6 @@ def observed(engine: SessionEngine, role: Role) -> ObservationMapping:
 
 
 def new_remarks(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...]:
-    """Returns the remarks that were not there before, whatever their words."""
+    """Returns the remarks that are new, regardless of their words."""
     known = [(one.act, one.meaning) for one in before]
     return tuple(one for one in after if (one.act, one.meaning) not in known)

@@ -1,9 +1,9 @@
 """Forms of remarks: remarks without their names and numbers, each of which is replaced by its source.
 
-A remark is an act with the propositions that it states or asks and the particulars of its words. In its form, each name
+A remark is an act with the propositions that it states or asks and the details of its wording. In its form, each name
 of a place or street and each number is replaced by where it is taken from: the goal, a place just named, the street of
-an exit, the time that the route takes. The network chooses a form, and thereby act, content and sources; `filled` puts
-in what the sources are at this moment. The grammar words the act, as for the scripted roles.
+an exit, the time that the route takes. The network chooses a form, and thereby act, content and sources; `filled`
+inserts the current values of the sources. The grammar words the act, as for the scripted roles.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _nearest(value: object, available: Sources) -> str:
 
 
 def filled(form: str, available: Sources, *, joined: bool = False) -> Remark | None:
-    """Returns the remark of a form with the present names and numbers; None if a source is missing."""
+    """Returns the remark of a form with the current names and numbers; None if a source is missing."""
     page = json.loads(form)
     try:
         if "whole" in page:
@@ -141,7 +141,7 @@ def check_form(
         form: the text.
         needed: names of the sources that it needs.
         fill: returns the remark of a form.
-        example: returns what a source can be.
+        example: returns the possible values of a source.
     """
     if not isinstance(parse_json(form, "form"), dict):
         raise ValueError(form[:80])

@@ -1,6 +1,6 @@
 """Rounds of training: imitation of a corpus, then rounds of practice with the teacher (DAgger).
 
-A round plays sessions in which the previous round's player and the teacher act in turns, adds the teacher's
+A round plays sessions in which the previous round's player and the teacher alternate, adds the teacher's
 decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). The examples of each
 session and the model of each fit are saved, so that an interrupted training can be resumed; all depend only on the
 seed.
@@ -45,7 +45,7 @@ class RoundSettings:
         first_epochs: passes of the fit to the corpus.
         epochs: passes of the fit after each round, which continues the previous fit.
         last_epochs: passes of the last fit.
-        least: number of times that a remark must occur in the corpus to be learnt.
+        least: minimum number of occurrences of a remark in the corpus for it to be learnt.
     """
 
     corpus: Path
@@ -66,7 +66,7 @@ class RoundSettings:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least {low}")
 
     def as_json(self) -> dict[str, object]:
-        """Returns the settings in JSON types."""
+        """Returns the settings as JSON types."""
         return {**asdict(self), "corpus": str(self.corpus)}
 
 
@@ -81,7 +81,7 @@ class FinishedFit:
 
 @dataclass(frozen=True, kw_only=True)
 class CorpusPlan:
-    """Session of the corpus to be followed: its number in the fold, and the file of its lessons."""
+    """Session of the corpus to be simulated again: its number in the fold, and the file of its lessons."""
 
     number: int
     file: Path
@@ -105,8 +105,8 @@ class FitPlan:
         number: number of the round; 0 for the fit to the corpus.
         folder: folder of its model.
         files: files of lessons.
-        corpus_files: the files of the corpus among them, from which the vocabulary is taken.
-        former: folder of the model to continue from; None for the first fit.
+        corpus_files: those of the files that belong to the corpus, from which the vocabulary is taken.
+        former: folder of the previous model, from which the fit continues; None for the first fit.
         epochs: number of passes.
         title: name of the stage.
     """
@@ -165,7 +165,7 @@ def train_in_rounds(
         The fits that were done now.
 
     Raises:
-        SessionError: the corpus cannot be read or replayed, or the folder holds something else.
+        SessionError: the corpus cannot be read or replayed, or the folder contains other files.
         ProcessError: a session failed in another process.
     """
     done: list[FinishedFit] = []

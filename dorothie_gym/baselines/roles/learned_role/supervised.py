@@ -14,7 +14,7 @@ from dorothie_gym.baselines.roles.learned_role.examples import UNKNOWN
 
 BATCH_SIZE: Final = 256
 RATE, LAST_RATE = 1e-3, 5e-5
-"""Learning rate at the beginning and at the end of a fit."""
+"""Learning rate at the start and at the end of a fit."""
 
 DECAY: Final = 1e-4
 """Weight decay."""
@@ -32,7 +32,7 @@ class Rows(Protocol):
         ...
 
     def rows(self, numbers: Tensor) -> Self:
-        """Returns the examples with some numbers (n,)."""
+        """Returns the examples with the given numbers (n,)."""
         ...
 
 
@@ -55,7 +55,7 @@ def fit(
     Args:
         network: the network; it is changed.
         examples: examples.
-        loss_of: loss of the network in some examples.
+        loss_of: loss of the network in the given examples.
         epochs: number of passes.
         seed: seed of their order.
         on_epoch: called after each epoch.
@@ -88,7 +88,7 @@ def entropy(logits: Tensor, target: Tensor) -> Tensor:
 
 
 def changed_weights(before: Tensor, after: Tensor) -> Tensor:
-    """Returns the weights of the predictions of a value (b,): higher where it changes, which is seldom."""
+    """Returns the weights of the predictions of a value (b,): higher where it changes, which is rarely."""
     return 1.0 + (CHANGED_WEIGHT - 1.0) * (before != after)
 
 

@@ -46,9 +46,9 @@ class LearnedRole(Generic[Network, Batch, Example, Settings]):
     Attributes:
         files: files and network of its models.
         examples: class of its examples.
-        loss: loss of a network in some examples [nats].
+        loss: loss of a network in the given examples [nats].
         follow: simulates a recorded session again, and hands on the examples of the role.
-        practise: plays the session of a seed, in which a network with a vocabulary and the teacher act in turns, and
+        practise: plays the session of a seed, in which a network with a vocabulary and the teacher alternate, and
             hands on the teacher's decisions.
         branch: branch of the seed from which the sessions of practice are drawn; no rollout or corpus draws from it.
     """
@@ -83,7 +83,7 @@ class RoleLearner(Generic[Network, Batch, Example, Settings]):
     Attributes:
         role: the role.
         settings: settings of the training.
-        begun: processor time at the beginning of the training [s].
+        begun: processor time at the start of the training [s].
     """
 
     role: LearnedRole[Network, Batch, Example, Settings]

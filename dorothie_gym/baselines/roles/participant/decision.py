@@ -1,4 +1,4 @@
-"""One decision of the learned participant, up to what the network is given: the same in training and in play."""
+"""One decision of the learned participant, up to the inputs of the network: the same in training and in play."""
 
 from __future__ import annotations
 

@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 PARTICIPANT: Final = Role.PARTICIPANT
 
 SHORTEST_TURN, LONGEST_TURN = 20, 160
-"""Range of the number of decisions for which teacher and player in turns guide the car."""
+"""Range of the number of decisions between changes of the guide, teacher or player."""
 
 OnExample = Callable[[Example], None]
 
 
 class Pupil:
-    """Attention beside the teacher; the example of a decision is what the teacher does with the pupil's memory."""
+    """Attention that runs beside the teacher; its examples are the teacher's choices with the pupil's memory."""
 
     def __init__(self, town: Town, seed: int, teacher: Teacher) -> None:
         """Prepares the pupil of a teacher; the seed draws which examples are kept."""
@@ -70,7 +70,7 @@ class Pupil:
         return percept, memory, lesson
 
     def follow(self, percept: ParticipantPercept, memory: SessionMemory, lesson: Lesson) -> None:
-        """Notes what the teacher says, in its words."""
+        """Notes the teacher's utterance in its own words."""
         memory = memory.decided(lesson.remarks, percept.view, percept.rng)
         state = self._teacher.state
         records = replace(memory.records)
@@ -80,7 +80,7 @@ class Pupil:
         self.attention = Attention(memory=memory.spoken(state.speech, percept.view), utterances=percept.utterances)
 
     def lead(self, percept: ParticipantPercept, player: LearnedParticipant) -> ActionDict:
-        """Lets the player decide, and puts what it does into the teacher's state; returns its action."""
+        """Lets the player decide, and copies its decision into the teacher's state; returns its action."""
         memory = percept.memory.chosen(player.choose(choosing_inputs(percept), percept), percept.view, percept.rng)
         remarks = player.speak(speaking_inputs(percept, memory), percept, memory)
         speech, self.attention = finished(percept, memory, remarks)
@@ -113,7 +113,7 @@ def practise(
     on_example: OnExample,
     settings: RoundSettings,
 ) -> None:
-    """Plays a session in which teacher and player guide the car in turns; hands on the examples.
+    """Plays a session in which teacher and player guide the car alternately; passes the examples on.
 
     Args:
         network: network of the player.

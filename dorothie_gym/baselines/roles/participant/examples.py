@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.speech import Remark
 
 MOST_REMARKS: Final = 4
-"""Largest number of remarks of one decision."""
+"""Maximum number of remarks of one decision."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -224,7 +224,7 @@ STATE_SIZE: Final = 415
 """Length of `state_vector`."""
 
 
-# --- What the car asks or says ----------------------------------------------------------------------------------------
+# --- Questions and statements of the car ------------------------------------------------------------------------------
 
 
 def _question(memory: SessionMemory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
@@ -282,7 +282,7 @@ def answer_to(memory: SessionMemory, view: ParticipantView, utterance: Utterance
         asked = Proposition.of(asked.predicate, negated=asked.negated, action=action, direction=direction)
     found = believes(memory.records, view, asked)
     if asked.predicate is Predicate.KNOWS and utterance.heard.words.asked is None:
-        # a place alone: a check means the errand, another question means where the car stands
+        # a place alone: a check refers to the errand, another question to the position of the car
         checks = any(act.move is DialogueMove.CHECK for act in utterance.heard.acts)
         return found and (checks or not is_elsewhere(memory.records, view))
     return found
@@ -323,7 +323,7 @@ ERRAND_SIZE: Final = 12
 
 
 def _way_to(memory: SessionMemory, view: ParticipantView, subgoal: SeenSubgoal) -> float:
-    """Returns the length of the route to a subgoal [m]; infinite where there is none."""
+    """Returns the length of the route to a subgoal [m]; infinite if there is none."""
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return math.inf

@@ -41,7 +41,7 @@ AVERAGE: Final = ParticipantStyle(
     reasons=0.12, aligns=0.02, nods=0.5, curious=0.05, notices=0.9, puzzled=0.0, points_out=0.5, thanks=0.5,
     verifies=0.05,
 )  # fmt: skip
-"""Style of the learned participant's records, and of the teacher in practice: few choices are left to chance."""
+"""Style of the learned participant's records, and of the teacher in practice: few choices are random."""
 
 KEEP_TARGET: Final = -1
 """TargetChoice of the target: no change."""

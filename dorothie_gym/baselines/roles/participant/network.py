@@ -41,7 +41,7 @@ class ParticipantLayout:
 
     @classmethod
     def of(cls, remarks: int) -> ParticipantLayout:
-        """Returns the layout of this version for a vocabulary of some size."""
+        """Returns the layout of this version for a vocabulary of a given size."""
         return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, errand=ERRAND_SIZE, remarks=remarks)
 
 
@@ -84,6 +84,6 @@ class ParticipantNetwork(RoleNetwork):
         return self.first(hidden), hidden
 
     def then(self, hidden: Tensor, before: Tensor) -> Tensor:
-        """Returns the logits of the remark (b, r) behind another one (b,)."""
+        """Returns the logits of the remark (b, r) that follows another one (b,)."""
         scores: Tensor = self.next(torch.cat([hidden, self.remarks(before)], dim=1))
         return scores

@@ -89,7 +89,7 @@ class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
         return ParticipantAction(speech=speech).encode(self.limits), replace(state, attention=attention)
 
     def choose(self, inputs: Inputs, percept: ParticipantPercept) -> TargetChoice:
-        """Returns the likeliest target, and whether to guide."""
+        """Returns the most likely target, and whether to guide."""
         guides = torch.tensor([float(percept.memory.records.guidance.guiding)])
         with torch.inference_mode():
             target, guiding = self._network.choose(*inputs.tensors(), guides)

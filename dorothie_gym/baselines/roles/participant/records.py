@@ -32,7 +32,7 @@ _STEPS: Final = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH
 
 
 def note_remark(records: ParticipantState, view: ParticipantView, remark: Remark) -> None:
-    """Enters a remark of the participant into the records: what it announces, describes, asks for, or mentions."""
+    """Enters into the records what a remark of the participant announces, describes, requests or mentions."""
     act, now, goal = remark.act, view.time, records.task.goal
     actions, statuses = act.values(Slot.ACTION), act.values(Slot.STATUS)
     later = {GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(statuses)

@@ -134,7 +134,7 @@ _POINTERS: Final = ((_ORDERS, ("manoeuvre", "turn")), (_ANSWERS, ("said_action",
 def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
     """Returns the form of a remark; None if it has a name, number or text without a source."""
     if any(said.predicate is Predicate.NEAR and said.get("object") is not None for said in remark.meaning):
-        return None  # which sign stands there is not observed
+        return None  # the sign at the place is not observed
     texts = {value: name for name, value in available.items() if name.startswith(TEXT_MARK)}
     plain = {name: value for name, value in available.items() if not name.startswith(TEXT_MARK)}
     try:
@@ -186,7 +186,7 @@ def _reworded(wording: Wording, content: Proposition | None) -> Wording:
 
 
 def filled(form: str, available: Mapping[str, object], *, joined: bool = False) -> Remark | None:
-    """Returns the remark of a form with the present names, numbers and texts; None if a source is missing."""
+    """Returns the remark of a form with the current names, numbers and texts; None if a source is missing."""
     found = remark_forms.filled(form, available, joined=joined)
     if found is None:
         return None
@@ -243,7 +243,7 @@ _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_str
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a form of a remark."""
     if form != STOP_FORM:
         remark_forms.check_form(form, sources_of(form), filled, _example)
 
@@ -266,7 +266,7 @@ STOP_FORM: Final = "stop"
 
 
 def is_stop(remark: Remark, memory: SessionMemory, view: ParticipantView) -> bool:
-    """Returns whether a remark stops the car at the target: an instruction, or the statement that this is the place."""
+    """Returns whether a remark stops the car at the target: an instruction, or the statement "this is the place"."""
     if not is_last_stretch(memory.records, view) or view.standing:
         return False
     stops = remark.act.move is DialogueMove.INSTRUCT and remark.act.slots == {ActionValue.STOP}

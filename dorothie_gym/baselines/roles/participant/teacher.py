@@ -1,4 +1,4 @@
-"""The scripted participant as a teacher: run alongside a session, it reports what it would choose and say.
+"""The scripted participant as a teacher: run alongside a session, it reports its choices and remarks.
 
 The teacher has the player's observations. The player's remarks are copied into its state instead of its own (`settle`),
 so that it continues from the player's situation, not from its own.
@@ -29,9 +29,9 @@ class Lesson:
     """Decision of the teacher.
 
     Attributes:
-        target: number of the subgoal that is its target; None for none.
+        target: number of the subgoal that is its target; None if there is none.
         guiding: whether it guides the car.
-        remarks: remarks that it chooses now, in one breath or the next.
+        remarks: remarks that it chooses now, for this utterance or the next.
         action: its action.
     """
 
@@ -41,7 +41,7 @@ class Lesson:
     action: ActionDict
 
     def choice(self, memory: SessionMemory) -> TargetChoice:
-        """Returns the choice by which a memory gets the teacher's target."""
+        """Returns the choice that sets the target of a memory to that of the teacher."""
         same = self.target is None or self.target == memory.records.task.target
         return TargetChoice(target=KEEP_TARGET if same or self.target is None else self.target, guiding=self.guiding)
 

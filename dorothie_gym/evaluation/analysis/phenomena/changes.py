@@ -21,7 +21,7 @@ M = DialogueMove
 DIM: Mapping[WeatherParameter, float] = MappingProxyType(
     {WeatherParameter.FOG_DENSITY: 30.0, WeatherParameter.PRECIPITATION: 30.0, WeatherParameter.SUN_ALTITUDE_ANGLE: 5.0}
 )
-"""Weather that reduces sight: fog and rain from these values on [%], the sun at most at this height [degrees]."""
+"""Weather that reduces sight: minimum values of fog and rain [%], maximum altitude of the sun [degrees]."""
 
 SLOWER = re.compile(r"\bslow\w*|\beasy\b|\bcareful\w*|\bnot so fast\b|\btoo fast\b|\bdown to\b|\bbrake\b")
 LIGHTS = re.compile(r"\blights?\b|\bheadlights?\b|\bbeams?\b")
@@ -35,7 +35,7 @@ MAX_SIGHT_LEAD = 10.0
 """Longest time between sight of an object on the road and the car's coming near [s]."""
 
 SETTLEMENT_WINDOW = 60.0
-"""Time within which a roadblock, or an unknown place, is settled [s]."""
+"""Time within which a roadblock or an unknown place must be resolved [s]."""
 
 
 def hidden_place(talk: DialogueView) -> Iterator[Occurrence]:
@@ -68,7 +68,7 @@ def has_hidden_goal(talk: DialogueView) -> bool:
 
 
 def roadblock(talk: DialogueView) -> Iterator[Occurrence]:
-    """Finds 9: the car reports an object across the road, another way is discussed and taken."""
+    """Finds 9: the car reports an object across the road, another route is discussed and taken."""
     for turn in talk.by(CAR, M.EXPLAIN):
         if not any(set(act.slots) & set(OBSTACLES) for act in turn.doing(M.EXPLAIN)):
             continue
@@ -94,7 +94,7 @@ def meets_roadblock(talk: DialogueView) -> bool:
 
 
 def dim_weather(talk: DialogueView) -> Iterator[Occurrence]:
-    """Finds 10: in fog, rain or at night the participant asks for less speed or more light, and the car responds."""
+    """Finds 10: in fog, rain or at night the participant requests less speed or more light, and the car responds."""
     stretches = tuple(_dim(talk))
     wishes = (
         (ActionValue.SPEED_CHANGE, SLOWER, PhysicalAction.SPEED_CHANGE, False, "slower"),

@@ -35,7 +35,7 @@ ANSWER_WINDOW = 15.0
 """Time after a turn within which its answer begins [s]: patience of an exchange, and duration of the answer."""
 
 _MAX_UTTERANCE_SECONDS = 60.0
-"""Longest utterance [s]: turns that began earlier are over."""
+"""Longest utterance [s]: turns that began earlier have ended."""
 
 _UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
 _QUERIED = (ActionValue.QUERIED, StreetName.QUERIED, LandmarkName.QUERIED, GoalStatus.QUERIED, ObjectClass.QUERIED)
@@ -108,7 +108,7 @@ class DialogueView:
         """Gathers the turns of a session.
 
         Args:
-            session: any.
+            session: a session of any layout.
             units: units of the session, if already known.
         """
         self.session = session
@@ -244,7 +244,7 @@ def asks_for(act: DialogueAct, *slots: Slot) -> bool:
 
 
 def _falls(times: Sequence[float], since: float, until: float) -> bool:
-    """Returns whether one of the rising times is within a stretch."""
+    """Returns whether one of the ascending times is within an interval."""
     k = bisect.bisect_left(times, since)
     return k < len(times) and times[k] <= until
 

@@ -46,7 +46,7 @@ def check(talk: DialogueView) -> Iterator[Occurrence]:
 
 
 def align(talk: DialogueView) -> Iterator[Occurrence]:
-    """Finds 7: a speaker asks for understanding: it is confirmed, or the utterance is rephrased."""
+    """Finds 7: a speaker asks whether it was understood; the listener confirms, or the utterance is rephrased."""
     for turn in talk.turns:
         if not turn.does(M.ALIGN):
             continue
@@ -76,7 +76,7 @@ def reason(talk: DialogueView) -> Iterator[Occurrence]:
 
 
 def acts_by_itself(talk: DialogueView) -> bool:
-    """Returns whether the car acts in a way that calls for a reason: stops for a hazard, or turns round."""
+    """Returns whether the car performs an action that needs a reason: stops for a hazard, or turns round."""
     return talk.happened(EventType.HAZARD_STOP) or talk.did(PhysicalAction.U_TURN)
 
 

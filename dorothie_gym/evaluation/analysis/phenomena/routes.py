@@ -134,7 +134,7 @@ def references(talk: DialogueView) -> Iterator[Occurrence]:
 
 
 def asks_where_next(talk: DialogueView, number: int) -> bool:
-    """Returns whether the turn of a number asks for the next destination."""
+    """Returns whether the turn with this number asks for the next destination."""
     return any(LandmarkName.QUERIED in act.slots for act in talk.turns[number].doing(M.QUERY_W))
 
 

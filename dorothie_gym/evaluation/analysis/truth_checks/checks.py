@@ -67,7 +67,7 @@ class TalkChecks:
     """Counts of a corpus.
 
     Attributes:
-        right: number of cases that are right, by figure; exceptions as "exceptions/KIND".
+        right: number of correct cases, by figure; exceptions as "exceptions/KIND".
         cases: number of cases that can be decided.
         unperceived: number of exceptions that no role could perceive, by kind.
     """
@@ -168,7 +168,7 @@ def _check_answers(checks: TalkChecks, session: Session) -> None:
 
 
 def _as_said(asked: MoveRecord) -> Proposition:
-    """Returns what a question asks, without a place that its words leave out: "is this it?"."""
+    """Returns the proposition of a question, without a place that its words leave out: "is this it?"."""
     question = asked.meaning[0]
     named = question.get("place") in (None, *asked.act.values(Slot.LANDMARK))
     if named or question.predicate is not Predicate.ARRIVED:
@@ -177,7 +177,7 @@ def _as_said(asked: MoveRecord) -> Proposition:
 
 
 def _is_about(answer: Proposition, question: Proposition) -> bool:
-    """Returns whether an answer's proposition is the one that was asked, filled in or denied."""
+    """Returns whether the proposition of an answer is that of the question, completed or denied."""
     if answer.predicate is Predicate.BECAUSE:
         effect = answer.get("effect")
         if question.predicate is Predicate.BECAUSE:
@@ -214,7 +214,7 @@ def _check_exceptions(checks: TalkChecks, session: Session, world: SessionWorld 
 
 
 def mentions_story(session: Session) -> bool | None:
-    """Returns whether a speaker mentions a name or a thing from the story; None if the story has neither."""
+    """Returns whether a speaker mentions a name or an item from the story; None if the story has neither."""
     texts = (session.header.story, *(str(row["description"]) for row in session.header.subgoals))
     things = (item for text in texts for item in find_items(text))
     wanted = {words.casefold() for words in (*read_people(*texts), *things)}

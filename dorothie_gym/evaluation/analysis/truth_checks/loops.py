@@ -28,7 +28,7 @@ SAME_PLACE: Final = 40.0
 """Distance between equal orders at one place [m]."""
 
 SAME_HEADING: Final = 45.0
-"""Difference between the headings of the car at one place [degrees]: it comes from the same side."""
+"""Largest difference between headings of the car at one place that count as the same direction [degrees]."""
 
 BACK_AND_FORTH: Final = 400.0
 """Distance between U-turns of one loop [m]: back and forth on a street."""
@@ -97,7 +97,7 @@ def _begins_anew(move: MoveRecord) -> bool:
 
 
 def _place(session: Session, time: float) -> tuple[float, float, float]:
-    """Returns position [m] and heading [degrees] of the car at a time [s]; zeros where there is no trajectory."""
+    """Returns position [m] and heading [degrees] of the car at a time [s]; zeros if there is no trajectory."""
     rows = session.trajectory
     if not len(rows):
         return 0.0, 0.0, 0.0

@@ -4,7 +4,7 @@
 - A change of the weather is perceived at once if it is at least `CHANGE` of the parameter's range; that of the sun's
   azimuth while the sun is up, those of the fog's distance and falloff in fog.
 - A failure of the GPS is perceived once the car has driven `BLIND_WAY` without it; one of the camera as soon as the
-  range of sight falls below `LOSS` of that in the present weather.
+  range of sight falls below `LOSS` of that in the current weather.
 - An object on the road is perceived when the car comes within `analysis.exception_attribution.MEETING_DISTANCE` of it.
 - Vehicles and pedestrians are perceived when `CROWD` of them are within `CROWD_DISTANCE` and within sight, while the
   car is within twice `MEETING_DISTANCE` of the place where they appeared.
@@ -32,7 +32,7 @@ WITHIN: Final = 45.0
 """Time within which an exception is perceived, if at all [s]."""
 
 CHANGE: Final = 0.15
-"""Least change of a parameter of the weather, as a share of its range."""
+"""Minimum change of a parameter of the weather, as a share of its range."""
 
 LOSS: Final = 0.85
 """Share of the range of sight below which a fault of the camera shows."""
@@ -41,14 +41,14 @@ BLIND_WAY: Final = 25.0
 """Distance without GPS after which the position is uncertain [m]."""
 
 CROWD: Final = 3
-"""Least number of vehicles or pedestrians in a crowd."""
+"""Minimum number of vehicles or pedestrians in a crowd."""
 
 CROWD_DISTANCE: Final = 50.0
 """Distance within which a crowd is perceived [m]."""
 
-_FOG: Final = 25.0  # least density of fog in which its distance and falloff show [%]
+_FOG: Final = 25.0  # minimum density of fog in which its distance and falloff are visible [%]
 _STEP: Final = 1.0  # time between looks into the record [s]
-_BEFORE: Final = 0.5  # time before a change at which its parameter has the former value [s]
+_BEFORE: Final = 0.5  # time before a change at which its parameter still has the previous value [s]
 
 
 def perceived_at(world: SessionWorld, event: Event) -> float | None:

@@ -25,8 +25,8 @@ CARRIED_OUT_WITHIN: Final = 60.0
 """Time within which an announced action is carried out [s]."""
 
 _JUST_DONE: Final = 6.0  # time before the words within which the action may already have been taken [s]
-_STRAIGHT: Final = 30.0  # largest angle of a way that counts as straight [degrees]
-_SHORTER: Final = 30.0  # difference of two ways that is not noticed [m]
+_STRAIGHT: Final = 30.0  # largest angle of a route that counts as straight [degrees]
+_SHORTER: Final = 30.0  # largest unnoticed difference between two routes [m]
 
 _COMMANDS: Final[Mapping[ActionValue, tuple[PhysicalAction, ...]]] = MappingProxyType(
     {
@@ -78,8 +78,8 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
     """Returns whether a place is one of the open tasks; without a place, whether one has been named.
 
     Statements of the Co-Wizard that agree with its recorded beliefs count as true: it may have misheard the place.
-    It cannot be decided whether an open task is not the current one, nor which of several places of a name is meant by
-    its street.
+    It cannot be decided whether an open task is not the current one, nor which of several places with one name a
+    street identifies.
     """
     place, own = said.get("place"), speaker is Role.CO_WIZARD
     if place is None:
@@ -119,7 +119,7 @@ def is_nearer(world: SessionWorld, said: Proposition, time: float, speaker: Role
 
 
 def has_purpose(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether story, tasks or messages name the person and the thing that an errand is said to be about."""
+    """Returns whether story, tasks or messages name the person and the item that an errand is said to be about."""
     header = world.session.header
     texts = [header.story, *(str(row["description"]) for row in header.subgoals)]
     texts += [str(row["change"] or "") for row in header.subgoals]

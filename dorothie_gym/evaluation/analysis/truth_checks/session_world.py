@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})
 STANDING_SPEED: Final = 0.5  # [m/s]
-_CLOSE: Final = 25.0  # distance from a landmark to a car that stands there, or just short of it [m]
+_CLOSE: Final = 25.0  # distance from a landmark within which a car is at it or just before it [m]
 _SOON: Final = 3.0  # time from the standstill at a place to the end of the errand [s]
 _LATELY: Final = 30.0  # time for which a car has arrived after that [s]
 _LIGHT_SIGHT: Final = 60.0  # distance of the light that a standing car waits for [m]
@@ -70,11 +70,11 @@ class SessionWorld:
         return float(row["x"]), float(row["y"])
 
     def speed(self, time: float) -> float:
-        """Returns the speed of the car at a time [s], in m/s."""
+        """Returns the speed of the car [m/s] at a time [s]."""
         return float(self.row(time)["speed"])
 
     def stands(self, time: float) -> bool:
-        """Returns whether the car stands at a time [s]."""
+        """Returns whether the car is stationary at a time [s]."""
         return self.speed(time) < STANDING_SPEED
 
     def place(self, time: float) -> Place:
@@ -83,7 +83,7 @@ class SessionWorld:
         return lane, float(self.town.lanes[lane].project(np.array(self.position(time)))[0])
 
     def street(self, time: float) -> str | None:
-        """Returns the label of the name of the street that the car is on; None if it has none."""
+        """Returns the label of the name of the car's street; None if the street has none."""
         return self.street_name(self.town.lanes[int(self.row(time)["lane"])].street)
 
     def street_name(self, street: int) -> str | None:
@@ -120,7 +120,7 @@ class SessionWorld:
         return False
 
     def lights_on(self, time: float) -> bool:
-        """Returns whether the head lights are on at a time [s]; they are off at first."""
+        """Returns whether the headlights are on at a time [s]; they are off at first."""
         switched = [
             action.up
             for action in self.session.physical_actions
@@ -139,7 +139,7 @@ class SessionWorld:
         return float(table.rows[int(table.offsets[place])][parameter.value])
 
     def sight(self, time: float, *, faulty: bool = True) -> float:
-        """Returns the range of sight at a time [s], by weather, light, head lights and the camera [m].
+        """Returns the range of sight at a time [s], by weather, light, headlights and the camera [m].
 
         Args:
             time: time [s].
@@ -153,20 +153,20 @@ class SessionWorld:
         return weather.visibility(lights=self.lights_on(time), clarity=clarity).sight
 
     def distance_of(self, time: float, kinds: Sequence[ActorKind]) -> float:
-        """Returns the distance of the nearest recorded actor of some kinds at a time [m]; infinity if there is none."""
+        """Returns the distance of the nearest recorded actor of the given kinds at a time [m]; infinity without one."""
         return float(self._distances(time, kinds).min(initial=math.inf))
 
     def count_near(self, time: float, kinds: Sequence[ActorKind], distance: float) -> int:
-        """Returns the number of recorded actors of some kinds within a distance at a time [m, s]."""
+        """Returns the number of recorded actors of the given kinds within a distance at a time [m, s]."""
         return int((self._distances(time, kinds) <= distance).sum())
 
     def _distances(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
-        """Returns the distances of the recorded actors of some kinds (n,) [m]."""
+        """Returns the distances of the recorded actors of the given kinds (n,) [m]."""
         offsets = self._offsets(time, kinds)
         return np.hypot(offsets[:, 0], offsets[:, 1])
 
     def _offsets(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
-        """Returns the positions of the recorded actors of some kinds relative to the car (n, 2) [m]."""
+        """Returns the positions of the recorded actors of the given kinds relative to the car (n, 2) [m]."""
         table = self.session.scene.actors
         place = bisect.bisect_right(table.frames.tolist(), round(time * FRAME_RATE)) - 1
         if place < 0:
@@ -177,12 +177,12 @@ class SessionWorld:
         return np.column_stack((rows["x"] - x, rows["y"] - y)).astype(np.float64)
 
     def is_ahead(self, time: float, kinds: Sequence[ActorKind], distance: float, angle: float) -> bool:
-        """Returns whether a recorded actor of some kinds is in front of the car at a time [s].
+        """Returns whether a recorded actor of the given kinds is in front of the car at a time [s].
 
         Args:
             time: [s].
             kinds: kinds of the actors.
-            distance: largest distance from the middle of the car [m].
+            distance: largest distance from the centre of the car [m].
             angle: largest angle to its heading [degrees].
         """
         offsets, heading = self._offsets(time, kinds), float(self.row(time)["heading"])
@@ -190,7 +190,7 @@ class SessionWorld:
         return bool(((np.hypot(*offsets.T) <= distance) & (angles <= angle)).any())
 
     def hazards(self, time: float, around: float) -> set[str]:
-        """Returns the labels of the objects that the car brakes for within some seconds of a time [s]."""
+        """Returns the labels of the objects that the car brakes for within a few seconds of a time [s]."""
         found: set[str] = set()
         for begun, ended, reason in self._hazards:
             if begun - around <= time <= ended + around:
@@ -221,7 +221,7 @@ class SessionWorld:
     # --- tasks --------------------------------------------------------------------------------------------------------
 
     def landmarks(self, name: LandmarkName) -> list[LandmarkRow]:
-        """Returns the landmarks of a name."""
+        """Returns the landmarks with a name."""
         return [row for row in self.session.header.landmarks if row["name"] == name.label]
 
     @functools.cached_property
@@ -230,7 +230,7 @@ class SessionWorld:
         return self.session.of_type(EventType.SUBGOAL)
 
     def statuses(self, time: float, name: LandmarkName) -> tuple[GoalStatus, ...]:
-        """Returns the statuses of the tasks at places of a name that have come up by a time [s]."""
+        """Returns the statuses of the tasks at places with a name that have been introduced by a time [s]."""
         found: list[GoalStatus] = []
         for number, subgoal in enumerate(self.session.header.subgoals):
             place = str(self.session.header.landmarks[subgoal["landmark"]]["name"])
@@ -243,7 +243,7 @@ class SessionWorld:
         return tuple(found)
 
     def arrival(self, time: float, name: LandmarkName) -> float | None:
-        """Returns the time of the next arrival, if it is at a landmark of a name and no task changes before [s]."""
+        """Returns the time of the next arrival [s], if it is at a landmark with the name and before any task change."""
         following = next((event for event in self.changes if event.time > time), None)
         if following is None or following.data.get("landmark") != name.label:
             return None
@@ -251,9 +251,9 @@ class SessionWorld:
         return following.time if arrived and following.data.get("status") == GoalStatus.COMPLETE.label else None
 
     def arrived_at(self, time: float, name: LandmarkName) -> bool | None:
-        """Returns whether the car has arrived at a landmark of a name: in the last half minute, or in a moment.
+        """Returns whether the car arrives at a landmark with a name: in the last half minute, or very soon.
 
-        None if it stands close to it, but its errand there is not done: it may be called there, or just short of it.
+        None if the car stands close to it and the errand there is not done: both "there" and "just before it" are true.
         """
         done = any(
             event.data.get("landmark") == name.label
@@ -266,7 +266,7 @@ class SessionWorld:
         return True if done else None if near and self.stands(time) else False
 
     def told_to(self, time: float, action: ActionValue, within: float) -> bool:
-        """Returns whether the participant has named an action within some seconds before a time [s]."""
+        """Returns whether the participant has named an action in the last seconds before a time [s]."""
         return any(
             action in move.act.slots and 0.0 <= time - move.end <= within
             for move in self.session.moves(Role.PARTICIPANT)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from dorothie_gym.session.recording.header import LandmarkRow
 
 CLOSE, FAR = 130.0, 200.0
-"""Routes up to the first length count as short, and from the second on as long [m]; in between, both statements are
-true.
+"""Routes up to the first length count as short, and those of at least the second as long [m]; in between, both
+statements are true.
 """
 
 PLAIN_SIGHT, SIGHT = 20.0, 120.0
@@ -38,15 +38,15 @@ _POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
 _SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
 _NEAR: Final = 130.0  # largest distance of two places near each other [m]
 _BESIDE: Final = 40.0  # largest distance of a light or sign from a place near it [m]
-_CORNER: Final = 80.0  # largest distance of a place near a corner from the middle of the junction [m]
-_SHORT_WAY, _WAY_ERROR = 40.0, 0.25  # errors of a way that agrees [m], as a share of the way
-_NOW: Final = 4.0  # time within which "now" may lie [s]
+_CORNER: Final = 80.0  # largest distance of a place near a corner from the centre of the junction [m]
+_SHORT_WAY, _WAY_ERROR = 40.0, 0.25  # largest error of a stated distance [m], and as a share of it
+_NOW: Final = 4.0  # tolerance of "now" [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
-_CROWD: Final = 3  # least number in a crowd
-_IN_FRONT: Final = 15.0  # largest distance from the middle of the car to what it stands behind [m]
+_CROWD: Final = 3  # minimum number in a crowd
+_IN_FRONT: Final = 15.0  # largest distance from the centre of the car to the body that it waits behind [m]
 _AHEAD: Final = 25.0  # and its largest angle to the heading [degrees]
-_TOLD: Final = 60.0  # longest time between an order and what it explains [s]
+_TOLD: Final = 60.0  # longest time between an order and the action that it explains [s]
 
 Evaluator = Callable[[SessionWorld, Proposition, float, Role], bool | None]
 """Returns whether a proposition without negation is true at a time [s], said by a role; None if it is not recorded."""
@@ -150,7 +150,7 @@ def _looks(world: SessionWorld, said: Proposition, time: float, speaker: Role) -
 
 
 def _distance(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether the shortest way has about the length; a detour around a roadblock is not known."""
+    """Whether the shortest route has about the stated length; detours around roadblocks are ignored."""
     place, metres = said.get("place"), said.get("metres")
     rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
     if len(rows) != 1 or not isinstance(metres, int):
@@ -192,7 +192,7 @@ def _knows(world: SessionWorld, said: Proposition, time: float, speaker: Role) -
 
 
 def _visibility(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether the range of sight, a moment ago or now, is long, or as long as said."""
+    """Whether the range of sight, now or a moment ago, is long, or as long as stated."""
     metres, sights = said.get("metres"), [world.sight(time - shift) for shift in (0.0, 2.0, _NOW)]
     if isinstance(metres, int):
         return any(abs(metres - sight) <= max(_SIGHT_ERROR, 0.3 * sight) for sight in sights)
@@ -206,12 +206,12 @@ def _arrived(world: SessionWorld, said: Proposition, time: float, speaker: Role)
     if not isinstance(place, LandmarkName):
         return None
     if speaker is Role.PARTICIPANT and len(world.landmarks(place)) > 1:
-        return None  # several houses: the car may stand at another one
+        return None  # several houses: the car may be at another one
     return world.arrived_at(time, place)
 
 
 def _lights_on(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether the head lights are on; None if they have been switched since the question."""
+    """Whether the headlights are on; None if they have been switched since the question."""
     now, before = world.lights_on(time), world.lights_on(time - _NOW)
     return now if now is before else None
 
@@ -225,7 +225,7 @@ def _because(world: SessionWorld, said: Proposition, time: float, speaker: Role)
 
 
 def _failed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether a sensor, or any, has failed, or had until a moment ago: the effect of a fault fades."""
+    """Whether a sensor, or any sensor, has failed or had failed until a moment ago: the effect of a fault fades."""
     sensor = said.get("sensor")
     asked = [sensor] if isinstance(sensor, Sensor) else list(Sensor)
     return any(world.failed(time - k, one) for one in asked for k in range(0, _FADING if not said.negated else 2, 2))
@@ -285,7 +285,7 @@ _OBSTACLES: Final = {**ACTORS, ObjectClass.TRAFFIC_SIGN: ACTORS[ObjectClass.STAT
 
 
 def _hinders(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
-    """Whether the car brakes for something, or stands right behind it, which it may have braked for something else."""
+    """Whether the car brakes for a body, or stands right behind it and may thus have braked for another one."""
     kind = cause.get("object")
     if not isinstance(kind, ObjectClass):
         return None

@@ -99,7 +99,7 @@ class Batch:
         move: (B, M) id of the move, 0..14.
         move_speaker: (B, M) 0 participant, 1 Co-Wizard.
         move_slots: (B, M, 69) bool.
-        move_time: (B, M) when its utterance was over [s]; the time of the point for an utterance in progress.
+        move_time: (B, M) end of its utterance [s]; the time of the point for an utterance in progress.
         move_text: (B, M) words of the move.
         move_mask: (B, M).
         utterance_text, utterance_recognised: (B, U) its words; the recognised words.

@@ -27,7 +27,7 @@ _WIDTHS: Final[Mapping[str, int]] = MappingProxyType(
 """Sizes of the second axis of two-dimensional columns."""
 
 _OPEN: Final = ("label_angle", "speed")
-"""Columns in which NaN stands for an unknown number."""
+"""Columns in which NaN denotes an unknown number."""
 
 _STARTS: Final = ("start", "member_start")
 

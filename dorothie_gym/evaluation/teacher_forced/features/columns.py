@@ -39,7 +39,7 @@ class SessionRows:
 
     Attributes:
         names: name of each.
-        folds: fold of each, as `Fold`'s value; empty for one that lies in none.
+        folds: fold of each session, as `Fold`'s value; empty for a session in no fold.
         town: index of its town in `Columns.towns`.
         has_objects: whether the objects around the ego were recorded.
     """
@@ -109,12 +109,12 @@ class ActionRows:
         tenth: when it was done.
         event: number of its event in the session.
         action: `PhysicalAction` less 1: 0..5 are the classes of NfD, 6 is SpeedChange, 7 LightChange.
-        angle: argument as it stands in a history [degrees, positive left]: -180 for a U-turn, 0 where it has none or
+        angle: argument as shown in a history [degrees, positive left]: -180 for a U-turn, 0 if it has none or
             it is not known (`history_angle`).
-        up: 1 faster or on, -1 slower or off, 0 for other actions.
-        label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN where it is not known.
+        up: 1 for faster or on, -1 for slower or off, 0 for other actions.
+        label_angle: argument as NfD's label [degrees]: 0 for an action that takes none, NaN if unknown.
         flagged: whether it is a point of NfD.
-        handling: as of `MoveRows`, by the rule of `handling_of_events`.
+        handling: as in `MoveRows`, by the rule of `handling_of_events`.
     """
 
     session: Ints
@@ -137,7 +137,7 @@ class FrameRows:
         tenth: when.
         pose: (n, 3) x, y [m], heading [degrees, clockwise from east, in [-180, 180)].
         speed: over the tenth before [m/s]; 0 in a session's first row.
-        lane: lane of the town, -1 where it is not known.
+        lane: lane of the town, -1 if unknown.
         look: row of `Columns.looks` that was the last then, -1 before the first.
     """
 
@@ -184,7 +184,7 @@ class LandmarkRows:
     Attributes:
         start: (S + 1,) those of session s are `start[s]:start[s + 1]`.
         place: (n, 2) x, y [m].
-        lane: lane of the town that it is at, -1 where it is not known.
+        lane: lane of the town that it is at, -1 if unknown.
         street: number of its street, -1 for none.
         text: its name.
     """
@@ -258,7 +258,7 @@ class Columns:
     """Corpus as columns; arrays may be memory maps of files.
 
     Attributes:
-        key: hash of everything that determines the content, sources included: key of the cache.
+        key: hash of all that determines the content, sources included; key of the cache.
         texts: every distinct text: utterances, recognised words, names of streets and landmarks.
         towns: towns of the sessions, by name.
         unreadable: sessions that could not be read, (name, reason) each.
@@ -285,7 +285,7 @@ class Columns:
     def times(self) -> RecordTimes:
         """Times that determine visibility at a point, in tenths of a second."""
         said, moves = self.utterances, self.moves
-        first = np.searchsorted(moves.utterance, np.arange(len(said.tenth) + 1))  # moves lie in the order of utterances
+        first = np.searchsorted(moves.utterance, np.arange(len(said.tenth) + 1))  # moves are in the order of utterances
         return RecordTimes(
             utterances=Moments(said.session, said.tenth),
             last_events=moves.event[first[1:] - 1],

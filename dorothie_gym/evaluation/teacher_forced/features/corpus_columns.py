@@ -1,7 +1,7 @@
 """Columns of all sessions of a corpus, kept in the user's cache.
 
 An entry of the cache is a folder of memory-mapped `.npy` files, and `columns.json` with all other values and a checksum
-of each file. Its name is a hash of everything that determines its content. A damaged entry is built again and replaced.
+of each file. Its name is a hash of all that determines its content. A damaged entry is rebuilt and replaced.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def _fold_name(fold: Fold | None) -> str:
 
 
 def _key(corpus: Corpus, sight: Sight | None) -> str:
-    """Returns the hash of everything that determines the columns: files, names and folds of sessions, and sources."""
+    """Returns the hash of all that determines the columns: files, names and folds of sessions, and sources."""
     digest = hashlib.sha256(f"{_sources_digest()} {compiler_digest()} numpy {np.__version__}\n".encode())
     if sight is not None:
         digest.update(f"sight {sight.digest}\n".encode())
@@ -201,7 +201,7 @@ def join(
     """Joins the columns of sessions to those of a corpus.
 
     Args:
-        key: hash of everything that determines them.
+        key: hash of all that determines them.
         names: names of the sessions.
         folds: their folds.
         parts: their columns, in the same order.
@@ -285,7 +285,7 @@ EMPTY: Final = 128
 """Size of an empty `.npy` file, which is its header [bytes]."""
 
 MOST_ENTRIES: Final = 12
-"""Largest number of entries; the least recently used are removed. An entry of 183 sessions has about 40 MB."""
+"""Maximum number of entries; the least recently used are removed. An entry of 183 sessions has about 40 MB."""
 
 
 def features_folder() -> Path | None:
@@ -320,7 +320,7 @@ def _check_signature(entry: Path, keys: Path) -> None:
 
 
 def keep(columns: Columns) -> None:
-    """Caches columns under their key, in one step: other processes see the whole entry or none."""
+    """Caches columns under their key atomically: other processes see the whole entry or none."""
     folder = features_folder()
     if folder is None:
         return
@@ -460,5 +460,5 @@ def _prune(folder: Path) -> None:
     """Removes the least recently used entries beyond `MOST_ENTRIES`."""
     entries = sorted(folder.iterdir(), key=lambda entry: (entry.lstat().st_mtime_ns, entry.name))
     for entry in entries[:-MOST_ENTRIES]:
-        with contextlib.suppress(OSError):  # another process removes entries, too
+        with contextlib.suppress(OSError):  # another process may also remove entries
             remove(entry)

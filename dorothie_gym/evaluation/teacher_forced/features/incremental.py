@@ -80,7 +80,7 @@ class FrameWindow:
         town: the map.
         tenths: length of the window that a batch shows [0.1 s]; older frames are dropped.
         frames: observed frames, oldest first.
-        switches: frames at which the headlights were switched, and whether on, as far as looks depend on them.
+        switches: frames at which the headlights were switched, and whether on; only those on which perceptions depend.
     """
 
     town: Town
@@ -129,7 +129,7 @@ class IncrementalColumns:
 
     Attributes:
         header: streets, and the landmarks that the Co-Wizard knows.
-        sizes: how much of the history a batch shows; more is not kept.
+        sizes: extent of the history in a batch; the rest is dropped.
         window: the last observed frames.
         utterances: the last utterances of participant and Co-Wizard.
         actions: the last physical actions.
@@ -158,7 +158,7 @@ class IncrementalColumns:
         return replace(self, window=self.window.observed(frame))
 
     def said(self, utterance: UtteranceRecord) -> Self:
-        """Returns the columns with an utterance, which was over no earlier than the last one."""
+        """Returns the columns with an utterance, which ended no earlier than the last one."""
         return replace(self, utterances=self._visible_utterances((*self.utterances, utterance)))
 
     def corrected(self, utterance: UtteranceRecord) -> Self:
@@ -207,7 +207,7 @@ class IncrementalColumns:
 
 
 def trajectory_at_tenths(frames: Sequence[ObservedFrame]) -> Trajectory:
-    """Returns the rows of the trajectory between the first and the last of some frames, ten a second.
+    """Returns the rows of the trajectory between the first and the last of the given frames, ten a second.
 
     Positions and speeds are interpolated; the lane is that of the nearer frame. As in a recording, nothing precedes the
     first tenth of a second.
@@ -243,7 +243,7 @@ def _headings(wanted: NDArray[np.int64], known: NDArray[np.int64], heading: NDAr
 
 
 def _surroundings(looks: Sequence[ObservedFrame]) -> Surroundings:
-    """Returns the surroundings at some frames (at least one) as they are recorded."""
+    """Returns the surroundings at the given frames (at least one) as they are recorded."""
     frames = np.array([each.frame for each in looks], dtype=np.int64)
 
     def table(rows: Sequence[Rows]) -> SceneTable:

@@ -28,7 +28,7 @@ class PointTable:
         tenth: time of the point [0.1 s].
         event: number of its event in the session.
         row: row of the point itself in `Columns.moves` (UfN, RfN) or `Columns.actions` (NfD): its label, never input.
-        handling: 0 nothing, 1 a task exception, 2 an environmental one (`Handled`).
+        handling: 0 none, 1 a task exception, 2 an environmental one (`Handled`).
         moves_start, moves_stop: visible rows of `Columns.moves`.
         spans_start, spans_stop: further visible rows of it: earlier acts of the utterance of the point (NfD: none).
         utterances_start, utterances_stop: visible rows of `Columns.utterances`.
@@ -80,7 +80,7 @@ def points(columns: Columns, task: Task, fold: Fold | str | None = None) -> Poin
     Args:
         columns: the corpus.
         task: the task.
-        fold: sessions of this fold only, or of several ("val", "test", "seen", "unseen"); None takes all.
+        fold: sessions of this fold only, or of several folds ("val", "test", "seen", "unseen"); None for all.
 
     Raises:
         SessionError: the fold is unknown.

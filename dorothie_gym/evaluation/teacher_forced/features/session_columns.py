@@ -50,7 +50,7 @@ class SessionColumns:
         arrays: by "group.field".
         texts: distinct texts.
         town: name of the town.
-        seed: seed of the session, -1 where there is none.
+        seed: seed of the session, -1 if there is none.
         unpointed: flagged events that are not points, (event, reason) each.
         signature: hash of the above, independent of the layout of the session.
     """
@@ -72,7 +72,7 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
     pose = poses(rows)
     looks = tuple(perceived(session.scene, pose, rows["frame"], light_switches(session), town))
     arrays = {
-        **place_columns(session.header, texts),  # first: numbers of texts then do not depend on what is said later
+        **place_columns(session.header, texts),  # first: numbers of texts then do not depend on later utterances
         **utterance_columns(SessionHistory(session).utterances, texts, handled),
         **action_columns(session.physical_actions, handled),
         **frame_columns(rows, pose, _speeds(rows), looks, known=town is not None),
@@ -115,8 +115,8 @@ def utterance_columns(
     """Returns the columns of moves and utterances.
 
     Args:
-        spoken: utterances of participant and Co-Wizard, by the frame at which they were over.
-        texts: numbers of texts; gets those of the utterances.
+        spoken: utterances of participant and Co-Wizard, by the frame at which they ended.
+        texts: numbers of texts, extended by those of the utterances.
         handled: value of the columns `handling` by number of the event.
     """
     over = [utterance.frame // FRAMES_PER_TENTH for utterance in spoken]
@@ -143,7 +143,7 @@ def utterance_columns(
 
 
 def action_columns(actions: Sequence[ActionRecord], handled: Mapping[int, int]) -> dict[str, NDArray[np.generic]]:
-    """Returns the columns of physical actions; `handled` is as of `utterance_columns`."""
+    """Returns the columns of physical actions; `handled` is as in `utterance_columns`."""
     return {
         "actions.tenth": _ints([act.frame // FRAMES_PER_TENTH for act in actions]),
         "actions.event": _ints([act.index for act in actions]),
@@ -247,7 +247,7 @@ def _pairs(values: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
 
 
 def town_graph(name: str, town: Town | None) -> TownGraph:
-    """Returns the graph of a town; without lanes where it is not known."""
+    """Returns the graph of a town; without lanes if unknown."""
     if town is None:
         empty = np.empty(0, dtype=np.int32)
         return TownGraph(

@@ -18,7 +18,7 @@ class Sight(Protocol):
 
     @property
     def digest(self) -> str:
-        """Text that changes whenever the same session may give other objects."""
+        """Text that changes when the same session may have other objects."""
         ...
 
     def actors(self, session: Session, town: Town) -> SceneTable:

@@ -28,7 +28,7 @@ GRAINS, PATCHES = 24.0, 2.1
 """Points of noise of two sizes [1/m]."""
 
 BLENDED = 0.3
-"""Width of a footprint from which on averaged colours are blended in [m]."""
+"""Width of a footprint at which averaged colours begin to be blended in [m]."""
 
 SHARP = 0.03
 """Width of a footprint up to which one sample is sufficient [m]."""

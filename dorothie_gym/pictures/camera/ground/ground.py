@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array
 
 _FEW = 1 << 16
-"""Largest number of pairs of a place and a triangle that are compared without a search tree."""
+"""Maximum number of pairs of a place and a triangle that are compared without a search tree."""
 
 _EDGE = 1e-9
-"""Share of a triangle by which a place may lie outside: rounded, one on a common edge would lie in neither."""
+"""Share of a triangle by which a place may be outside: by rounding, a place on a common edge could be in neither."""
 
 
 @dataclass(frozen=True, eq=False)

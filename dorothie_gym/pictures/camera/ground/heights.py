@@ -30,12 +30,12 @@ _LEVEL = 4.5  # [m] of level ground beside other roads: their pavements
 _BESIDE = 0.5  # [m] further from the edge of a lane than from the nearest one; its height counts as well
 _ALIKE = 1.0  # [m] between road and land at which the level ground is narrow
 _APART = 0.25  # [m] of height between a pavement and the land from which it is a bench
-_WIDEST_VERGE = 7.0  # [m] from a road to the middle of its pavement
+_WIDEST_VERGE = 7.0  # [m] from a road to the centre of its pavement
 _OWN_ROAD = 1.5  # [m] of height between a pavement and the road beside it, at most
 _NEAREST = 24  # samples of lanes that are considered at a point
 _AROUND = 12  # samples of the land that are considered at a point
-_THIN = 4  # one of so many samples gives the height of the land
-_AHEAD = 6.0  # [m] along a lane over which a sample's slope is followed
+_THIN = 4  # every such sample gives the height of the land
+_AHEAD = 6.0  # [m] along a lane over which a sample's slope is extrapolated
 
 
 class Zone(enum.IntEnum):
@@ -79,7 +79,7 @@ class HeightField:
         }
         walks = _sidewalk_samples(town)
         away, beside = (np.asarray(row) for row in cKDTree(samples.centre).query(walks.centre))
-        # level from the road on, and as far behind
+        # level from the road to the pavement, and equally far on its other side
         verge = np.clip(away - samples.half_width[beside], 0.0, _WIDEST_VERGE)
         walks = replace(walks, half_width=np.maximum(walks.half_width, verge))
         # those in tunnels count before the mouths; above, only lanes do
@@ -189,7 +189,7 @@ def _sidewalk_samples(town: Town) -> TownSamples:
 
 
 class _Lanes:
-    """Samples of some lanes or pavements with their slopes."""
+    """Samples of lanes or pavements with their slopes."""
 
     def __init__(self, samples: TownSamples, keep: NDArray[np.bool_]) -> None:
         slope = np.zeros(len(keep))

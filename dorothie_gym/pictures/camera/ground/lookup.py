@@ -1,8 +1,8 @@
 """Lookup of the material of the ground at a point: the top-most polygon of the map that contains it, exactly.
 
-A grid of square cells gives the material at most points. In a cell with several materials, the polygons that have an
-edge in it are tried from the top: a path from the corner of the cell to the point, first along y and then along x, is
-crossed an odd number of times by the edges of a polygon if one end is inside and the other outside.
+For most points, a grid of square cells gives the material. In a cell with several materials, the polygons with an edge
+in the cell are tested from the topmost down. The test follows a path from the corner of the cell to the point, first
+along y and then along x: if the edges of a polygon cross it an odd number of times, exactly one end is inside.
 """
 
 from __future__ import annotations

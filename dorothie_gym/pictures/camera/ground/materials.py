@@ -13,7 +13,7 @@ from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.palette import Colour
 
 KERB_HEIGHT = 0.12
-"""Height of pavements and everything else behind a kerb above the road [m]."""
+"""Height above the road of pavements and all other ground behind a kerb [m]."""
 
 
 class Relief(enum.IntEnum):
@@ -130,7 +130,7 @@ SYMBOLS: frozenset[Colour] = frozenset(
         palette.BRIDGE_SHADOW,
     }
 )
-"""Colours of the map for things that do not lie on the ground: trees, shadows, and symbols of cartography."""
+"""Colours of the map for objects that are not on the ground: trees, shadows, and symbols of cartography."""
 
 
 def material_colours() -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """Plane partition of a sheet into triangles: areas cut by square cells, without gaps or corners on other edges.
 
 All corners lie on a grid of about a millimetre, as whole numbers. Cells are cut into quarters where the ground is not
-level. Along the borders of cells, each polygon gets the corners of its neighbours.
+level. Along the borders of cells, each polygon receives the corners of its neighbours.
 """
 
 from __future__ import annotations

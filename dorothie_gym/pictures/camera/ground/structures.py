@@ -164,7 +164,7 @@ def add_tunnel(
     high[..., 2] += _headroom(field, high)
     sides[..., 2] -= _UNDER
     _add_quads(builder, sides[:, ::-1], high[:, ::-1], _TILES, ObjectClass.WALL)
-    # up to the lid; in the ground, where only the sun sees it, so far behind the wall that no light gets through
+    # up to the lid; in the ground, visible to the sun only, it is so far behind the wall that no light passes through
     behind = np.concatenate((_THICK * _inward(sides), np.zeros((len(sides), 1))), axis=1)[:, None]
     high[..., 2] += ROOF - _LID / 2.0
     _add_quads(builder, sides - behind, high - behind, _TILES, ObjectClass.WALL)
@@ -206,7 +206,7 @@ def _longer(town: Town, part: LevelStretch, more: float) -> LevelStretch:
 
 
 def _add_pillars(builder: MeshBuilder, sheet: Sheet, field: HeightField, town: Town, ground: GroundArrays) -> None:
-    """Adds pillars below the middles of lanes, except on roads."""
+    """Adds pillars below the centres of lanes, except on roads."""
     stood: list[Array] = []
     reach = _PILLAR_WIDTH * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     for part in sheet.stretches:
@@ -246,7 +246,7 @@ def _inward(lines: Array) -> Array:
 
 
 def _add_quads(builder: MeshBuilder, low: Array, high: Array, colour: tuple[int, int, int], kind: ObjectClass) -> None:
-    """Adds faces between lines (n, 2, 3) [m], seen from the left of their way, on the map."""
+    """Adds faces between lines (n, 2, 3) [m], seen from the left of their direction, on the map."""
     builder.triangles(np.stack((low[:, 0], low[:, 1], high[:, 1]), axis=1), colour=colour, kind=kind)
     builder.triangles(np.stack((low[:, 0], high[:, 1], high[:, 0]), axis=1), colour=colour, kind=kind)
 

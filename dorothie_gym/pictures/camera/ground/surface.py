@@ -96,7 +96,7 @@ class Edges(NamedTuple):
     """Edges between two triangles.
 
     Attributes:
-        ends: (n, 2, 2) positions [grid steps]; the first triangle lies on the right of the way from the first to the
+        ends: (n, 2, 2) positions [grid steps]; the first triangle is to the right of the line from the first to the
             second, on the map.
         heights: (n, 2, 2) of the first and second triangle at both ends [m].
         areas: (n, 2) of both triangles.
@@ -165,7 +165,7 @@ def add_faces(builder: MeshBuilder, edges: Edges, tunnels: TunnelFloors | None =
         top, foot = places[rows].copy(), places[rows].copy()
         top[..., 2], foot[..., 2] = edges.heights[rows, above], edges.heights[rows, 1 - above]
         kinds = edges.areas[rows]
-        # seen from the lower side: from the left of the way if the first triangle is the higher one
+        # seen from the lower side: from the left of the line if the first triangle is the higher one
         start, end = (1, 0) if above == 0 else (0, 1)
         opening = (kinds[:, 1 - above] & Area.COVERED == 0) & (kinds[:, above] & Area.COVERED != 0)
         if tunnels is not None and opening.any():

@@ -45,12 +45,12 @@ LAMP_STATES = 4
 """Number of combinations of `Lamps`; the state of a vehicle is the rest of its model's index."""
 
 COARSE_FROM = 40.0
-"""Distance from which on people have few triangles [m]."""
+"""Distance beyond which people have few triangles [m]."""
 
 BRAKING = -0.6
-"""Acceleration below which brake lamps are on [m/s^2]: less is engine drag."""
+"""Acceleration below which brake lamps are on [m/s^2]: weaker deceleration is engine drag."""
 
-_STAND = 0.1  # [m/s] a car stands, with the brakes on, and a person does not walk
+_STAND = 0.1  # [m/s] below which a car stands, with the brakes on, and a person does not walk
 _COARSE_STEP = 2  # of the phases of walking, every second one has a coarse version
 _COARSE_POSES = PHASES // _COARSE_STEP + 1
 
@@ -191,7 +191,7 @@ def place_bodies(
         reach: distance up to which bodies are listed [m].
         own: key of the vehicle that carries the camera, which is left out; -1 for none.
         lights: whether cars drive with their lights on.
-        placed: receives the models, as far as it has room; z is the height of the road, also for pedestrians.
+        placed: receives as many models as it has room for; z is the height of the road, also for pedestrians.
 
     Returns:
         The number of models.

@@ -1,4 +1,4 @@
-"""People who walk or stand, in several clothings, and a coarse version of each for the distance."""
+"""Walking and standing people in several clothings, each also in a coarse version for the distance."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def dressed_person(form: Mesh, look: Look) -> Mesh:
 
 
 def _leg(swing: float, forward: float) -> Array:
-    """Returns hip, knee and ankle (3, 3) below the middle of the hip, from the angle and the motion of the thigh."""
+    """Returns hip, knee and ankle (3, 3) below the centre of the hip, from the angle and the motion of the thigh."""
     thigh = _SWING * swing + 0.14 * max(0.0, forward)
     knee = _KNEE * max(0.0, forward) + 0.06 * abs(swing)
     joint = np.array([_THIGH * pm.sin(thigh), 0.0, -_THIGH * pm.cos(thigh)])

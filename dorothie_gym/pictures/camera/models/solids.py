@@ -94,7 +94,7 @@ class ModelBuilder:
     def hull(
         self, triangles: ArrayLike, slot: Part, inside: Point, *, shade: float = 1.0, surface: Surface = Surface.NONE
     ) -> None:
-        """Adds triangles (n, 3, 3), each visible from the side away from a point inside the model."""
+        """Adds triangles (n, 3, 3), each visible from the side that faces away from a point inside the model."""
         corners = np.asarray(triangles, dtype=np.float64).reshape(-1, 3, 3)
         shape = len(corners), 3
         self._triangles.setdefault(surface, []).append(corners)
@@ -138,7 +138,7 @@ class ModelBuilder:
         self, centre: Point, radii: Sequence[float], slot: Part, *, sides: int = 6, rings: int = 2,
         part: tuple[float, float] = (0.0, 1.0), shade: float = 1.0,
     ) -> None:  # fmt: skip
-        """Adds an ellipsoid, or a part of it between two shares of the way from its top to its bottom."""
+        """Adds an ellipsoid, or its part between two heights, given as shares of the distance from top to bottom."""
         middle = np.asarray(centre, dtype=np.float64)
         heights = np.pi * np.linspace(*part, rings + 2)[:, None]
         turns = _turns(sides)

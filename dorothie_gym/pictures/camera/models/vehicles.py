@@ -43,7 +43,7 @@ class Lamps(enum.IntFlag):
     OFF = 0
     BRAKES = 1
     LIGHTS = 2
-    """Head lights and tail lights."""
+    """Headlights and tail lights."""
 
 
 PAINTS: tuple[Rgb, ...] = (
@@ -116,7 +116,7 @@ def vehicle_form(kind: VehicleType) -> Mesh:
 
 
 def painted_vehicle(form: Mesh, paint: Rgb, lamps: Lamps) -> Mesh:
-    """Returns a car with a colour, and with some of its lamps on."""
+    """Returns a car with a colour, and with the given lamps on."""
     brakes, lights = Lamps.BRAKES in lamps, Lamps.LIGHTS in lamps
     palette: Palette = {
         Part.PAINT: paint,
@@ -224,6 +224,6 @@ def _lamps(model: ModelBuilder, form: _Form) -> None:
     ]
     model.face(bar, Part.BRAKE_LAMP, inside)
     for x, bottom in ((_FRONT, 0.36), (-_FRONT, 0.40)):
-        left, top = math.copysign(_PLATE[0] / 2.0, x), bottom + _PLATE[1]  # left for somebody who looks at this end
+        left, top = math.copysign(_PLATE[0] / 2.0, x), bottom + _PLATE[1]  # left for a viewer who looks at this end
         corners = [(x, left, bottom), (x, left, top), (x, -left, top), (x, -left, bottom)]
         model.panel(corners, Part.PLATE, texture=Texture.PLATE)

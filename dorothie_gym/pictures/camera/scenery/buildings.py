@@ -132,7 +132,7 @@ class Building:
 
 
 def plan_buildings(layers: MapLayers, clearance: Clearance) -> list[Building]:
-    """Returns buildings along all streets, clear of everything that the map draws and of the lots of landmarks."""
+    """Returns buildings along all streets, clear of all that the map draws and of the lots of landmarks."""
     rng = np.random.default_rng(zlib.crc32(b"buildings of " + layers.town.name.encode()))
     placed = _Placed()
     quarters = _Quarters(layers.town, clearance)
@@ -163,7 +163,7 @@ def _frontages(layers: MapLayers) -> Iterator[_Frontage]:
 
 
 class _Quarters:
-    """Quarters of a town: a centre, homes round it and suburbs, also wherever the open country begins."""
+    """Quarters of a town: a centre, homes around it, and suburbs, which also border on the open country."""
 
     def __init__(self, town: Town, clearance: Clearance) -> None:
         points = np.concatenate([lane.points[:, :2] for lane in town.lanes])

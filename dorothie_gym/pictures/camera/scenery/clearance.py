@@ -1,4 +1,4 @@
-"""Room for scenery: everything that the map draws is kept free, and a lot is reserved for the landmark of each site."""
+"""Room for scenery: all that the map draws is kept free, and a lot is reserved for the landmark of each site."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ BESIDE = 1.8
 """Ground beside a lane that stays free [m]."""
 
 FOOTWAY = 1.0
-"""Ground on both sides of the middle of a footway that stays free [m]."""
+"""Ground on both sides of the centre of a footway that stays free [m]."""
 
 _TREES = (palette.TREE, palette.COUNTRY_TREE)
 _OPEN = (palette.COUNTRY, palette.BLOCK, palette.PARK, palette.BRIDGE_SHADOW, *_TREES)
-"""Colours of ground on which something may stand."""
+"""Colours of ground on which scenery may stand."""
 
 _PAINT = (
     palette.LANE_LINE,
@@ -42,7 +42,7 @@ _PAINT = (
     palette.ONE_WAY,
 )
 _SEEN_FROM = (42.0, 26.0)  # [m] before the stop at a site
-_SIGN = (2.4, 3.4)  # [m] extent of signs before and behind the front of a lot
+_SIGN = (2.4, 3.4)  # [m] extent of signs in front of and behind the front of a lot
 BESIDE_LOT = 1.2
 """Room at both sides of a lot, for a sign [m]."""
 
@@ -90,7 +90,7 @@ class Clearance:
 
     @cached_property
     def reserved(self) -> shapely.STRtree:
-        """Lots, the ground between them and their streets, and the lines of sight of cars that come near."""
+        """Lots, the ground between them and their streets, and the lines of sight of approaching cars."""
         town = self._layers.town
         sights = [sight for lot, site in zip(self.lots, town.sites, strict=True) for sight in _sights(town, site, lot)]
         return shapely.STRtree([*(_with_view(lot) for lot in self.lots), *sights])
@@ -145,7 +145,7 @@ def _sights(town: Town, site: Site, lot: Lot) -> list[shapely.Polygon]:
 
 
 def _before(town: Town, site: Site, distance: float) -> tuple[float, float]:
-    """Returns the position (x, y) [m] at a distance before the stop at a site, as far as there is a lane."""
+    """Returns the position (x, y) [m] at a distance before the stop at a site, limited by the start of the lane."""
     lane, station = town.lanes[site.lane], site.station
     seen = {lane.id}
     while station < distance and (before := [k for k in town.predecessors(lane.id) if k not in seen]):

@@ -99,7 +99,7 @@ def _plain_building(works: _Works) -> None:
 
 
 class _Works:
-    """Builder on a lot, in its own frame: metres behind the front, to the right of the middle, and above the ground."""
+    """Builder on a lot, in its own frame: metres behind the front, to the right of the centre, and above the ground."""
 
     def __init__(self, lot: Lot, ground: Heights) -> None:
         self.lot = lot

@@ -37,6 +37,6 @@ class Lenses(NamedTuple):
 
 
 def lens_rows(lenses: Lenses, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Returns the triangles of some lenses."""
+    """Returns the triangles of the given lenses."""
     parts = [np.arange(first, last) for first, last in lenses.ranges[chosen].tolist()]
     return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)

@@ -17,7 +17,7 @@ class Lot:
         site: id of the site.
         place: position of the site (x, y) [m].
         heading: viewing direction of a person who looks at it from its street [rad].
-        front: middle of its front edge (x, y) [m].
+        front: centre of its front edge (x, y) [m].
         length: along the street [m].
         depth: away from the street [m].
     """
@@ -30,11 +30,11 @@ class Lot:
     depth: float
 
     def at(self, deep: float, right: float) -> tuple[float, float]:
-        """Returns the world position (x, y) [m] of a place in the lot: behind its front, to the right of the middle."""
+        """Returns the world position (x, y) [m] of a place in the lot: behind its front, to the right of the centre."""
         ((x, y),) = oriented([(deep, right)], self.front, self.heading).tolist()
         return x, y
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Middle of the lot (x, y) [m]."""
+        """Centre of the lot (x, y) [m]."""
         return self.at(self.depth / 2.0, 0.0)

@@ -19,7 +19,7 @@ class Heights(Hashable, Protocol):
     """Ground with heights."""
 
     def height_at(self, points: Array) -> Array:
-        """Returns the heights (n,) [m] of the ground at points (n, 2) [m], NaN where there is none."""
+        """Returns the heights (n,) [m] of the ground at points (n, 2) [m], NaN if there is none."""
         ...
 
 
@@ -51,8 +51,8 @@ def stamped(
         template: mesh around the origin, which looks along x.
         places: positions (n, 3) [m].
         headings: (n,) [rad].
-        scales: (n,), 1 where absent.
-        tints: factors of the colours (n, 3), 1 where absent.
+        scales: (n,), 1 if omitted.
+        tints: factors of the colours (n, 3), 1 if omitted.
     """
     count, size = len(places), template.size
     sizes = np.ones(count) if scales is None else np.asarray(scales, dtype=np.float64)

@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.maps.map_layers import MapLayers, Post
 
-_HEAD = 3.4  # [m] height of the middle of a traffic light
+_HEAD = 3.4  # [m] height of the centre of a traffic light
 _LENS, _BETWEEN = 0.2, 0.46  # [m] radius of a lens, distance of two
-_SIGN = 2.4  # [m] height of the middle of a sign
+_SIGN = 2.4  # [m] height of the centre of a sign
 _METAL, _BACK = (100, 104, 104), (150, 152, 154)
 _BLADE = 2.2, 0.55  # [m] width and height of a street name
 _BLADE_HEIGHT = 4.3  # [m] of the lower blade: above the lights at the same corner
 _CORNER = (3.0, 1.9, 1.2)  # [m] from the edge of the road to the post with names; the first that has room
 _CORNERS_APART = 6.0  # [m]
 _OTHER_LEVEL = 2.5  # [m] between a road and the ground above or below it
-_STRAIGHT = 45  # [degrees] largest turn of a way straight on
-_FAR, _FAR_ASIDE = 1.5, 1.3  # [m] from the beginning and from the edge of the exit to a repeated light
+_STRAIGHT = 45  # [degrees] largest turn of an exit that counts as straight on
+_FAR, _FAR_ASIDE = 1.5, 1.3  # [m] from the start and from the edge of the exit to a repeated light
 _HEADS_APART = 1.5  # [m] between lights
 
 
@@ -52,7 +52,7 @@ def build_signals(layers: MapLayers, clearance: Clearance, ground: Heights) -> t
     """Returns lights and signs at all posts of a map, and the lenses among their triangles.
 
     Each light is repeated on the far side of its junction where there is room, so that the first car in a queue, which
-    stands beside the post, sees it as well.
+    stands beside the post, also sees it.
     """
     light, parts = _traffic_light()
     templates = {SignalKind.TRAFFIC_LIGHT: light, SignalKind.STOP: _stop_sign(), SignalKind.YIELD: _yield_sign()}
