@@ -33,7 +33,7 @@ from dorothie_gym.pictures.camera.scenery.lenses import Lenses
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA, is_body_seen
-from dorothie_gym.pictures.charts import INK, SHEET, SOFT, empty_figure
+from dorothie_gym.pictures.chart_style import INK, SHEET, SOFT, empty_figure
 from dorothie_gym.policies import make_policy
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.session_engine import SessionEngine

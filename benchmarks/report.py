@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from benchmarks.timing import Figures
-from dorothie_gym.pictures.charts import GRID, INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.pictures.chart_style import GRID, INK, SHEET, SOFT, hexadecimal
 from dorothie_gym.pictures.palette import CAR, LIGHT_RED, ROAD
 from dorothie_gym.session.config import CameraOutput
 from dorothie_gym.sim.config import FRAME_RATE

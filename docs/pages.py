@@ -38,7 +38,7 @@ from dorothie_gym.evaluation.analysis.exception_attribution import kind_of
 from dorothie_gym.evaluation.analysis.transcript import markdown
 from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.pictures.charts import SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.pictures.chart_style import SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.pictures.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
 from dorothie_gym.policies import make_policy, pretrained_card, pretrained_names
 from dorothie_gym.policies.pretrained import CardFigure, pretrained_size

@@ -190,7 +190,7 @@ def draw_corpus(path: Path, corpus: Path) -> None:
     """Draws moves and slots of a corpus."""
     from dorothie_gym.archive import Corpus
     from dorothie_gym.evaluation.analysis import corpus_stats_of
-    from dorothie_gym.evaluation.analysis.profiles import draw_profiles
+    from dorothie_gym.evaluation.analysis.profile_charts import draw_profiles
 
     census = corpus_stats_of(Corpus.load(corpus))
     made = json.loads((corpus / "generation.json").read_text(encoding="utf-8"))

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.pictures.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.pictures.chart_style import INK, SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.pictures.palette import CAR, ROAD
 from dorothie_gym.support.files import replacing
 

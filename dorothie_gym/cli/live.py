@@ -25,7 +25,7 @@ from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.tasks.storyboard import TaskState
 
 if TYPE_CHECKING:
-    from dorothie_gym.cli.film import Film
+    from dorothie_gym.cli.live_film import Film
 
 EventData: TypeAlias = Mapping[str, Any]
 """Data of an event, whose fields depend on its type."""

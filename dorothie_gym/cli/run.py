@@ -54,8 +54,8 @@ from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.session.config import PerceptionModel, RenderView
 
 if TYPE_CHECKING:
-    from dorothie_gym.cli.film import Film
     from dorothie_gym.cli.live import Pace
+    from dorothie_gym.cli.live_film import Film
     from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.session_log import SessionSummary
 
@@ -227,7 +227,7 @@ def _watchers(
     pace: Pace | None = None
     watchers: list[Callable[[SessionEngine], None]] = []
     if plan.video is not None:
-        from dorothie_gym.cli.film import Film
+        from dorothie_gym.cli.live_film import Film
 
         film = stack.enter_context(Film(plan.video, plan.view))
         watchers.append(film)

@@ -10,9 +10,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.labelled_enums import check_complete
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, SlotValue
-from dorothie_gym.ontology.vocabulary import check_complete
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.conversation import Utterance

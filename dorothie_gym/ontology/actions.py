@@ -7,8 +7,8 @@ from enum import StrEnum
 from types import MappingProxyType
 
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.labelled_enums import LabelledInt
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.ontology.vocabulary import LabelledInt
 
 LANE_SWITCH_LEFT = 90.0
 """Angle argument of a lane switch to the left [degrees, positive left]."""

@@ -11,8 +11,8 @@ from types import MappingProxyType
 from typing import Self, TypeAlias
 
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.labelled_enums import LabelledInt, complete, unknown_spelling
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
-from dorothie_gym.ontology.vocabulary import LabelledInt, complete, unknown_spelling
 from dorothie_gym.support.copying import shared
 
 

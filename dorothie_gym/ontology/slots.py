@@ -7,7 +7,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import ClassVar, Self, TypeAlias
 
-from dorothie_gym.ontology.vocabulary import LabelledInt
+from dorothie_gym.ontology.labelled_enums import LabelledInt
 
 ARRIVAL_DISTANCE = 2.0
 """Largest distance between the stopped car and the waypoint of a landmark at which a subgoal is reached [m]."""

@@ -12,6 +12,7 @@ from typing import Protocol, TypeVar
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.labelled_enums import Vocabulary, normalise
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import (
     ActionValue,
@@ -22,7 +23,6 @@ from dorothie_gym.ontology.slots import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.ontology.vocabulary import Vocabulary, normalise
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 
 

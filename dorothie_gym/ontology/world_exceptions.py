@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Self
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology.vocabulary import LabelledInt
+from dorothie_gym.ontology.labelled_enums import LabelledInt
 
 
 class ExceptionKind(LabelledInt):

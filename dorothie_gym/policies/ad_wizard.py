@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 import numpy as np
 
 from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.labelled_enums import check_complete
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.vocabulary import check_complete
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import Policy, replace

@@ -12,8 +12,8 @@ import numpy as np
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT

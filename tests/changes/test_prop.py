@@ -17,7 +17,7 @@ EDITS = (
         '    TRAFFIC_SIGN = "trafficsign", 0.10, 0.76, 2.89\n    BENCH = "bench", 0.55, 1.80, 0.85\n',
     ),
     Edit(
-        "dorothie_gym/dialogue/data/talk/36_around.talk",
+        "dorothie_gym/dialogue/data/talk/36_surroundings.talk",
         "== prop trafficsign\n",
         "== prop bench\na bench *2 | a park bench\n== prop trafficsign\n",
         r"dorothie_gym/dialogue/data/talk: there is no section `== prop bench`",

@@ -23,7 +23,7 @@ EDITS = (
         r"CLARITY of dorothie_gym/sim/sensing/visibility\.py .* Sensor\.GLARE",
     ),
     Edit(
-        "dorothie_gym/dialogue/data/talk/36_around.talk",
+        "dorothie_gym/dialogue/data/talk/36_surroundings.talk",
         "== Explain co_wizard topic=failed_view\n",
         "== Explain co_wizard topic=failed_glare\nthe sun blinds my camera\n== Explain co_wizard topic=failed_view\n",
         r"dorothie_gym/dialogue/data/talk: there is no section `== Explain topic=failed_glare`",

@@ -15,7 +15,7 @@ EDITS = (
         '    WETNESS = "wetness", 0.0, 100.0, 0.0, "%"\n    DUST_STORM = "dust_storm", 0.0, 100.0, 0.0, "%"\n',
     ),
     Edit(
-        "dorothie_gym/dialogue/data/talk/36_around.talk",
+        "dorothie_gym/dialogue/data/talk/36_surroundings.talk",
         "== Explain topic=much_wetness\n",
         "== Explain topic=much_dust_storm\nthere's dust in the air\n"
         "== Explain topic=less_dust_storm\nthe dust has settled\n"

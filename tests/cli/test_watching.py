@@ -13,8 +13,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.cli.film import Film
 from dorothie_gym.cli.live import LiveShow, script_lines
+from dorothie_gym.cli.live_film import Film
 from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.pictures.views.playback import Playback

@@ -169,7 +169,7 @@ def test_grammar_without_words_for_an_action_raises_error():
 def test_grammar_without_words_for_a_member_of_the_world_names_the_section(head):
     section = head.replace(" co_wizard", "")
     with pytest.raises(PhraseFileError, match=f"dialogue/data/talk: there is no section `{section}`"):
-        parse_grammar(without_section("36_around.talk", head))
+        parse_grammar(without_section("36_surroundings.talk", head))
 
 
 @pytest.mark.parametrize(

@@ -30,9 +30,9 @@ from dorothie_gym.ontology.actions import (
     MentalAction,
     PhysicalAction,
 )
+from dorothie_gym.ontology.labelled_enums import normalise
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_goal_status, parse_mental_action, parse_physical_action, parse_role
-from dorothie_gym.ontology.vocabulary import normalise
 from dorothie_gym.session.recording.events import Event, EventType, check_event
 from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.session.recording.validation import ReadReport

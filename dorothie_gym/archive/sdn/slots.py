@@ -11,9 +11,9 @@ from typing import Final
 from dorothie_gym.archive.sdn.files import JsonObject, plain, whole_of
 from dorothie_gym.archive.sdn.landmark_names import landmark_name
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.labelled_enums import normalise
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
 from dorothie_gym.ontology.spellings import parse_slot, parse_slot_value
-from dorothie_gym.ontology.vocabulary import normalise
 from dorothie_gym.session.recording.validation import ReadReport
 
 _ACT: Final = "act"

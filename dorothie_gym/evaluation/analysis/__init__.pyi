@@ -25,9 +25,9 @@ from .phenomena.catalogue import PHENOMENA as PHENOMENA
 from .phenomena.dialogue_view import DialogueView as DialogueView
 from .phenomena.dialogue_view import Occurrence as Occurrence
 from .phenomena.dialogue_view import Phenomenon as Phenomenon
+from .profile_charts import draw_profiles as draw_profiles
 from .profiles import Profile as Profile
 from .profiles import Profiles as Profiles
-from .profiles import draw_profiles as draw_profiles
 from .segmentation_agreement import SegmentationAgreement as SegmentationAgreement
 from .segmentation_agreement import SegmentedSession as SegmentedSession
 from .segmentation_agreement import UnitSpan as UnitSpan

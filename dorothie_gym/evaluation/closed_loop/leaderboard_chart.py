@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.evaluation.closed_loop.leaderboard import IMPORTED, OTHER, PART_TITLES, LeaderboardEntry, labels_of
 from dorothie_gym.evaluation.closed_loop.results import ALL_METRICS
-from dorothie_gym.pictures.charts import INK, dress_percent_axes, empty_figure
+from dorothie_gym.pictures.chart_style import INK, dress_percent_axes, empty_figure
 from dorothie_gym.support.files import replacing
 
 if TYPE_CHECKING:

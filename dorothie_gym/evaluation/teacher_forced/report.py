@@ -33,7 +33,7 @@ from dorothie_gym.evaluation.teacher_forced.paper_comparison import (
     paper_source,
 )
 from dorothie_gym.evaluation.teacher_forced.scoring import class_labels
-from dorothie_gym.pictures.charts import INK, SHEET, SOFT, dress_percent_axes, empty_figure
+from dorothie_gym.pictures.chart_style import INK, SHEET, SOFT, dress_percent_axes, empty_figure
 from dorothie_gym.support.files import replacing, write_atomically
 
 if TYPE_CHECKING:

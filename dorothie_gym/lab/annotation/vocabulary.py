@@ -16,8 +16,8 @@ from dorothie_gym.ontology.dialogue_acts import (
     Question,
     path_to,
 )
+from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.slots import SLOT_VALUES, LandmarkName
-from dorothie_gym.ontology.vocabulary import complete
 
 MOVE_KEYS: Mapping[DialogueMove, str] = complete(
     {

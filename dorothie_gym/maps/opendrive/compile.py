@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.map_inference import lay_sites, name_streets
 from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_road
 from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
+from dorothie_gym.maps.street_inference import lay_sites, name_streets
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 

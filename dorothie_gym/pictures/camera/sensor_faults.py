@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.ontology.vocabulary import complete
+from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.support.compilation import concurrent

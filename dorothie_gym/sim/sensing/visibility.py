@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.ontology.vocabulary import complete
+from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled

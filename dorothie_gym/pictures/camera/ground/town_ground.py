@@ -10,13 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from dorothie_gym.pictures.camera.ground.arrays import ground_arrays
-from dorothie_gym.pictures.camera.ground.ground import Ground
-from dorothie_gym.pictures.camera.ground.heights import HeightField
-from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET
-from dorothie_gym.pictures.camera.ground.partition import Area, Cut, cut_ground
-from dorothie_gym.pictures.camera.ground.regions import GRID, Regions, find_regions, only_areas, tidy
-from dorothie_gym.pictures.camera.ground.sheets import town_sheets
-from dorothie_gym.pictures.camera.ground.structures import (
+from dorothie_gym.pictures.camera.ground.bridges_and_tunnels import (
     add_bridge,
     add_lids,
     add_portals,
@@ -25,6 +19,12 @@ from dorothie_gym.pictures.camera.ground.structures import (
     deck_area,
     tunnel_floors,
 )
+from dorothie_gym.pictures.camera.ground.ground import Ground
+from dorothie_gym.pictures.camera.ground.heights import HeightField
+from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET
+from dorothie_gym.pictures.camera.ground.partition import Area, Cut, cut_ground
+from dorothie_gym.pictures.camera.ground.regions import GRID, Regions, find_regions, only_areas, tidy
+from dorothie_gym.pictures.camera.ground.sheets import town_sheets
 from dorothie_gym.pictures.camera.ground.surface import add_faces, add_sheet, find_edges, lifted
 from dorothie_gym.pictures.camera.mesh import MeshBuilder
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.ontology.labelled_enums import check_complete
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
-from dorothie_gym.ontology.vocabulary import check_complete
 from dorothie_gym.pictures.camera import atlas
 from dorothie_gym.pictures.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented

@@ -3,8 +3,8 @@ import pickle
 import pytest
 
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.labelled_enums import Vocabulary, complete, normalise, unknown_spelling
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.vocabulary import Vocabulary, complete, normalise, unknown_spelling
 
 
 def test_look_up_ignores_case_space_and_punctuation() -> None:

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from dorothie_gym.cli import app
 from dorothie_gym.cli import film as film_module
 from dorothie_gym.cli import sessions as sessions_module
-from dorothie_gym.cli.film import Film
+from dorothie_gym.cli.live_film import Film
 from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES

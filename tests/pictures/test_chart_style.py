@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from benchmarks.report import draw, world_report
 from dorothie_gym.archive import Corpus
 from dorothie_gym.evaluation.analysis import corpus_stats_of
-from dorothie_gym.evaluation.analysis.profiles import draw_profiles
+from dorothie_gym.evaluation.analysis.profile_charts import draw_profiles
 from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
