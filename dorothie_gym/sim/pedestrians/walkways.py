@@ -167,7 +167,7 @@ def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
 
 
 def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) -> tuple[int, Array] | None:
-    """Returns the first of the ends that can be reached without crossing a lane, and the path, straight or curved."""
+    """Returns the first of the given ends that is reachable without crossing a lane, and a straight or curved path."""
     for bow in BOWS:
         for other in others:
             line = places[[one, other]]
