@@ -169,7 +169,7 @@ class Pace:
         self.seconds = 0.0
 
     def __call__(self, engine: SessionEngine) -> None:
-        """Waits until the time of the present decision."""
+        """Waits until the time of the current decision."""
         now = time.perf_counter()
         if self._begun is None:
             self._begun = now

@@ -136,7 +136,7 @@ class _Windscreen:
         self._last = self._moment()
 
     def now(self) -> NDArray[np.uint8] | None:
-        """Returns the picture of the present decision, and keeps what the next pictures need."""
+        """Returns the picture of the current decision, and keeps what the next pictures need."""
         self._last = self._moment()
         return self._camera.render(self._world).rgb
 

@@ -285,7 +285,7 @@ def _survey(town: TownArrays, poses: Array, k: int) -> tuple[float, bool, int, f
 # --- Infractions ------------------------------------------------------------------------------------------------------
 # Infractions of the ego: red lights, stop signs, leaving the road, driving against the traffic.
 #
-# They follow from the ego's trajectory alone, whatever drove it, and are counted and listed by `sim.traffic_rules`;
+# They follow from the trajectory alone, regardless of the driver, and are counted and listed by `sim.traffic_rules`;
 # collisions, the fifth kind, are detected in `sim.collisions`. This module reads the lists.
 
 

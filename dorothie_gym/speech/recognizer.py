@@ -61,7 +61,7 @@ class Recognition:
 
 
 class Recognizer(Protocol):
-    """Speech recogniser; equal arguments give equal results, whatever was recognised before."""
+    """Speech recogniser; equal arguments give equal results, regardless of earlier calls."""
 
     def recognize(self, samples: Samples, sample_rate: int, *, hints: Sequence[str] = ()) -> Recognition:
         """Returns the words of an audio.

@@ -38,7 +38,7 @@ def load_detector(folder: Path, device: torch.device) -> Detector:
 
 
 def stored_config(folder: Path, kind: Any) -> Any:
-    """Returns the config of a trained model, of the class `kind`; errors as of `load_detector`."""
+    """Returns the config of a trained model, of the class `kind`; errors as in `load_detector`."""
     path = folder / BEST_FILE
     if not path.is_file():
         name = "segformer" if kind is SegFormerConfig else "detr"

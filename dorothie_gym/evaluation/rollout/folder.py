@@ -107,7 +107,7 @@ def _lock(root: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def noticing_deletion(folder: Path) -> Iterator[None]:
-    """Raises `OutputFolderError` if a folder was deleted or replaced inside the block, whatever else failed there."""
+    """Raises `OutputFolderError` if a folder was deleted or replaced inside the block, also after other failures."""
     deleted = f"{folder}: the folder was deleted or replaced while it was being written; run the command again"
     before = _identity(folder)
     try:

@@ -55,7 +55,7 @@ def measure(track: Array, k: int, draws: Array, dt: float, truth: Array) -> tupl
     """Returns the measurements of a frame.
 
     Args:
-        track: true poses, x, y, heading and whatever else, of successive frames (n + 1, 3 or more) [m, m, rad].
+        track: true poses, x, y, heading and any further columns, of successive frames (n + 1, 3 or more) [m, m, rad].
         k: number of the frame: from pose k to k + 1.
         draws: normal numbers (ODOMETRY_DRAWS or more,).
         dt: time of a frame [s].
