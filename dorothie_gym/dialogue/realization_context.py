@@ -11,7 +11,7 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import LandmarkName, SlotValue, StreetName
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.propositions import Proposition
+    from dorothie_gym.dialogue.propositions import Proposition  # noqa: TC004 (propositions have directions)
 
 
 class Direction(enum.StrEnum):

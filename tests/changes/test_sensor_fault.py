@@ -17,7 +17,7 @@ EDITS = (
         '    VIEW = "view"\n    GLARE = "glare"\n',
     ),
     Edit(
-        "dorothie_gym/sim/world.py",
+        "dorothie_gym/sim/sensing/visibility.py",
         "Sensor.VIEW: 0.0}, Sensor",
         "Sensor.VIEW: 0.0, Sensor.GLARE: 0.5}, Sensor",
         r"CLARITY of dorothie_gym/sim/sensing/visibility\.py .* Sensor\.GLARE",

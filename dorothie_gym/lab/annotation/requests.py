@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from msgspec import Meta, Struct
 
-if TYPE_CHECKING:
-    from dorothie_gym.lab.annotation.rows import ChangeRows, Label
+from dorothie_gym.lab.annotation.rows import ChangeRows, Label
 
 _Edit = Annotated[int, Meta(ge=0, lt=2**53)]
 

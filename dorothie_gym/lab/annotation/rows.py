@@ -9,13 +9,13 @@ import msgspec
 from msgspec import Meta, Struct
 
 from dorothie_gym.errors import AnnotationError, OntologyError
+from dorothie_gym.evaluation.analysis.exception_attribution import Handled
 from dorothie_gym.lab.annotation.marks import MAX_UNIT, Change, ExchangeMark, SpanMark, TransactionMark
 from dorothie_gym.lab.annotation.source_text import SPEAKERS, UtteranceId
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, UnitEnd
 from dorothie_gym.ontology.spellings import parse_act, parse_landmark, parse_move
 
 if TYPE_CHECKING:
-    from dorothie_gym.evaluation.analysis.exception_attribution import Handled
     from dorothie_gym.ontology.slots import LandmarkName
 
 MAX_SPANS: Final = 400

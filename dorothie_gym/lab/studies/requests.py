@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct
 
 from dorothie_gym.lab.studies.items import MAX_TEXT
-
-if TYPE_CHECKING:
-    from dorothie_gym.lab.studies.stages import Stage
-    from dorothie_gym.ontology.roles import Role
+from dorothie_gym.lab.studies.stages import Stage
+from dorothie_gym.ontology.roles import Role
 
 
 class Body(Struct, forbid_unknown_fields=True, frozen=True):
