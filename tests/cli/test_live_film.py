@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.cli import film as film_module
+from dorothie_gym.cli import live_film as film_module
 from dorothie_gym.cli import sessions as sessions_module
 from dorothie_gym.cli.live_film import Film
 from dorothie_gym.evaluation.rollout import play_session
