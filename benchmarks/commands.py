@@ -1,4 +1,4 @@
-"""`python -m benchmarks world|env|vector|camera|rl|speech|train|import`: measurements, each with its reference."""
+"""`python -m benchmarks`: measurements of speed and of understanding, each with its reference."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ app = typer.Typer(
     name="python -m benchmarks",
     cls=CommandGroup,
     help="Measure speeds, each with a reference in the same run: world, environment of three agents, "
-    "batches of worlds, camera, speech, training, and import time.",
+    "batches of worlds, camera, speech, understanding, training, and import time.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -251,6 +251,25 @@ def speech(
     _run("speech", measured, picture, as_json)
 
 
+@app.command(cls=PictureCommand)
+def understanding(
+    split: Annotated[str, typer.Option(help="Sentences to measure with: dev, test, or all.")] = "dev",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the word errors.")] = 0,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Moves, slots and plans understood of labelled everyday sentences, as written and with word errors."""
+    if split not in ("dev", "test", "all"):
+        fail(f"--split {split}: give dev, test or all")
+
+    def measured(progress: Progress) -> Figures:
+        from benchmarks.understanding import measure
+
+        return measure(split=None if split == "all" else split, seed=seed, progress=progress)
+
+    _run("understanding", measured, picture, as_json)
+
+
 @app.command("import", cls=PictureCommand)
 def importing(repeats: Repeats = 7, picture: Picture = None, as_json: AsJson = False) -> None:
     """Time to import the package and to create a first environment, compared with importing highway-env."""
@@ -294,6 +313,33 @@ def train(
         return measure(folder, threads=threads, batch_size=batch, repeats=repeats, progress=progress)
 
     _run("train", measured, picture, as_json)
+
+
+@app.command()
+def drives(
+    records: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Driving tests as lines of JSON; default: those of the package.")
+    ] = None,
+    split: Annotated[str, typer.Option(metavar="NAME", help="dev, or test, which is to be used once.")] = "dev",
+    only: Annotated[str | None, typer.Option(metavar="ID", help="Only tests whose id begins like this.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Share of driving tests, sentences of people-like speakers, that the scripted Co-Wizard drives and answers."""
+    with reporting_errors(), _progress() as progress:
+        from benchmarks.drives import RECORDS, measure
+
+        figures = measure(records=records or RECORDS, split=split, only=only, progress=progress)
+    if as_json:
+        print_json(figures)
+        return
+    count = figures["tests"]
+    stdout().print(f"{count} driving tests: {figures['as_expected']:.0%} as expected", style="bold", markup=False)
+    stdout().print(f"driven {figures['driven']:.0%}, replied {figures['replied']:.0%}", markup=False)
+    for kind, (passed, tests) in figures["kinds"].items():
+        stdout().print(f"  {kind:<11} {passed} of {tests}", markup=False)
+    for failure in figures["failures"]:
+        wrong = "; ".join(filter(None, (failure["drive"], failure["reply"])))
+        stdout().print(f"  {failure['id']}: {wrong}", markup=False, soft_wrap=True)
 
 
 def _run(name: str, measure: Measure, picture: Path | None, as_json: bool, *, pictures: bool = False) -> None:

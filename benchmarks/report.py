@@ -302,6 +302,32 @@ def speech_report(figures: Figures) -> Report:
     )
 
 
+def understanding_report(figures: Figures) -> Report:
+    """Returns the summary of `understanding.measure`."""
+    written, misheard = figures["written"], figures["misheard"]["all"]
+    rows = [
+        Measurement(label=kind.replace("_", " "), value=100.0 * shares["first_move_and_slots"])
+        for kind, shares in written["kinds"].items()
+    ]
+    found = written["all"]
+    return Report(
+        title="Understanding",
+        setting=f"{_count(figures['sentences'], 'sentence')}, split {figures['split']}",
+        headline=f"first move {found['first_move']:.1%}, first move and all slots {found['first_move_and_slots']:.1%}",
+        unit="first move and all slots [percent]",
+        rows=tuple(rows),
+        notes=(
+            f"slot values: F1 {found['slots_f1']:.3f}",
+            f"plans: {found['plan']:.1%} equal, their steps F1 {found['steps_f1']:.3f}",
+            f"with {figures['word_errors']:.0%} word errors: first move {misheard['first_move']:.1%}, "
+            f"slot values F1 {misheard['slots_f1']:.3f}, plans {misheard['plan']:.1%}",
+            f"time: {number(figures['milliseconds'])} ms per sentence",
+        ),
+        machine=machine_line(figures["machine"]),
+        logarithmic=False,
+    )
+
+
 def _rate(row: Figures) -> float:
     return float(1000.0 / row["milliseconds"])
 

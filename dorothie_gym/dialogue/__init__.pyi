@@ -46,6 +46,14 @@ from .recognition_errors import Loudness as Loudness
 from .recognition_errors import WordClass as WordClass
 from .recognition_errors import measured_errors as measured_errors
 from .recognition_errors import word_class as word_class
+from .routes import Anaphor as Anaphor
+from .routes import ConditionRelation as ConditionRelation
+from .routes import DrivingPlan as DrivingPlan
+from .routes import PlaceReference as PlaceReference
+from .routes import PlanStep as PlanStep
+from .routes import StepAction as StepAction
+from .routes import StepChange as StepChange
+from .routes import StepCondition as StepCondition
 from .speaker_style import SpeakerStyle as SpeakerStyle
 from .speaker_style import draw_style as draw_style
 from .transactions import Annotator as Annotator

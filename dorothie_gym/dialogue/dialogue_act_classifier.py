@@ -9,8 +9,19 @@ from dataclasses import dataclass
 
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
-from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, strings
+from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, split_words, strings
+from dorothie_gym.dialogue.move_decision import (
+    belong_together,
+    decide,
+    formula_move,
+    formula_moves,
+    in_context,
+    joined,
+    sign_of_hearing,
+    stand_apart,
+)
 from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot, SlotValue
@@ -80,8 +91,27 @@ _AIMED = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 
 _ASKED_FOR = (ActionValue.QUERIED, ObjectClass.QUERIED)
 
-_MOVING = frozenset({ActionValue.STOP, ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
-"""Actions whose negation is a command to continue: "don't stop here"."""
+_HUMS = frozenset({"mm hm", "mm hmm", "mhm", "mmhm", "uh huh", "aha"})
+"""Words that answer yes, or show that something was heard, if the other speaker has just spoken."""
+
+_OVERRULED = frozenset(
+    {
+        DialogueMove.INSTRUCT,
+        DialogueMove.EXPLAIN,
+        DialogueMove.CHECK,
+        DialogueMove.QUERY_YN,
+        DialogueMove.QUERY_W,
+        DialogueMove.CLARIFY,
+        DialogueMove.REPLY_W,
+    }
+)
+"""Moves of the cues that give way to a formula, besides those that formulas have."""
+
+_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_Y})
+"""Moves whose formulas ask with a question mark."""
+
+_ROADS = frozenset({"lane", "lanes", "road", "junction", "traffic", "jam", "turning"})
+"""Words that no small talk holds."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +168,16 @@ def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
 
 def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct:
     """Returns the dialogue act of a parsed text; see `guess_act`."""
+    formula = formula_move(_plain_words(parsed.text))
+    if parsed.question and formula in _SIGNS:
+        formula = None  # "got it?"
+    if after is None and parsed.masked.strip(" ,") in _HUMS:
+        formula = DialogueMove.REPLY_Y
     move = _move_of(parsed)
+    if formula is not None and (move in _OVERRULED or move in formula_moves()):
+        move = formula
+    elif formula is None:
+        move = decide(parsed, move, after)
     if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in parsed.statuses and parsed.masked.startswith("#status"):
         move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" a statement
     elif move is DialogueMove.EXPLAIN and _is_bare_place(parsed):
@@ -148,7 +187,14 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
         # Small talk remains irrelevant, unless it is a bare answer: "the blue one".
         if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(parsed)):
             move = changes.get(move, move)
+    if sign_of_hearing(parsed, move, after):
+        move = DialogueMove.ACKNOWLEDGE
     return DialogueAct(move, _slots(parsed, move))
+
+
+def _plain_words(text: str) -> list[str]:
+    lists = word_lists()
+    return without_asides(without_vocative(split_words(text), lists), lists)
 
 
 def _is_bare_place(parsed: ParsedText) -> bool:
@@ -189,6 +235,8 @@ def _is_small_talk(parsed: ParsedText) -> bool:
     if any(status is not GoalStatus.PENDING for status in parsed.statuses):  # "later" is unspecific
         return False
     words = set(parsed.masked.split())
+    if not words.isdisjoint(_ROADS):
+        return False
     return not words.isdisjoint(_cues().small_talk) and words.isdisjoint(_cues().reports)
 
 
@@ -199,15 +247,17 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
     if move is DialogueMove.CONFUSE:
         values -= set(_ASKED_FOR)  # "what was that?" asks for a repetition, not for an object
     if parsed.denied and move is DialogueMove.INSTRUCT:
-        values -= set(parsed.denied)
-        if not any(isinstance(value, ActionValue) for value in values) and not _MOVING.isdisjoint(parsed.denied):
-            values.add(ActionValue.LANE_FOLLOW)
+        if parsed.parse is not None and parsed.parse.forbidding:
+            values.discard(ActionValue.LANE_FOLLOW)  # "don't turn" names a turn
+        elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
+            values -= set(parsed.denied)  # "don't turn, keep going"
     # One goal is abandoned in favour of another.
     if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1:
         values.add(GoalStatus.ONGOING)
     return frozenset(values)
 
 
+@functools.lru_cache(maxsize=2048)
 def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
     """Segments free English into spans with one act each, at sentence ends and at commas before a new act.
 
@@ -219,11 +269,11 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
         Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
     segments = [segment for sentence in _SENTENCE_END.split(text.strip()) for segment in _segments(sentence)]
-    return tuple(
-        Span(segment, guess_act(segment, after if place == 0 else None))
-        for place, segment in enumerate(segments)
-        if segment
-    )
+    spans: list[Span] = []
+    for segment, core in joined([segment for segment in segments if segment], after):
+        act = guess_act(core, after if not spans else None)
+        spans.append(Span(segment, in_context(act, understand(core), [span.act.move for span in spans], after)))
+    return tuple(spans)
 
 
 def _segments(sentence: str) -> list[str]:
@@ -254,6 +304,10 @@ def _is_boundary(head: str, rest: str) -> bool:
     """Returns whether the texts before and after a comma are separate acts."""
     if any(part.lower().strip(" .?!,") in word_lists().vocatives for part in (head, rest)):
         return False
+    if belong_together(head, rest):
+        return False
+    if stand_apart(head, rest):
+        return True
     first, second = guess_act(head), guess_act(rest)
     if second.move is DialogueMove.ALIGN:
         # "turn left, did you get that?" has two acts, "hello, can you hear me?" has one.

@@ -23,6 +23,13 @@ _RIGHT_OPENS = frozenset({"you", "so", "well", "ho", "i"})
 
 _DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
 _CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
+_SAYS = frozenset({"it's", "that's"})
+_ENDS = frozenset({"", ",", "then", "and", "at", "again"})
+"""Words behind "it's left" where it is a direction."""
+
+_LISTED = frozenset({"left", "right", "lefts", "rights"})
+"""Words of which "right, then ..." needs one to begin a list of turns."""
+
 _TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "back", "around", "way", "round"})
 
 
@@ -82,8 +89,9 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
         after = words[place + 1] if place + 1 < len(words) else ""
         if word == "right":
             following = words[place + 2] if place + 2 < len(words) else ""
-            masked[place] = _right(before, after, following, place, lists)
-        elif word == "left" and before in lists.left_not_after:
+            listed = place == 0 and list(words[1:3]) == [",", "then"] and not _LISTED.isdisjoint(words[3:6])
+            masked[place] = "right" if listed else _right(before, after, following, place, lists)
+        elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):
             masked[place] = "#left"
         elif word == "straight" and after == "away":
             masked[place] = "#ok"

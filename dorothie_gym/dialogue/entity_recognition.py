@@ -89,18 +89,23 @@ class Mention:
         value: the slot value.
         start: index of its token in the masked words.
         guessed: whether the match is approximate.
+        first: its first word.
+        contracted: whether its last word ends in "'s".
     """
 
     value: SlotValue
     start: int
     guessed: bool = False
+    first: str = ""
+    contracted: bool = False
 
 
-def find_names(words: Sequence[str]) -> tuple[list[Mention], list[str]]:
+def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Mention], list[str]]:
     """Finds the names in a sequence of words, preferring the longest match at each position.
 
     Args:
         words: lower-case words, see `lexicon.split_words`.
+        statuses: whether to find statuses ("instead of", "done") as well.
 
     Returns:
         The mentions in order, and the words with each mention replaced by "#landmark", "#street", "#object" or
@@ -117,13 +122,13 @@ def find_names(words: Sequence[str]) -> tuple[list[Mention], list[str]]:
             masked.append(word)
             place += 1
             continue
-        value, length = _at(words, place)
+        value, length = _at(words, place, statuses)
         if value is None:
             masked += words[place : place + length]
         else:
-            mentions.append(
-                Mention(value, len(masked), guessed=word not in index and word.removesuffix("'s") not in index)
-            )
+            guessed = word not in index and word.removesuffix("'s") not in index
+            contracted = words[place + length - 1].endswith("'s")
+            mentions.append(Mention(value, len(masked), guessed=guessed, first=word, contracted=contracted))
             masked.append("#what" if value.label == "Queried" else f"#{value.slot.label.lower()}")
             if value.slot is Slot.STREET and place + length < len(words):
                 length += words[place + length] in _STREET_KINDS
@@ -131,10 +136,15 @@ def find_names(words: Sequence[str]) -> tuple[list[Mention], list[str]]:
     return mentions, masked
 
 
-def _at(words: tuple[str, ...], place: int) -> tuple[SlotValue | None, int]:
+def _at(words: tuple[str, ...], place: int, statuses: bool) -> tuple[SlotValue | None, int]:
     for name, value in _index().get(words[place], ()):
+        if not statuses and value is not None and value.slot is Slot.STATUS:
+            continue
         if words[place : place + len(name)] == name:
             return value, len(name)
+        if len(name) > 1 and value is not None and value.slot is Slot.LANDMARK:
+            if words[place : place + len(name)] == (*name[:-1], f"{name[-1]}'s"):
+                return value, len(name)
     word = words[place].removesuffix("'s")
     if word != words[place] and (word,) in load_lexicon().names:
         return load_lexicon().names[word,], 1

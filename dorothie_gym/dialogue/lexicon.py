@@ -14,6 +14,9 @@ import yaml
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, Slot, SlotValue
 
+_LOADER: type[yaml.CSafeLoader | yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Safe loader of libyaml, where PyYAML has it: ten times as fast."""
+
 _FORMS = frozenset({"say", "also", "again", "here", "the", "order", "tail", "hear"})
 _HEARD_FORMS = ("say", "also", "the", "tail", "hear")
 _ARTICLES = frozenset({"a", "an", "the", "some"})
@@ -96,7 +99,7 @@ def read_data(name: str) -> YamlMapping:
     """
     text = resources.files("dorothie_gym.dialogue").joinpath("data", name).read_text(encoding="utf-8")
     try:
-        data = yaml.safe_load(text)
+        data = yaml.load(text, Loader=_LOADER)
     except yaml.YAMLError as error:
         raise PhraseFileError(f"{name}: not readable as YAML: {error}") from error
     if not isinstance(data, dict):

@@ -192,7 +192,8 @@ class _Sentence:
         body = template.body.phrase.say(realizer)
         body = self._decorated(body, template)
         close = template.close.say(realizer)
-        whole = act.move is _IRRELEVANT or "cause" in template.needs  # a cause says all that the act names
+        # a cause, and a plan, say all that the act names
+        whole = act.move is _IRRELEVANT or not template.needs.isdisjoint(("cause", "plan"))
         missing = () if whole else realizer.values.keys() - template.covers
         for slot in SPOKEN_SLOTS if missing else ():
             if slot in missing:

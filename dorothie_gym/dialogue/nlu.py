@@ -12,7 +12,13 @@ from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal,
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
+from dorothie_gym.dialogue.plan_fields import named_actions, planned_change, planned_number, planned_turns
+from dorothie_gym.dialogue.plan_parser import PlanParse
+from dorothie_gym.dialogue.plan_reading import read_plan, with_plain_lights
 from dorothie_gym.dialogue.propositions import Proposition
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.routes import DrivingPlan
+from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.slots import (
     SLOT_VALUES,
@@ -84,15 +90,6 @@ _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
 _DISTANCE_UNITS = frozenset({"m", "meter", "meters", "metre", "metres", "feet", "yards"})
 _OPENING = frozenset({",", "oh", "well", "hmm", "um", "uh", "er", "ah", "hm", "like", "okay", "ok"})
-_ENDEARING = frozenset({"my", "dear", "lovely", "old"})
-_AFTER_ADDRESSEE = frozenset(
-    {
-        ",", "?", "please", "can", "could", "would", "will", "are", "do", "did", "have", "is", "how", "what", "where",
-        "which", "who", "i", "we", "let's", "turn", "stop", "go", "take", "drive", "slow", "keep", "head", "follow",
-        "make", "pull",
-    }
-)  # fmt: skip
-"""Words after a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""
 _DENIAL = re.compile(
     r"(don't|do not|dont|never|not|instead of|rather than|without)"
     r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
@@ -135,6 +132,8 @@ class ParsedText:
         question: whether the text contains a question mark.
         asked: proposition of a question, if the words determine it; slot values identify other questions.
         about_hearing: whether the words ask if the listener hears, rather than understands: "can you hear me?".
+        plan: steps of driving that the text asks for; empty for a question or a statement.
+        parse: what the parser of plans made of the text.
         told: proposition of a statement about weather, crowds, sensors or the view, if the words determine it.
     """
 
@@ -164,6 +163,8 @@ class ParsedText:
     asked: Proposition | None = None
     about_hearing: bool = False
     told: Proposition | None = None
+    plan: DrivingPlan = DrivingPlan()
+    parse: PlanParse | None = None
 
     @property
     def direction(self) -> Direction | None:
@@ -187,7 +188,8 @@ def understand(text: str) -> ParsedText:
         The parsed text. Every text is accepted.
     """
     lists = word_lists()
-    said = _without_vocative(split_words(text), lists)
+    parse = read_plan(text)
+    said = without_asides(with_plain_lights(without_vocative(split_words(text), lists)), lists, machines=True)
     spoken = " ".join(said)
     mentions, words = find_names(said)
     words = mask_directions(words, lists)
@@ -198,9 +200,11 @@ def understand(text: str) -> ParsedText:
     mentions = _unretracted(mentions, words, joined)
     stems = {word[:4] for word in words}
     acted, actions, denied = _actions(masked, stems)
+    actions = named_actions(actions, parse)
     named = _distinct([*(mention.value for mention in mentions), *_queried_values(masked, words)])
+    named = _meant(named, actions, parse)
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
-    turns = find_turns(words, lists)
+    turns = planned_turns(find_turns(words, lists), parse)
     return ParsedText(
         text=text,
         masked=masked,
@@ -209,7 +213,7 @@ def understand(text: str) -> ParsedText:
         ordinal=next((turn.ordinal for turn in turns if turn.ordinal is not None), find_ordinal(words, lists)),
         actions=actions,
         denied=denied,
-        landmarks=tuple(value for value in named if isinstance(value, LandmarkName)),
+        landmarks=_unique(value for value in named if isinstance(value, LandmarkName)),
         streets=tuple(value for value in named if isinstance(value, StreetName)),
         objects=tuple(value for value in named if isinstance(value, ObjectClass)),
         statuses=tuple(value for value in named if isinstance(value, GoalStatus)),
@@ -217,10 +221,10 @@ def understand(text: str) -> ParsedText:
         past=_following(landmarks, words, _PAST) if landmarks else (),
         dropped=_following(landmarks, words, lists.dropping) if landmarks else (),
         order=order[1] if not _ORDER_WORDS.isdisjoint(words) and (order := _ORDER.search(joined)) else None,
-        faster=None if stems.isdisjoint(_SPEED_STEMS) else _faster(masked),
+        faster=planned_change(parse, None if stems.isdisjoint(_SPEED_STEMS) else _faster(masked)),
         lights=None if stems.isdisjoint(_LIGHT_STEMS) else _lights(words, joined),
-        speed=speed,
-        distance=distance,
+        speed=planned_number(parse, "speed", speed),
+        distance=planned_number(parse, "distance", distance),
         here="here" in words,
         further=_FURTHER.search(joined) is not None,
         affirms=_affirms(words, lists),
@@ -228,46 +232,27 @@ def understand(text: str) -> ParsedText:
         asked=_first("questions", "asks", masked),
         about_hearing="?" in words and _HEARING.search(spoken) is not None,
         told=_first("statements", "says", _stated(masked)) or _first("statements", "says", _stated(spoken)),
+        plan=parse.plan,
+        parse=parse,
     )
+
+
+def _meant(named: list[SlotValue], actions: Sequence[ActionValue], parse: PlanParse) -> list[SlotValue]:
+    """Returns the values that the words name, with somebody who is to be fetched, and without withdrawn orders."""
+    found = list(named)
+    if parse.person:
+        found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
+        found.append(LandmarkName.PERSON)
+    driving = bool(actions) or any(isinstance(value, StreetName) for value in found)
+    if parse.repaired or (driving and not any(isinstance(value, LandmarkName) for value in found)):
+        found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, Bishop"
+    return found
 
 
 def _stated(text: str) -> str:
     """Returns the words before a question in the same breath: "it's foggy" of "it's foggy, shall I slow down?"."""
     head, mark, _ = text.rpartition("?")
     return head[: max(head.rfind(","), head.rfind("."), 0)] if mark else text
-
-
-def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative: at the end ("stop here, man"), at the start, or after a greeting."""
-    while words and words[-1] == ",":
-        words.pop()
-    words = _without_addressee(words, lists)
-    marked = words[-1:] == ["?"]
-    end = len(words) - marked
-    for length in (1, 2):
-        if (
-            end > length + 1
-            and words[end - length - 1] == ","
-            and " ".join(words[end - length : end]) in lists.vocatives
-        ):
-            return words[: end - length - 1] + words[end:]
-        if len(words) > length + 1 and words[length] == "," and " ".join(words[:length]) in lists.vocatives:
-            return words[length + 1 :]
-    return words
-
-
-def _without_addressee(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative that follows a greeting or thanks, a comma between or not: "hi dear car"."""
-    opening = next((n for n in (2, 1) if " ".join(words[:n]) in lists.addressing and len(words) > n), 0)
-    if not opening:
-        return words
-    begin = opening + (words[opening] == ",")
-    begin += words[begin : begin + 1] != [] and words[begin] in _ENDEARING
-    for end in (begin + 2, begin + 1):
-        if " ".join(words[begin:end]) in lists.vocatives and (end >= len(words) or words[end] in _AFTER_ADDRESSEE):
-            joint = [","] if end < len(words) and words[end] not in (",", "?") else []
-            return words[:opening] + joint + words[end:]
-    return words
 
 
 def _unretracted(mentions: list[Mention], words: Sequence[str], joined: str) -> list[Mention]:

@@ -59,7 +59,7 @@ class Predicate(enum.StrEnum):
     LOOKS = "looks"
     """The building or person at a landmark has a feature."""
     WEATHER = "weather"
-    """A parameter of the weather is high (or low)."""
+    """A parameter of the weather is high (or low), now or later in the day."""
     VISIBILITY = "visibility"
     """The speaker sees far enough, or so far; negated: the view is poor."""
     BLOCKED = "blocked"
@@ -98,7 +98,7 @@ class Predicate(enum.StrEnum):
     LIGHTS_ON = "lights_on"
     """The headlights are on."""
     DRIVES_AT = "drives_at"
-    """The car drives at a speed, or is set to it."""
+    """The car drives at a speed, or is set to it; as a limit, the street allows no more."""
     ARRIVED = "arrived"
     """The car has arrived at a landmark."""
     POSSIBLE = "possible"
@@ -145,6 +145,7 @@ _ACTION: Final[Mapping[str, _Kind]] = {
     "street": StreetName,
     "place": LandmarkName,
     "speed": int,
+    "object": ObjectClass,
 }
 
 PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
@@ -154,7 +155,7 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.LOCATED: {**_PLACE, "street": StreetName, "cross": StreetName, "side": Direction},
         Predicate.NEAR: {**_PLACE, "landmark": LandmarkName, "object": ObjectClass},
         Predicate.LOOKS: {**_PLACE, "object": ObjectClass, "feature": str},
-        Predicate.WEATHER: {"parameter": WeatherParameter, "high": bool, "object": ObjectClass},
+        Predicate.WEATHER: {"parameter": WeatherParameter, "high": bool, "object": ObjectClass, "later": bool},
         Predicate.VISIBILITY: {"metres": int},
         Predicate.BLOCKED: {"object": ObjectClass, "prop": PropKind, "street": StreetName},
         Predicate.CROWDED: {"object": ObjectClass},
@@ -173,7 +174,7 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.SHORTER: {"street": StreetName},
         Predicate.LOCALISED: {},
         Predicate.LIGHTS_ON: {"action": ActionValue},
-        Predicate.DRIVES_AT: {"speed": int, "action": ActionValue},
+        Predicate.DRIVES_AT: {"speed": int, "action": ActionValue, "limit": bool},
         Predicate.ARRIVED: _PLACE,
         Predicate.POSSIBLE: _ACTION,
         Predicate.SAFE: {},

@@ -244,6 +244,10 @@ class SlotRealizer:
         """Returns the name of the landmark to drive past."""
         return self.place(self._wording.past)
 
+    def plan(self) -> str:
+        """Returns the words of a driving plan."""
+        return self._wording.plan or ""
+
     def dropped(self) -> str:
         """Returns the name of the abandoned landmark."""
         return self.place(self._wording.dropped)
@@ -335,6 +339,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "distance": SlotRealizer.distance,
         "past": SlotRealizer.past,
         "dropped": SlotRealizer.dropped,
+        "plan": SlotRealizer.plan,
         "seconds": SlotRealizer.duration,
         "metres": SlotRealizer.metres,
         "cause": SlotRealizer.clause,

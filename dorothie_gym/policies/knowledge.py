@@ -17,6 +17,7 @@ from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
+from dorothie_gym.policies.guidance_config import USUAL_SPEED
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 
@@ -79,6 +80,7 @@ class CoWizardKnowledge:
         standstill: current or last standstill.
         rests_for: obstacle for which the car stops by a decision.
         rests_until: end of that stop [s].
+        usual_speed: cruise speed where nothing is said about it [km/h].
     """
 
     town: Town
@@ -102,3 +104,4 @@ class CoWizardKnowledge:
     standstill: Standstill
     rests_for: ObjectClass = ObjectClass.UNLABELED
     rests_until: float = -math.inf
+    usual_speed: int = USUAL_SPEED

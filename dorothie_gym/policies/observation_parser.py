@@ -1,4 +1,4 @@
-"""Observations and heard utterances read into typed records."""
+"""Observations read into typed records."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
-from dorothie_gym.dialogue.nlu import ParsedText, understand
-from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
@@ -21,14 +18,12 @@ from dorothie_gym.session.spaces.observations import (
     ObjectColumn,
     ObservationMapping,
     SubgoalColumn,
-    heard_acts,
 )
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import Rows
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
-    from dorothie_gym.ontology.roles import Role
 
 PARAMETERS = tuple(WeatherParameter)
 
@@ -289,38 +284,3 @@ def place_ahead(lanes: Rows[LaneLength], path: Rows[int], lane: int, ahead: floa
             return number, ahead
         ahead -= length
     return -1, 0.0
-
-
-# --- heard utterances -------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, kw_only=True)
-class HeardUtterance:
-    """Utterance that ended since the last decision, as a policy reads it from its observation.
-
-    Attributes:
-        acts: acts in order; classified from the words where acts are not observed.
-        words: parsed words.
-    """
-
-    acts: tuple[DialogueAct, ...]
-    words: ParsedText
-
-
-def heard_utterance(
-    observation: ObservationMapping, speaker: Role, after: DialogueMove | None = None
-) -> HeardUtterance | None:
-    """Returns the utterance completed since the last decision, or None; acts that are not observed are classified.
-
-    Args:
-        observation: observation of the listener.
-        speaker: role of the speaker.
-        after: last move of the listener, as context of the classification.
-    """
-    text = str(observation[f"{speaker}_text"])
-    acts = heard_acts(observation, speaker)
-    if not text and not acts:
-        return None
-    if acts is None:
-        acts = tuple(span.act for span in guess_spans(text, after))
-    return HeardUtterance(acts=acts, words=understand(text))

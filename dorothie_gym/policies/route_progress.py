@@ -356,12 +356,14 @@ class RouteState:
         blocked: places beyond roadblocks.
         avoided: places excluded because the car missed the goal after passing them, the latest last.
         misses: number of times that the car has driven past the goal.
+        kept_off: places on the streets that the car is to keep off.
     """
 
     progress: RouteProgress | None = None
     blocked: tuple[Place, ...] = ()
     avoided: tuple[Place, ...] = ()
     misses: int = 0
+    kept_off: tuple[Place, ...] = ()
 
     @property
     def to_goal(self) -> RouteProgress:
@@ -373,7 +375,7 @@ class RouteState:
     @property
     def closed(self) -> tuple[Place, ...]:
         """Places that the planner must not use."""
-        return self.blocked + self.avoided
+        return self.blocked + self.avoided + self.kept_off
 
     def with_progress(self, progress: RouteProgress | None) -> RouteState:
         """Sets the route, or gives it up (None)."""
@@ -400,6 +402,20 @@ class RouteState:
     def avoiding(self, town: Town, start: Place, place: Place) -> RouteState:
         """Excludes a place, in addition to the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
         return replace(self, avoided=(*self.avoided, place)[-MOST_AVOIDED:]).replanned(town, start)
+
+    def keeping_off(self, town: Town, streets: frozenset[int], here: int) -> RouteState:
+        """Excludes the lanes of some streets; junctions with them can be crossed, and the present lane left.
+
+        Args:
+            town: the map.
+            streets: indices of the streets.
+            here: lane of the car.
+        """
+        spared = (here, *lanes_beside(town, here))
+        kept = (lane for lane in town.lanes if lane.street in streets and not lane.in_junction)
+        lanes = (lane for lane in kept if lane.id not in spared)
+        places = tuple((lane.id, lane.length / 2.0) for lane in lanes)
+        return replace(self, kept_off=tuple(dict.fromkeys((*self.kept_off, *places))))
 
     def knows_roadblock(self, place: Place) -> bool:
         """Returns whether a roadblock at a place is one of those known."""

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.conversation import INAUDIBLE
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
+from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.routes import PlanStep
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, SlotValue
 from dorothie_gym.speech.language import punctuation_model
@@ -50,12 +52,14 @@ class SpokenUnderstanding:
         act: act of the best hypothesis; Irrelevant if nothing was recognised.
         confidence: share of the hypotheses, by weight, that have this act, in [0, 1].
         alternatives: other acts with their shares, the most probable first.
+        steps: steps of the driving plan of the best hypothesis, each with the share of the hypotheses that have it.
     """
 
     text: str
     act: DialogueAct
     confidence: float
     alternatives: tuple[tuple[DialogueAct, float], ...] = ()
+    steps: tuple[tuple[PlanStep, float], ...] = ()
 
 
 @functools.lru_cache(maxsize=8192)
@@ -112,9 +116,14 @@ def understand_speech(recognition: Recognition, after: DialogueMove | None = Non
     if not recognition.hypotheses:
         return SpokenUnderstanding(text=INAUDIBLE, act=DialogueAct(DialogueMove.IRRELEVANT), confidence=0.0)
     shares: dict[DialogueAct, float] = defaultdict(float)
+    steps: dict[PlanStep, float] = defaultdict(float)
     for hypothesis in recognition.hypotheses:
-        shares[guess_act(readable(hypothesis.text), after)] += hypothesis.weight
+        words = readable(hypothesis.text)
+        shares[guess_act(words, after)] += hypothesis.weight
+        for step in dict.fromkeys(understand(words).plan):
+            steps[step] += hypothesis.weight
     text = readable(recognition.hypotheses[0].text)
     act = guess_act(text, after)
     others = sorted(((each, share) for each, share in shares.items() if each != act), key=lambda each: -each[1])
-    return SpokenUnderstanding(text=text, act=act, confidence=shares[act], alternatives=tuple(others))
+    planned = tuple((step, steps[step]) for step in understand(text).plan)
+    return SpokenUnderstanding(text=text, act=act, confidence=shares[act], alternatives=tuple(others), steps=planned)

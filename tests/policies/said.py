@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import Wording, word_act
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue, encode_slots
-from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
+from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 
 
 def with_words(observation: dict[str, Any], speaker: Role, text: str, *acts: DialogueAct) -> dict[str, Any]:

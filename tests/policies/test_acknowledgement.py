@@ -29,19 +29,25 @@ def start(**style: float) -> tuple[CoWizardState, CoWizardView]:
     return state, CoWizardView.read(observations["co_wizard"], env.town)
 
 
-def heard_moves(words: str, action: ActionValue, seed: int, **style: float) -> list[DialogueMove]:
+def heard_moves(
+    words: str, action: ActionValue, seed: int, *, answers: bool = False, **style: float
+) -> list[DialogueMove]:
     state, view = start(**style)
-    acknowledge(state, view, action, understand(words), np.random.default_rng(seed))
+    acknowledge(state, view, action, understand(words), np.random.default_rng(seed), answers=answers)
     return [item.act.move for item in state.speech.queue]
 
 
-def test_silent_style_does_not_acknowledge():
-    assert all(heard_moves("turn left", ActionValue.J_TURN, seed, silent=1.0) == [] for seed in range(20))
+def test_silent_style_obeys_answers_without_a_word_but_acknowledges_orders():
+    for seed in range(20):
+        assert heard_moves("turn left", ActionValue.J_TURN, seed, answers=True, silent=1.0) == []
+        assert heard_moves("turn left", ActionValue.J_TURN, seed, silent=1.0)
 
 
 def test_echo_names_direction():
     state, view = start(echoes=1.0)
-    acknowledge(state, view, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
+    acknowledge(
+        state, view, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5), answers=False
+    )
     named = [item for item in state.speech.queue if item.act.slots]
     assert named and named[0].wording.direction is Direction.LEFT
 

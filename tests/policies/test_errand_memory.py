@@ -9,7 +9,7 @@ from dorothie_gym.dialogue import Predicate
 from dorothie_gym.ontology import DialogueAct, DialogueMove, GoalStatus, LandmarkName, Role
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder, kept_for_later, note_owner, remember
 from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.observation_parser import heard_utterance
+from dorothie_gym.policies.heard_utterance import heard_utterance
 from tests.policies.said import with_words
 from tests.policies.test_acknowledgement import start
 

@@ -267,3 +267,15 @@ def test_missing_and_damaged_acoustic_models_are_named(tmp_path: Path, monkeypat
     shutil.copy(models / "en-us" / "mdef", tmp_path / "en-us" / "en-us")
     with pytest.raises(SpeechError, match=r"en-us/en-us: is missing or damaged; pip install --force-reinstall pocket"):
         SphinxRecognizer()
+
+
+def test_the_steps_of_a_plan_have_the_shares_of_the_hypotheses_that_hold_them() -> None:
+    words = (
+        ("turn left at the ikea then stop", 0.6),
+        ("turn left at the ikea then", 0.3),
+        ("burn left at the pine", 0.1),
+    )
+    hypotheses = tuple(Hypothesis(text=text, weight=weight) for text, weight in words)
+    found = understand_speech(Recognition(text=words[0][0], hypotheses=hypotheses))
+    assert [step.action.value for step, _ in found.steps] == ["turn", "stop"]
+    assert [round(share, 6) for _, share in found.steps] == [0.9, 0.6]

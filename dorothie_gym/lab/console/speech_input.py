@@ -94,11 +94,14 @@ def typed_acts(message: Say, after: DialogueMove | None) -> tuple[TypedAct, ...]
 
 
 def _confirmed(spans: Sequence[TypedSpan], after: DialogueMove | None) -> tuple[TypedAct, ...]:
+    text = " ".join(span.text for span in spans)
+    proposed = {typed.text: typed.act for typed in read_typed(text, after)}
     found = []
     for k, span in enumerate(spans):
         act = read_act(span.move, span.slots)
         for part in _parts(plain_text(span.text, len(span.text))):
-            found.append(TypedAct(text=part, act=act, guess=guess_act(part, after if k == 0 else None)))
+            guess = proposed.get(part) or guess_act(part, after if k == 0 else None)
+            found.append(TypedAct(text=part, act=act, guess=guess))
     return tuple(found)
 
 

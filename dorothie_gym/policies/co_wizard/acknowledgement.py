@@ -26,9 +26,15 @@ _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 
 
 def acknowledge(
-    state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText, rng: np.random.Generator
+    state: CoWizardState,
+    view: CoWizardView,
+    action: ActionValue,
+    words: ParsedText,
+    rng: np.random.Generator,
+    *,
+    answers: bool,
 ) -> None:
-    """Acknowledges an instruction: silently, with a word, by accepting it, by repeating it, or by checking it.
+    """Acknowledges an instruction: with a word, by taking it on, by repeating it, by checking it, or not at all.
 
     Args:
         state: working copy of the state.
@@ -36,8 +42,9 @@ def acknowledge(
         action: requested action.
         words: words of the instruction.
         rng: random generator of the decision.
+        answers: whether the instruction answers a question of the car, so that it may be obeyed without a word.
     """
-    if rng.random() < state.style.silent:
+    if rng.random() < state.style.silent and answers:
         return
     wanted = act_builders.action(action, words)
     wording = Wording(
@@ -46,6 +53,9 @@ def acknowledge(
         lights=words.lights,
         speed=words.speed if action is ActionValue.SPEED_CHANGE else None,
     )
+    if action is ActionValue.STOP and (state.beliefs.goal is None or state.beliefs.exact):
+        state.say(intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")))
+        return
     at_once = action in _AT_ONCE or words.further or words.distance is not None
     if rng.random() < state.style.checks * 0.25 and not at_once:
         state.say(intend(Function.CHECK_QUESTION, wanted, wording=wording))

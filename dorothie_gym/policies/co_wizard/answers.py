@@ -11,11 +11,14 @@ import numpy as np
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot, StreetName
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
+from dorothie_gym.policies.co_wizard.drive_answers import drive_answer
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.goals import set_goal
+from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.proposition_truth import (
     believes,
     reason_to_stand,
@@ -60,13 +63,23 @@ def answer_yes_no(
     if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
         set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
     elif asked is None:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+    elif words.asked is None and ActionValue.SPEED_CHANGE in act.values(Slot.ACTION):
+        state.say(*drive_answer(state, view, Proposition.of(Predicate.DRIVES_AT), None))
+    elif asked.asks:
+        answer_open(state, view, act, words, rng)
     elif asked.predicate is Predicate.LIGHTS_ON:
         _answer_lights(state, view)
     else:
         if asked.predicate is Predicate.KNOWS:  # "it isn't on my map" need not be said twice
             state.speech = state.speech.without_statements(frozenset({Predicate.KNOWS}))
         state.say_first(judged(state.knowledge, view, asked), *_more(state, view, asked, rng))
+
+
+def asks_to_act(act: DialogueAct, words: ParsedText) -> bool:
+    """Returns whether a question asks the car to do something: "could you stop here?"."""
+    actions = set(act.values(Slot.ACTION)) - {ActionValue.LIGHT_CHANGE, ActionValue.QUERIED}
+    return bool(actions) and _REQUEST.search(words.text.lower()) is not None
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
@@ -97,11 +110,22 @@ def judged(
 
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
     """Answers a question about the headlights, which is also a request to switch them on."""
-    state.intentions = state.intentions.with_lights(True)
     state.say(judged(state.knowledge, view, Proposition.of(Predicate.LIGHTS_ON)))
-    if not view.lights:
+    switch_lights_on(state, announced=not view.lights, joined=True)
+
+
+def switch_lights_on(state: CoWizardState, *, announced: bool = True, joined: bool = False) -> None:
+    """Switches the head lights on, and says so.
+
+    Args:
+        state: working copy of the state.
+        announced: whether it is said.
+        joined: whether the remark continues the one before.
+    """
+    state.intentions = state.intentions.with_lights(True)
+    if announced:
         on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
-        state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=True))
+        state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=joined))
 
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -132,9 +156,11 @@ def answer_open(
 ) -> None:
     """Answers an open question."""
     asked, actions, landmarks = words.asked, act.values(Slot.ACTION), act.values(Slot.LANDMARK)
-    if asked is not None and asked.predicate is Predicate.ARRIVES_IN:
-        state.say(arrival(state.knowledge, view))
-    elif ActionValue.STOP in actions:
+    if GoalStatus.QUERIED in act.values(Slot.STATUS):
+        asked = Proposition.of(Predicate.TASK)
+    if asked is not None and _answer_asked(state, view, asked, act_builders.first_name(landmarks)):
+        return
+    if ActionValue.STOP in actions:
         _explain_standing(state, view)
     elif ActionValue.U_TURN in actions:
         state.say(why_turning_round(state.knowledge, view))
@@ -157,6 +183,24 @@ def answer_open(
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
 
 
+def _answer_asked(state: CoWizardState, view: CoWizardView, asked: Proposition, place: LandmarkName | None) -> bool:
+    """Answers a question by its content, where that is enough; returns whether it was."""
+    about_drive = drive_answer(state, view, asked, place)
+    if about_drive:
+        state.say(*about_drive)
+    elif asked.predicate is Predicate.BECAUSE:
+        _explain_standing(state, view)
+    elif asked.predicate is Predicate.WILL and asked.asks:
+        _name_way(state, view)
+    elif asked.predicate is Predicate.SEES and asked.asks:
+        _name_objects(state, view)
+    elif asked.predicate is Predicate.WEATHER:
+        state.say(judged(state.knowledge, view, asked))
+    else:
+        return False
+    return True
+
+
 def arrival(known: CoWizardKnowledge, view: CoWizardView) -> Remark:
     """Returns the answer to when the car will reach its goal, without content if that is unknown."""
     seconds = seconds_to_goal(known, view)
@@ -175,6 +219,10 @@ def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
             state.intentions = state.intentions.resumed()
         elif reason is not None and reason.predicate is not Predicate.GOAL:
             state.dialogue = state.dialogue.after_explaining_hazard(view.time)
+        elif reason is not None:
+            stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+            state.say(_explanation(stands, reason), replace(answer, joined=True))
+            return
     state.say(answer)
 
 
@@ -226,6 +274,9 @@ def _name_objects(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _name_way(state: CoWizardState, view: CoWizardView) -> None:
+    if state.plan.steps:
+        state.say(told_plan(state.plan.steps, Function.ANSWER))
+        return
     plan = () if state.intentions.directive is not None else _next_turns(state, view)
     if not plan:
         way, progress = wanted_exit(state, view), state.route.progress

@@ -52,6 +52,7 @@ class CoWizardConfig:
         open_road_speed: lower requested speeds are temporary [km/h].
         slow_time: duration of a temporary speed [s].
         answer_time: time after a question within which an utterance is taken for the answer [s].
+        pause_time: time after which the car drives on from a stop that was to be followed by driving on [s].
         long_standstill: standstill after which the first reason for it no longer counts [s].
         plan_junctions: junctions of the route that are searched for turns to mention.
         close_distance: distance within which a goal is called close [m].
@@ -102,6 +103,7 @@ class CoWizardConfig:
     open_road_speed: int = 20
     slow_time: float = 40.0
     answer_time: float = 12.0
+    pause_time: float = 30.0
     long_standstill: float = 60.0
     plan_junctions: int = 6
     close_distance: float = 120.0

@@ -14,13 +14,15 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
-from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
+from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no, asks_to_act, switch_lights_on
 from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
 from dorothie_gym.policies.co_wizard.goals import (
     abandon,
     accept_offer,
+    accept_street,
     approach_stop,
     complete,
     doubt,
@@ -29,24 +31,28 @@ from dorothie_gym.policies.co_wizard.goals import (
     postpone,
     set_goal,
 )
-from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn
+from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn, limit_remark
 from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
+from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, is_plain_sign, still_due
+from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts, settle_with_order, take_plan
 from dorothie_gym.policies.co_wizard.proposition_truth import believes
 from dorothie_gym.policies.co_wizard.repairs import (
+    ask_for_known_place,
     check_goal,
     expects_stop,
     is_garbled,
     is_unclear,
     is_unclear_reply,
+    names_unknown_place,
     note_contradiction,
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
+from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.speech import intend
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.policies.view_range import camera_fault
 
@@ -62,9 +68,9 @@ _STEERING = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
 )
 _COMMANDS = _STEERING | {ActionValue.STOP}
+_IDLE = frozenset({DialogueMove.IRRELEVANT, DialogueMove.ALIGN})
+_WAYS = frozenset({ActionValue.J_TURN, ActionValue.LANE_FOLLOW, ActionValue.U_TURN})
 _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
-_SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
-_PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -81,69 +87,31 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         state.commands = state.commands.reacting_until(view.time + reaction)
     done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
     state.speech = state.speech.without_told(heard.words.told)
-    before = () if done else _still_due(state)
+    before = () if done else still_due(state)
     state.speech = state.speech.cleared()
     unclear = is_unclear(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
-    if unclear or _mishears(state, heard, rng):
+    planned = planned_acts(state, heard)
+    if unclear or (_mishears(state, heard, rng) and not planned):
         state.say(intend(Function.NEGATIVE_FEEDBACK), *before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
     note_owner(state, heard)
-    for act in heard.acts:
-        react = _REACTIONS.get(act.move)
-        if react is not None:
-            react(state, view, act, heard.words, rng)
+    for number, act in enumerate(heard.acts):
+        asks = act.move in _IDLE and heard.words.question and heard.words.asked is not None
+        react = answer_open if asks else _REACTIONS.get(act.move)
+        if react is not None and number not in planned:
+            # an act without content is judged by the whole utterance: how short it is tells whether it was misheard
+            react(state, view, act, heard.words_of(number) if act.slots else heard.words, rng)
+    if planned:
+        take_plan(state, view, heard, rng)
     remember(state, heard, rng)
-    answer = _in_one_breath(state.speech.queue)
-    before = tuple(itertools.dropwhile(_is_plain_sign, before))  # the "okay" to the previous utterance is too late
+    answer = in_one_breath(state.speech.queue)
+    before = tuple(itertools.dropwhile(is_plain_sign, before))  # the "okay" to what was said before comes too late
     if before:
         before = (replace(before[0], joined=False), *before[1:])
     state.speech = state.speech.cleared().plan(*before, *answer)
-
-
-def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
-    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may answer."""
-    kept: list[Remark] = []
-    dropped = False
-    for item in state.speech.queue:
-        idle = item.act.move in _SETTLED or any(said.predicate in _PLANS for said in item.meaning)
-        dropped = dropped if item.joined else idle and not item.urgent
-        if not dropped:
-            kept.append(item)
-    if len(kept) < len(state.speech.queue):
-        state.dialogue = state.dialogue.with_proposal(None)
-    return tuple(kept)
-
-
-def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
-    """Joins the answers to an utterance.
-
-    An "okay" is dropped if another remark follows, and "what?" if a part of the utterance was understood.
-    Plans come last.
-    """
-    understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
-    answers = sorted(understood or answers[:1], key=_tells_plan)
-    plain = list(map(_is_plain_sign, answers))
-    leads = [following.joined for following in answers[1:]]
-    kept = [
-        item
-        for k, item in enumerate(answers)
-        if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
-    ]
-    return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
-
-
-def _is_plain_sign(item: Remark) -> bool:
-    """Returns whether a remark is a mere "okay"."""
-    return item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots
-
-
-def _tells_plan(item: Remark) -> bool:
-    """Returns whether a remark states a plan unasked."""
-    plan = any(said.predicate in _PLANS for said in item.meaning)
-    return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
 
 
 def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:
@@ -160,13 +128,15 @@ def _instruction(
 ) -> None:
     landmarks = tuple(name for name in act.values(Slot.LANDMARK) if name not in _UNNAMED)
     actions = tuple(value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue) and value in OBEYED)
+    if words.parse is not None and words.parse.forbidding:
+        actions = (ActionValue.LANE_FOLLOW,)  # "don't turn here"
     streets = tuple(name for name in act.values(Slot.STREET) if isinstance(name, StreetName))
     if not actions and landmarks:
         _instructed_place(state, view, act, words, rng)
     elif words.distance is not None and not view.standing and _STOP_AHEAD & set(actions):
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
         approach_stop(state, view, name, float(words.distance))
-        if state.speech.idle and rng.random() > state.style.silent:
+        if state.speech.idle:
             state.say(sign_of_hearing("ordered"))
     elif actions:
         _obey(state, view, act, actions, words, rng)
@@ -174,6 +144,8 @@ def _instruction(
         _instructed_street(state, view, streets[0])
     elif state.dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
+    elif not act.slots and names_unknown_place(state, words):
+        ask_for_known_place(state, view)
     elif not act.slots:
         state.dialogue = state.dialogue.with_orders_settled()  # another route may be tried
         _senseless(state, view, act, words, asks=state.beliefs.goal is None or is_garbled(words))
@@ -205,10 +177,14 @@ def _obey(
         state.dialogue = state.dialogue.after_steering(view.time)
         if not state.beliefs.exact:  # the car is guided and need not search for the place
             state.route = state.route.with_progress(None)
+    settle_with_order(state, actions, words)
     contradicts = note_contradiction(state, view, actions[0], words)
     for action in actions:
         OBEYED[action](state, view, act, words)
-    acknowledge(state, view, actions[0], words, rng)
+    answers = act.move is not DialogueMove.INSTRUCT and actions[0] in _WAYS
+    acknowledge(state, view, actions[0], words, rng, answers=answers)
+    if ActionValue.SPEED_CHANGE in actions and words.speed is not None:
+        state.say(*limit_remark(state, view, words.speed))
     note_order(state, view, actions[0])
     if contradicts:
         check_goal(state, view)
@@ -228,6 +204,7 @@ def _instructed_place(
         state.intentions = state.intentions.resumed()
         state.say(intend(Function.POSITIVE_FEEDBACK, act_builders.destination(landmarks[0])))
     else:
+        state.plan = state.plan.dropped()
         set_goal(
             state, view, landmarks[0], act_builders.named_streets(act), rng, sure=landmarks[0] not in words.guessed
         )
@@ -295,7 +272,7 @@ def _explanation(
             state.say(sign_of_hearing("told"))
     elif _is_here(state, view, words):
         do_stop(state, view, act, words)
-        acknowledge(state, view, ActionValue.STOP, words, rng)
+        acknowledge(state, view, ActionValue.STOP, words, rng, answers=True)
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
@@ -347,12 +324,23 @@ def _statement(
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
         state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
+        if state.beliefs.exact and state.beliefs.goal is not None:
+            state.say(intend(Function.CHECK_QUESTION, act_builders.destination(state.beliefs.goal), joined=True))
+    elif _is_called_dark(words) and not view.lights:
+        switch_lights_on(state)
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
         sees = words.told is not None and camera_fault(view.raw) is None
         state.say(sign_of_hearing("seen" if sees else "told"))
+
+
+def _is_called_dark(words: ParsedText) -> bool:
+    """Returns whether a statement says that it is dark."""
+    told = words.told
+    dark = told is not None and told.get("parameter") is WeatherParameter.SUN_ALTITUDE_ANGLE
+    return dark and told is not None and told.get("high") is True
 
 
 def _reply(
@@ -369,7 +357,7 @@ def _reply(
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
         do_turn(state, view, act, words)
-        acknowledge(state, view, ActionValue.J_TURN, words, rng)
+        acknowledge(state, view, ActionValue.J_TURN, words, rng, answers=True)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
     elif is_unclear_reply(state, view, act, words):
@@ -394,6 +382,8 @@ def _yes(
     dialogue = state.dialogue
     if dialogue.offer is not None:
         accept_offer(state, view)
+    elif dialogue.offered_street is not None:
+        accept_street(state, view)
     elif dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
     elif dialogue.proposed is not None:
@@ -417,6 +407,16 @@ def _no(
         doubt(state)
     if words.turns and not act.values(Slot.ACTION):
         do_turn(state, view, act, words)
+
+
+def _yes_no_question(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Answers a question, or carries out what is asked for in the form of one: "could you stop here?"."""
+    if asks_to_act(act, words):
+        _instruction(state, view, act, words, rng)
+    else:
+        answer_yes_no(state, view, act, words, rng)
 
 
 def _alignment(
@@ -491,6 +491,6 @@ _REACTIONS: dict[
     DialogueMove.CHECK: _check,
     DialogueMove.CONFUSE: _confusion,
     DialogueMove.IRRELEVANT: _small_talk,
-    DialogueMove.QUERY_YN: answer_yes_no,
+    DialogueMove.QUERY_YN: _yes_no_question,
     DialogueMove.QUERY_W: answer_open,
 }

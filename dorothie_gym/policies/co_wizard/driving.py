@@ -13,6 +13,9 @@ from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.intentions import Wish
+from dorothie_gym.policies.co_wizard.plan_memory import StepStage
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, slowing_distance, u_turn_start
 from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import (
@@ -41,6 +44,9 @@ CRUISE_TOLERANCE = 2.6
 STOP_MARGIN = 0.2
 """Distance by which Stop is commanded early rather than late [m]."""
 
+JUNCTION_LENGTH = 25.0
+"""Way through a junction in which the car does not stop on request [m]."""
+
 STARTING = 3.0
 """Acceleration of a car that has just started [m/s^2]."""
 
@@ -59,9 +65,21 @@ def drive(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 def _stand(state: CoWizardState, view: CoWizardView) -> Physical | None:
     """Stops a car that is meant to stand."""
-    if not state.intentions.halted or view.motion is Motion.STOPPED:
+    if not state.intentions.halted or view.motion is Motion.STOPPED or _would_stop_in_junction(state, view):
         return None
     return _stop_unless_sent(state, view)
+
+
+def _would_stop_in_junction(state: CoWizardState, view: CoWizardView) -> bool:
+    """Returns whether a stop now would leave the car in a junction; a car that is guided to a place stops anyhow."""
+    guided = state.beliefs.goal is not None and not state.beliefs.exact
+    if guided or view.standing:
+        return False
+    if state.town.lanes[view.lane].in_junction:
+        return True
+    way, choice = stopping_distance(view.speed), view.choice
+    crosses = choice is not None and view.manoeuvre is PhysicalAction.J_TURN
+    return crosses and choice is not None and choice.distance < way < choice.distance + JUNCTION_LENGTH
 
 
 def _stop_unless_sent(state: CoWizardState, view: CoWizardView) -> Physical | None:
@@ -90,7 +108,8 @@ def _stop_at_place(state: CoWizardState, view: CoWizardView) -> Physical | None:
     later = left - _way_to_next_decision(state, view) if nudge is not None else left - view.speed * state.clock.interval
     if left + later > 2.0 * STOP_MARGIN:
         return None
-    arrived = state.beliefs.goal is not None
+    planned = nudge is not None and state.plan.stage is StepStage.BEGUN and state.beliefs.exact
+    arrived = state.beliefs.goal is not None and not planned
     state.intentions = state.intentions.stopped_at_place(arrived=arrived, sent_on=nudge is not None)
     state.commands = state.commands.after_stop(view.time)
     return Physical(action=PhysicalAction.STOP)
@@ -336,7 +355,7 @@ def _set_speed_and_lights(state: CoWizardState, view: CoWizardView) -> Physical 
     intentions = state.intentions
     if intentions.speed < intentions.usual and view.time > intentions.slow_until and not intentions.creeping:
         intentions = state.intentions = intentions.with_speed(intentions.usual)
-    slowly = _goal_is_close(state, view) or _turns_soon(state, view)
+    slowly = state.plan.stops_soon or _goal_is_close(state, view) or _turns_soon(state, view)
     wanted = min(intentions.speed, state.config.gentle_speed) if slowly else intentions.speed
     if abs(view.cruise - wanted) > CRUISE_TOLERANCE:
         return Physical(action=PhysicalAction.SPEED_CHANGE, up=view.cruise < wanted)

@@ -19,7 +19,7 @@ from dorothie_gym.tasks.purposes import read_purpose
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
-    from dorothie_gym.policies.observation_parser import HeardUtterance
+    from dorothie_gym.policies.heard_utterance import HeardUtterance
 
 _TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.REPLY_W})
 _CLAUSE = re.compile(

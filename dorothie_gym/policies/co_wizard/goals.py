@@ -149,6 +149,16 @@ def _set_unknown_goal(
         state.say(no_map)
 
 
+def adopt_unknown(state: CoWizardState, name: LandmarkName) -> None:
+    """Adopts a destination that is not on the map, and says so."""
+    state.beliefs = state.beliefs.with_unknown_goal(name).with_status(name, GoalStatus.UNKNOWN)
+    state.route = state.route.with_progress(None)
+    state.intentions = state.intentions.for_unknown_goal()
+    unknown = Proposition.of(Predicate.KNOWS, negated=True, place=name)
+    unmarked = act_builders.errand(name, GoalStatus.UNKNOWN)
+    state.say(intend(Function.INFORM, unknown, unmarked, wording=Wording(topic="no_map")))
+
+
 def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
     """Records a place to visit later: acknowledges it, asks for the order, or offers to go there first."""
     state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
@@ -264,6 +274,25 @@ def _described_place(
         return None
     _, nearest = min(found)
     return nearest, state.town.lanes[nearest].length / 2
+
+
+def seek_street(state: CoWizardState, view: CoWizardView, street: StreetName) -> bool:
+    """Plans a route to the nearest part of a street; returns whether there is one."""
+    place = _described_place(state, view, (street,), ())
+    if place is None:
+        return False
+    state.route = state.route.with_progress(RouteProgress.plan(state.town, view.here, place, state.route.closed))
+    note_plan(state)
+    return True
+
+
+def accept_street(state: CoWizardState, view: CoWizardView) -> None:
+    """Drives to the street that was offered."""
+    street = state.dialogue.offered_street
+    state.dialogue = state.dialogue.with_offered_street(None)
+    if street is not None and seek_street(state, view, street):
+        state.intentions = state.intentions.without_manoeuvres().started()
+        state.say(intend(Function.ACCEPT, act_builders.action(None, street=street), wording=Wording(topic="taken")))
 
 
 def search_on(state: CoWizardState, view: CoWizardView) -> None:

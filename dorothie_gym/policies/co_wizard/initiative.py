@@ -96,6 +96,9 @@ def _give_up_wish(state: CoWizardState, view: CoWizardView, rng: np.random.Gener
         state.intentions = state.intentions.without_wish()
         refused = Proposition.of(Predicate.POSSIBLE, negated=True, action=_WISHED.get(wish))
         state.say(intend(Function.INFORM, refused, wording=Wording(topic="given_up")))
+        if wish is Wish.U_TURN and state.route.progress is None:
+            way = act_builders.action(ActionValue.QUERIED)
+            state.say(intend(Function.SET_QUESTION, way, wording=Wording(topic="another_way"), joined=True))
 
 
 def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -192,6 +195,7 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
         and intentions.directive is None
         and intentions.wish is None
         and intentions.nudge is None
+        and not state.plan.steps
         and state.route.progress is None
     )
     if not idle or intentions.creeping:

@@ -7,19 +7,22 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.actions import SPEED_STEP
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import approach_stop
 from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
+from dorothie_gym.policies.co_wizard.proposition_truth import speed_limit
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.knowledge import TOLD_TO_STOP
 from dorothie_gym.policies.route_progress import default_lane_place
+from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.sim.state.codes import Motion
 
@@ -31,6 +34,9 @@ SLOWER_DISTANCE = 20.0
 
 ASKED_SPEED_CHANGE = 10
 """Change of the cruise speed for "faster" and "slower" without a number [km/h]."""
+
+LIMIT_TOLERANCE = 3
+"""Excess over the speed limit that is not remarked on [km/h]."""
 
 SPEED_RANGE = (10, 60)
 """Range of cruise speeds that the Co-Wizard accepts [km/h]."""
@@ -97,18 +103,39 @@ def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words:
 
 
 def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    if words.speed is None and words.faster is False and not state.beliefs.exact:
+    guided = state.beliefs.goal is not None and not state.beliefs.exact
+    if words.speed is None and words.faster is False and guided:
         # without a reason given, the goal that is not on the map must be near
         approach_stop(state, view, None, SLOWER_DISTANCE)
         return
-    if words.speed is not None:
-        asked = words.speed
-    else:
-        asked = round(view.cruise) + (ASKED_SPEED_CHANGE if words.faster else -ASKED_SPEED_CHANGE)
-    low, high = SPEED_RANGE
-    asked = min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
+    asked = asked_speed(state, view, words.speed, words.faster)
     until = view.time + state.config.slow_time
     state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
+
+
+def asked_speed(state: CoWizardState, view: CoWizardView, speed: int | None, faster: bool | None) -> int:
+    """Returns the cruise speed that the car is set to on a request [km/h].
+
+    Args:
+        state: state of the Co-Wizard.
+        view: observation.
+        speed: speed asked for [km/h]; None for a change.
+        faster: direction of the change.
+    """
+    asked = speed
+    if asked is None:
+        asked = round(view.cruise) + (ASKED_SPEED_CHANGE if faster else -ASKED_SPEED_CHANGE)
+    low, high = SPEED_RANGE
+    return min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
+
+
+def limit_remark(state: CoWizardState, view: CoWizardView, speed: int) -> tuple[Remark, ...]:
+    """Returns the remark that the limit of the street is lower than a speed [km/h] asked for, if it is."""
+    limit = speed_limit(state.town, view.lane)
+    if speed < limit + LIMIT_TOLERANCE:
+        return ()
+    content = Proposition.of(Predicate.DRIVES_AT, speed=limit, limit=True)
+    return (intend(CommunicativeFunction.INFORM, content, wording=Wording(topic="limit", speed=limit), joined=True),)
 
 
 def _do_lights(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.maps.town import LightColour, Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.knowledge import CoWizardKnowledge
-from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, street_of
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.travel_time import travel_time
 from dorothie_gym.policies.view_range import FAR_SIGHT, camera_fault, sight
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support import portable_math as pm
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 NAMED_ACTIONS: Final = {
     PhysicalAction.J_TURN: ActionValue.J_TURN,
@@ -32,6 +35,12 @@ OBEYED_WITHIN: Final = 15.0
 
 DETOUR_TIME: Final = 30.0
 """Time for which an obstacle explains a U-turn [s]."""
+
+SPEED_TOLERANCE: Final = 5.0
+"""Difference up to which two speeds are called the same [km/h]."""
+
+JUNCTION_NEAR: Final = 45.0
+"""Distance to a junction from which on the car slows down for it [m]."""
 
 CROWD: Final = 3
 """Minimum number of people or vehicles in a crowd."""
@@ -58,6 +67,11 @@ def seconds_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> int | None:
         return None
     seconds = travel_time(known.town, known.progress, view.station, view.time, view.speed)
     return round(seconds) if math.isfinite(seconds) else None
+
+
+def speed_limit(town: Town, lane: int) -> int:
+    """Returns the speed limit of a lane [km/h]."""
+    return round(3.6 * town.lanes[lane].speed_limit)
 
 
 def is_localised(view: CoWizardView, most: float) -> bool:
@@ -150,7 +164,30 @@ def _is_blocked(known: CoWizardKnowledge, view: CoWizardView, said: Proposition)
     return met or view.hazard is ObjectClass.STATIC or any(thing.kind is ObjectClass.STATIC for thing in view.objects)
 
 
+def _drives_at(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    speed = said.get("speed")
+    if said.get("limit") is True:
+        return speed == speed_limit(known.town, view.lane)
+    return abs(3.6 * view.speed - speed) <= SPEED_TOLERANCE if isinstance(speed, int) else None
+
+
+def _weather_is(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether a parameter of the present weather is high; None for the weather to come."""
+    parameter = said.get("parameter")
+    judge = None if said.get("later") is True else _HIGH.get(parameter)
+    return None if judge is None else judge(view.raw) is not (said.get("high") is False)
+
+
+_HIGH: Final[dict[object, Callable[[ObservationMapping], bool]]] = {
+    WeatherParameter.FOG_DENSITY: is_foggy,
+    WeatherParameter.PRECIPITATION: is_rainy,
+    WeatherParameter.SUN_ALTITUDE_ANGLE: is_dark,
+}
+"""Parameters of the weather that the car observes; that of the sun counts as "high" when the sun is down."""
+
 _JUDGEMENTS: Final[dict[Predicate, Judgement]] = {
+    Predicate.DRIVES_AT: _drives_at,
+    Predicate.WEATHER: _weather_is,
     Predicate.SEES: lambda known, view, said: sees(view, said),
     Predicate.ON_STREET: _is_on_street,
     Predicate.LOCATED: lambda known, view, said: is_located(view, said),
@@ -176,6 +213,24 @@ _JUDGEMENTS: Final[dict[Predicate, Judgement]] = {
     ),
     Predicate.HINDERS: lambda known, view, said: view.motion is Motion.HAZARD and view.hazard is said.get("object"),
 }
+
+
+def reason_to_be_slow(known: CoWizardKnowledge, view: CoWizardView) -> Proposition:
+    """Returns why the car drives no faster; the speed limit where nothing else is in its way."""
+    limit = speed_limit(known.town, view.lane)
+    if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
+        return Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT)
+    if view.motion is Motion.HAZARD and view.hazard is not ObjectClass.UNLABELED:
+        return Proposition.of(Predicate.HINDERS, object=view.hazard)
+    if not sees_far(view) and view.cruise < limit - SPEED_TOLERANCE:
+        return Proposition.of(Predicate.VISIBILITY, negated=True)
+    if view.choice is not None and view.choice.distance < JUNCTION_NEAR:
+        return Proposition.of(Predicate.WILL, action=ActionValue.J_TURN)
+    if view.cruise < min(limit, known.usual_speed) - SPEED_TOLERANCE:
+        return Proposition.of(Predicate.TOLD, action=ActionValue.SPEED_CHANGE)
+    if view.cruise < limit - SPEED_TOLERANCE:
+        return Proposition.of(Predicate.DRIVES_AT, action=ActionValue.LANE_FOLLOW, speed=round(view.cruise))
+    return Proposition.of(Predicate.DRIVES_AT, speed=limit, limit=True)
 
 
 # --- reasons ----------------------------------------------------------------------------------------------------------

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.conversation import is_partly_inaudible
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, Slot
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import doubt
 from dorothie_gym.policies.policy import replace
@@ -19,11 +20,14 @@ if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
-    from dorothie_gym.policies.observation_parser import HeardUtterance
+    from dorothie_gym.policies.heard_utterance import HeardUtterance
 
 FRAGMENT = 3
 """Maximum number of meaningless words that count as the rest of a misheard utterance."""
 
+
+_UNKNOWN_PLACE: Final = re.compile(r"\b(take|bring|drive|get|go|head|run)\b( \w+){0,3} to (the|a|an|my|our) [a-z]{3,}")
+"""Request to drive to a place whose noun is masked by no name."""
 
 _REPEATABLE = act_builders.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
 """Moves that are repeated on request."""
@@ -48,6 +52,23 @@ _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predi
 def is_garbled(words: ParsedText) -> bool:
     """Returns whether words that make no sense are so few that they have probably been misheard."""
     return len(words.text.split()) <= FRAGMENT
+
+
+def names_unknown_place(state: CoWizardState, words: ParsedText) -> bool:
+    """Returns whether words ask a car without a destination to drive to a place that it has no name for."""
+    return state.beliefs.goal is None and _UNKNOWN_PLACE.search(words.masked) is not None
+
+
+def ask_for_known_place(state: CoWizardState, view: CoWizardView) -> None:
+    """Says that a place is not on the map, and asks where to go."""
+    unknown = Proposition.of(Predicate.KNOWS, negated=True)
+    unmarked = act_builders.errand(None, GoalStatus.UNKNOWN)
+    where = act_builders.destination(LandmarkName.QUERIED)
+    state.say(
+        intend(Function.INFORM, unknown, unmarked, wording=Wording(topic="unknown_place")),
+        intend(Function.SET_QUESTION, where, joined=True),
+    )
+    state.dialogue = state.dialogue.after_asking(view.time)
 
 
 def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:

@@ -10,11 +10,12 @@ import math
 from dataclasses import dataclass, field
 
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.beliefs import BeliefState
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.intentions import Directive, Intentions, Wish
+from dorothie_gym.policies.co_wizard.plan_memory import PlanMemory
 from dorothie_gym.policies.knowledge import TOLD_TO_STOP, CoWizardKnowledge, Standstill
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.policy import replace
@@ -39,6 +40,7 @@ class DialogueState:
         orders: latest U-turns and lane changes that the participant requested, with their times [s].
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
+        offered_street: street proposed to drive to and not answered yet.
         slower: speed that was proposed and not answered yet [km/h].
         blocked_at: time at which an obstacle across the road was last found [s].
         detour_asked_at: time of the open question about a detour [s]; None where none is open.
@@ -62,6 +64,7 @@ class DialogueState:
     orders: tuple[tuple[ActionValue, float], ...] = ()
     proposed: Directive | None = None
     offer: LandmarkName | None = None
+    offered_street: StreetName | None = None
     slower: int | None = None
     blocked_at: float = -math.inf
     detour_asked_at: float | None = None
@@ -125,6 +128,10 @@ class DialogueState:
         """Opens the proposal of a first destination; None withdraws it."""
         return replace(self, offer=place)
 
+    def with_offered_street(self, street: StreetName | None) -> DialogueState:
+        """Opens the proposal to drive to a street; None withdraws it."""
+        return replace(self, offered_street=street)
+
     def with_slower(self, speed: int | None) -> DialogueState:
         """Opens the proposal of a lower speed [km/h]; None closes it."""
         return replace(self, slower=speed)
@@ -135,7 +142,7 @@ class DialogueState:
 
     def after_refusal(self) -> DialogueState:
         """Closes all proposals."""
-        return replace(self, proposed=None, offer=None, slower=None)
+        return replace(self, proposed=None, offer=None, offered_street=None, slower=None)
 
     def with_detour_question(self, asked_at: float | None) -> DialogueState:
         """Opens the question about a detour at a time [s]; None closes it."""
@@ -228,6 +235,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
         beliefs: beliefs about destinations.
         route: route to the goal.
         intentions: driving goals of the next seconds.
+        plan: driving plan that the participant has asked for.
         commands: commands given to the car.
         standstill: current or last standstill.
     """
@@ -236,6 +244,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
     beliefs: BeliefState = field(default_factory=BeliefState)
     route: RouteState = field(default_factory=RouteState)
     intentions: Intentions
+    plan: PlanMemory = field(default_factory=PlanMemory)
     commands: CommandState = field(default_factory=CommandState)
     standstill: Standstill = field(default_factory=Standstill)
 
@@ -261,7 +270,7 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
             arrived=intentions.arrived,
             sent_on=intentions.sent_on,
             pausing=intentions.pausing,
-            directed=intentions.directive is not None,
+            directed=intentions.directive is not None or bool(self.plan.steps),
             to_turn_round=intentions.wish is Wish.U_TURN,
             asks_for_detour=dialogue.detour_asked_at is not None,
             blocked_at=dialogue.blocked_at,
@@ -271,4 +280,5 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
             standstill=self.standstill,
             rests_for=self.commands.rest_for,
             rests_until=self.commands.rest_until,
+            usual_speed=intentions.usual,
         )

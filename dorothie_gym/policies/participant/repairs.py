@@ -15,7 +15,7 @@ from dorothie_gym.policies.speech import Remark, intend, repeated
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
-    from dorothie_gym.policies.observation_parser import HeardUtterance
+    from dorothie_gym.policies.heard_utterance import HeardUtterance
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 

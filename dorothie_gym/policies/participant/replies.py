@@ -23,8 +23,8 @@ from dorothie_gym.ontology.slots import (
     StreetName,
 )
 from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
 from dorothie_gym.policies.participant.goals import announcement, describe
 from dorothie_gym.policies.participant.guidance import next_step, note_step

@@ -13,8 +13,9 @@ from typing import TypeAlias
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.notable_conditions import Noticed
-from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
+from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, Utterance, utterance_vector, word_rows
-from dorothie_gym.policies.observation_parser import heard_utterance
+from dorothie_gym.policies.heard_utterance import heard_utterance
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.dialogue_acts import DialogueMove

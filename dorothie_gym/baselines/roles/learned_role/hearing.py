@@ -18,7 +18,7 @@ from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX, LABELS, DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, SlotValue, StreetName
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.heard_utterance import HeardUtterance
 
 WORD_BUCKETS: Final = 4096
 """Number of rows of the word embedding; row 0 is padding, words are hashed into the others."""

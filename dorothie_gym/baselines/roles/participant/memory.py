@@ -33,7 +33,8 @@ from dorothie_gym.policies.speech import Remark, SpeechState
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
-    from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
+    from dorothie_gym.policies.heard_utterance import HeardUtterance
+    from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
     from dorothie_gym.policies.participant.view import ParticipantView
 
 AVERAGE: Final = ParticipantStyle(

@@ -11,8 +11,9 @@ from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Landma
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.knowledge import TOLD_TO_STOP, Standstill
-from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
+from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.session_engine import SessionEngine

@@ -10,7 +10,7 @@ from dorothie_gym.baselines.roles.learned_role.hearing import (
 )
 from dorothie_gym.dialogue import Predicate, guess_spans, understand
 from dorothie_gym.ontology import LandmarkName, StreetName
-from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.heard_utterance import HeardUtterance
 
 
 def heard(text, time=10.0):

@@ -18,7 +18,7 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Wording, guess_spans, load_lexicon, understand
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, act_builders
-from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
 from dorothie_gym.policies.speech import intend

@@ -1,0 +1,134 @@
+"""Moods of clauses: whether a clause orders, asks or states, by its opening and its first finite verb."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from dorothie_gym.dialogue.route_grammar import route_grammar
+
+
+class ClauseMood(enum.Enum):
+    """What a clause does, as far as its form tells."""
+
+    COMMAND = "command"
+    REQUEST = "request"
+    QUESTION = "question"
+    STATEMENT = "statement"
+
+
+ORDERED: Final = frozenset({ClauseMood.COMMAND, ClauseMood.REQUEST})
+"""Moods of the clauses whose steps the driver is asked for."""
+
+_BASE_FORMS: Final = frozenset({"speed", "proceed", "need", "bring", "swing"})
+"""Verbs that end as participles do."""
+
+_SUBJECT_WORDS: Final = 6
+"""Words of a clause among which its finite verb is sought."""
+
+_NO_SUBJECTS: Final = frozenset({"let's", "here's", "that's", "it's", "there's", "what's", "hour's"})
+_SUBORDINATING: Final = frozenset({"where", "when", "what", "which", "how"})
+_RELATIVE: Final = (["i"], ["we"], ["you"], ["that"], ["who"])
+_ORDERING: Final = frozenset({"actions", "verbs", "lights", "relations", "negations"})
+"""Groups of the grammar before which a finite verb must stand to make a statement."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClauseReader:
+    """Tokens of a sentence, with what tells the moods of its clauses.
+
+    Attributes:
+        words: tokens with masked names and directions.
+        question: whether a question mark ends the sentence.
+        contracted: tokens of the names that end in "'s".
+    """
+
+    words: Sequence[str]
+    question: bool
+    contracted: frozenset[int]
+
+    def mood(self, place: int, before: ClauseMood, *, new: bool) -> ClauseMood:
+        """Returns the mood of the clause that begins at a token.
+
+        Args:
+            place: the token.
+            before: mood of the clause before it.
+            new: whether the clause begins the sentence.
+        """
+        found = mood_of(self.words, place)
+        word = self.words[place] if place < len(self.words) else ""
+        if found is ClauseMood.QUESTION and not new and not self.question and word in _SUBORDINATING:
+            found = None
+        return self._inherited(place, before, new=new) if found is None else found
+
+    def _inherited(self, place: int, before: ClauseMood, *, new: bool) -> ClauseMood:
+        """Returns the mood of a clause whose opening does not tell it."""
+        if self._states(place):
+            return ClauseMood.STATEMENT
+        if new:
+            return ClauseMood.QUESTION if self.question and "," not in self.words[place:] else ClauseMood.COMMAND
+        if before is not ClauseMood.STATEMENT:
+            return ClauseMood.QUESTION if before is ClauseMood.QUESTION else ClauseMood.COMMAND
+        word = self.words[place] if place < len(self.words) else ""
+        past = word.endswith("ed") and word not in _BASE_FORMS
+        return ClauseMood.STATEMENT if past or is_participle(word) or self._names_only(place) else ClauseMood.COMMAND
+
+    def _names_only(self, place: int) -> bool:
+        """Returns whether a clause goes on with nothing but a name: "it's on the left, the Panera, stop there"."""
+        grammar, words = route_grammar(), self.words
+        end = next((number for number in range(place, len(words)) if words[number] in (",", "?")), len(words))
+        named = any(words[number].startswith("#") for number in range(place, end))
+        quiet = all(
+            words[number] not in ("left", "right") and grammar.terminals.longest(words, number) is None
+            for number in range(place, end)
+        )
+        return named and quiet
+
+    def _states(self, place: int) -> bool:
+        """Returns whether a finite verb comes before anything that is ordered: "nobody's coming", "turning left"."""
+        grammar, words = route_grammar(), self.words
+        first = words[place] if place < len(words) else ""
+        if is_participle(first):
+            return True
+        if first in grammar.subordinators:
+            return False
+        for number in range(place, min(place + _SUBJECT_WORDS, len(words))):
+            word = words[number]
+            if word == "," or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
+                return False
+            if self._is_finite(number, place):
+                return True
+            if word.startswith("#") and words[number + 1 : number + 2] in _RELATIVE:
+                return True  # "the person I have to meet is on Beal"
+            match = grammar.terminals.longest(words, number)
+            if match is not None and match.group in _ORDERING:
+                return False
+        return False
+
+    def _is_finite(self, number: int, place: int) -> bool:
+        """Returns whether a token is, or ends in, a finite verb whose subject begins at `place`."""
+        word, following = self.words[number], self.words[number + 1 : number + 2]
+        if number > place and (word in route_grammar().finite or word in route_grammar().subjects):
+            return True
+        contracted = number in self.contracted or (word.endswith("'s") and word not in _NO_SUBJECTS)
+        return contracted and following != ["#landmark"]
+
+
+def is_participle(word: str) -> bool:
+    """Returns whether a word is a form in -ing: "turning", but neither "swing" nor "anything"."""
+    return word.endswith("ing") and not word.endswith("thing") and word not in _BASE_FORMS
+
+
+def mood_of(words: Sequence[str], place: int = 0) -> ClauseMood | None:
+    """Returns what the clause that begins at a place does; None if its opening does not tell, as of "turn left"."""
+    openers = route_grammar().openers
+    while place < len(words):
+        match = openers.longest(words, place)
+        if match is None:
+            return None
+        if match.kind != "soft":
+            return ClauseMood(match.kind)
+        place += match.length
+    return None

@@ -1,0 +1,308 @@
+"""Dialogue move of a span by its form: formulas, orders and corrections that the parser has read.
+
+The questions are those of the annotators' decision tree (`ontology.DECISION_TREE`). Where the parse does not settle
+them, the cues of `dialogue_act_classifier` do.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Final
+
+from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
+from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
+from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS
+from dorothie_gym.dialogue.plan_reading import read_plan
+from dorothie_gym.dialogue.route_grammar import PhraseIndex, route_grammar
+from dorothie_gym.dialogue.routes import StepAction
+from dorothie_gym.errors import PhraseFileError
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.spellings import parse_move
+
+_FILLER: Final = "Filler"
+_DECIDING: Final = frozenset({DialogueMove.CONFUSE.label, DialogueMove.CONFIRM.label})
+"""Moves whose formulas decide for others beside them: "okay, will do"."""
+
+_SHORT: Final = 4
+"""Words of an utterance that can be a mere sign of hearing."""
+
+_NEWS: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.CONFIRM, DialogueMove.ACKNOWLEDGE})
+"""Moves of the car that a listener takes note of, or sets right."""
+
+_UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
+"""Moves that the cues give to an order of unknown form."""
+
+_ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
+_OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
+"""Words by which the car offers what it asks: "would you like me to turn?"."""
+
+_FOR_PASSENGERS: Final = frozenset({StepAction.STOP, StepAction.VISIT, StepAction.WAIT})
+"""Actions that a passenger asks for with "can I"; others the car offers."""
+
+_NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
+_FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
+"""Verbs of small talk of the first person."""
+
+_MEANT: Final = (
+    "i said",
+    "i meant",
+    "i mean",
+    "i asked",
+    "i wanted",
+    "i was wanting",
+    "i told you",
+    "that's not",
+    "not what i",
+)
+_ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
+"""Moves that yes and no answer."""
+_SPEAKERS: Final = frozenset({"i", "we", "you", "he", "she", "they"})
+_PAST: Final = frozenset(
+    {"lost", "missed", "passed", "saw", "went", "left", "forgot", "overshot", "ran", "took", "came", "found", "drove"}
+)
+_HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
+_REPAIRING: Final = frozenset(
+    {
+        "no",
+        "nope",
+        "nah",
+        "wait",
+        "mean",
+        "meant",
+        "sorry",
+        "rather",
+        "actually",
+        "scratch",
+        "correction",
+        "mistake",
+        "oops",
+        "whoops",
+        "strike",
+        "forget",
+        "make",
+        "saying",
+        "not",
+    }
+)
+"""Words of which a correction has one; others need not be tried."""
+_DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
+
+
+def formula_move(words: Sequence[str]) -> DialogueMove | None:
+    """Returns the move of words that consist of formulas only ("right, okay, thank you"); None of other words."""
+    words = [word for word in words if word != ","]
+    formulas, place = _formulas(), 0
+    found: DialogueMove | None = None
+    while place < len(words):
+        match = formulas.longest(words, place)
+        if match is None:
+            return None
+        if match.kind != _FILLER and (found is None or match.kind in _DECIDING):
+            found = parse_move(match.kind)
+        place += match.length
+    return found
+
+
+def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of a span.
+
+    Args:
+        parsed: the span.
+        move: move by the cues.
+        after: move of the other speaker before it.
+    """
+    parse = parsed.parse
+    if parse is None:
+        return move
+    answer = _first_answer(parsed) if after in _ANSWERED else None
+    if answer is not None and move is not DialogueMove.CLARIFY:
+        return answer
+    if after in _NEWS and _corrects(parsed):
+        return DialogueMove.CLARIFY
+    requested = ClauseMood.REQUEST in parse.moods
+    ordered = bool(parse.plan.steps) or bool(parse.denied and requested)
+    if ordered:
+        return _order(parsed, move, after, requested=requested)
+    if move is DialogueMove.IRRELEVANT and parsed.told is not None:
+        return DialogueMove.EXPLAIN
+    words = parsed.masked.split()
+    if after in _ANSWERED and words[:1] in (["not"], ["ain't"]) and move is not DialogueMove.REPLY_U:
+        return DialogueMove.REPLY_N
+    if words[:1] == ["i"] and words[1:2] in _FEELING and not parsed.values and words[2:3] != ["to"]:
+        return DialogueMove.IRRELEVANT if move is DialogueMove.EXPLAIN else move
+    stated = set(parse.moods) == {ClauseMood.STATEMENT} and not any(
+        words in parsed.masked for words in (" if i were you", " plenty", " enough")
+    )
+    past = len(words) > 1 and words[0] in _SPEAKERS and words[1] in _PAST  # "we lost him at the KFC"
+    if move is DialogueMove.INSTRUCT and (stated or past):
+        return DialogueMove.EXPLAIN
+    return move
+
+
+def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *, requested: bool) -> DialogueMove:
+    """Returns the move of words that order something."""
+    parse = parsed.parse
+    named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
+    news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
+    if move in _UNSURE and not named and not news:
+        return DialogueMove.INSTRUCT
+    if move in _ASKED and requested and not (move is DialogueMove.QUERY_W and parsed.question):
+        offered = any(f"{words} " in f"{parsed.masked} " for words in _OFFERS)
+        mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
+        offered = offered or (mine and not all(step.action in _FOR_PASSENGERS for step in parsed.plan))
+        return move if offered else DialogueMove.INSTRUCT
+    if move is DialogueMove.CHECK and not parsed.question:
+        return DialogueMove.INSTRUCT
+    if (
+        move is DialogueMove.REPLY_N
+        and after not in _ANSWERED
+        and parsed.masked.startswith(("no #", "no lights", "no head"))
+    ):
+        return DialogueMove.INSTRUCT
+    if move is DialogueMove.ACKNOWLEDGE and parsed.masked.startswith(("sorry", "oops", "whoops")):
+        return DialogueMove.INSTRUCT  # "sorry, left"
+    if move is DialogueMove.CLARIFY and after is DialogueMove.QUERY_W:
+        return DialogueMove.REPLY_W
+    if move is DialogueMove.CLARIFY and parsed.parse is not None and parsed.parse.repaired and after is None:
+        return DialogueMove.INSTRUCT
+    return move
+
+
+def _first_answer(parsed: ParsedText) -> DialogueMove | None:
+    """Returns the answer with which a span begins, before its first comma; None without any."""
+    words = _without_restart(split_words(parsed.text))
+    if "," not in words:
+        return None
+    move = formula_move(words[: words.index(",")])
+    return move if move in (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U) else None
+
+
+def _without_restart(words: list[str]) -> list[str]:
+    """Returns the words without a first word that is said twice: "I, I think so"."""
+    return words[2:] if len(words) > 2 and words[1] == "," and words[2] == words[0] else words
+
+
+def _corrects(parsed: ParsedText) -> bool:
+    """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
+    if parsed.question:
+        return False
+    if any(phrase in parsed.masked for phrase in _MEANT):
+        return True
+    if not (parsed.plan.steps or parsed.values):
+        return False
+    words = parsed.masked.split()
+    return not _DENIALS.isdisjoint(words[:3]) or any(phrase in parsed.masked for phrase in _MEANT)
+
+
+def sign_of_hearing(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> bool:
+    """Returns whether unknown words that follow news are a mere sign of having heard them."""
+    short = len([word for word in parsed.masked.split() if word != ","]) <= _SHORT
+    empty = not parsed.values and not parsed.plan.steps and not parsed.question
+    return move is DialogueMove.IRRELEVANT and after in _NEWS and short and empty
+
+
+def in_context(
+    act: DialogueAct, parsed: ParsedText, before: Sequence[DialogueMove], after: DialogueMove | None
+) -> DialogueAct:
+    """Returns the act of a span among the others of its utterance.
+
+    An answer, or a correction, goes on over the orders that follow it; without a question, "the second left" is none.
+
+    Args:
+        act: act of the span alone.
+        parsed: the span.
+        before: moves of the earlier spans of the utterance.
+        after: move of the other speaker before the utterance.
+    """
+    move, ordered = act.move, bool(parsed.plan.steps)
+    answers = after is DialogueMove.QUERY_W or "i'd say" in parsed.masked
+    if move is DialogueMove.REPLY_W and ordered and not answers:
+        move = DialogueMove.INSTRUCT
+    goes_on = after is DialogueMove.QUERY_W and set(before) == {DialogueMove.REPLY_W}
+    if move is DialogueMove.INSTRUCT and before and goes_on and ordered:
+        move = DialogueMove.REPLY_W
+    return act if move is act.move else DialogueAct(move, act.slots)
+
+
+def belong_together(head: str, rest: str) -> bool:
+    """Returns whether the words before and after a comma are one span: a condition and its order, or a correction."""
+    first, second = read_plan(head), read_plan(rest)
+    opens = route_grammar().terminals.longest(split_words(head), 0) if split_words(head) else None
+    when = opens is not None and opens.group == "relations"
+    if (
+        (first.waiting or when)
+        and not first.plan.steps
+        and second.plan.steps
+        and ClauseMood.STATEMENT not in first.moods[:1]
+    ):
+        return True
+    if _REPAIRING.isdisjoint(split_words(rest)[:4]) and _REPAIRING.isdisjoint(split_words(head)[-4:]):
+        return False
+    return read_plan(f"{head} {rest}").repaired and not first.repaired and not second.repaired
+
+
+def stand_apart(head: str, rest: str) -> bool:
+    """Returns whether a comma separates a statement from an order, or an order from a statement."""
+    first, second = read_plan(head), read_plan(rest)
+    if formula_move(split_words(rest)) is not None:
+        return False
+    states, orders = {ClauseMood.STATEMENT}, bool(second.plan.steps)
+    if set(first.moods) == states and orders and second.moods[0] in ORDERED:
+        return bool(read_plan(f"{head}, {rest}").plan.steps)  # not in "here we are, the KFC"
+    return bool(first.plan.steps) and set(second.moods) == states and not second.repaired
+
+
+def joined(segments: Sequence[str], after: DialogueMove | None) -> list[tuple[str, str]]:
+    """Returns the segments of an utterance with those joined to the next one that are no act of their own.
+
+    These are hesitations, counts ("one, straight on"), conditions that wait for their order, and, behind news, the "no"
+    of a correction.
+
+    Returns:
+        The segments, each with its words that tell the act: without hesitations and counts.
+    """
+    found: list[tuple[str, str]] = []
+    for segment in segments:
+        if found and _is_noise(found[-1][1]):
+            full = f"{found[-1][0]} {segment}"
+            found[-1] = full, segment if understand(segment).plan.steps or len(split_words(segment)) > 2 else full
+        elif found and _is_unfinished(found[-1][1], segment, after if len(found) == 1 else None):
+            found[-1] = f"{found[-1][0]} {segment}", f"{found[-1][1]} {segment}"
+        else:
+            found.append((segment, segment))
+    return found
+
+
+def _is_noise(segment: str) -> bool:
+    words = [word for word in split_words(segment) if word != ","]
+    return bool(words) and all(word in _HESITATIONS or word in NUMBER_WORDS for word in words)
+
+
+def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> bool:
+    words = [word for word in split_words(segment) if word != ","]
+    parse, rest = read_plan(segment), read_plan(following)
+    if parse.waiting and not parse.described and rest.plan.steps and len(rest.plan) == 1:
+        return True
+    denial = after in _NEWS and formula_move(words) is DialogueMove.REPLY_N
+    return denial and bool(rest.plan.steps or not _DENIALS.isdisjoint(split_words(following)))
+
+
+@functools.cache
+def formula_moves() -> frozenset[DialogueMove]:
+    """Returns the moves that have formulas; the cues alone tell others."""
+    return frozenset(parse_move(kind) for kind in read_data("formulas.yaml") if kind != _FILLER)
+
+
+@functools.cache
+def _formulas() -> PhraseIndex:
+    rows = []
+    for kind, phrases in read_data("formulas.yaml").items():
+        if kind != _FILLER:
+            parse_move(kind)
+        rows += [("formulas", kind, text) for text in strings(f"formulas.yaml: {kind}", phrases)]
+    if not rows:
+        raise PhraseFileError("formulas.yaml: lists no phrases")
+    return PhraseIndex(rows, adverbs=False)

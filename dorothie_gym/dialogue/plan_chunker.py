@@ -1,0 +1,456 @@
+"""Chunker of route talk: tokens of a sentence become actions, turns, conditions, places, sides and quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from dorothie_gym.dialogue.numerals import read_cardinals, read_ordinal
+from dorothie_gym.dialogue.plan_items import (
+    ActionItem,
+    BoundaryItem,
+    ConditionItem,
+    DistanceItem,
+    Item,
+    LaneItem,
+    NegationItem,
+    NounPhrase,
+    RepairItem,
+    SideItem,
+    SpeedItem,
+    TurnItem,
+    UnitItem,
+    VerbItem,
+    WordItem,
+)
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.route_grammar import Match, RouteGrammar, route_grammar
+from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
+
+_SIDES: Final[Mapping[str, Direction]] = {
+    "left": Direction.LEFT,
+    "right": Direction.RIGHT,
+    "leftwards": Direction.LEFT,
+    "rightwards": Direction.RIGHT,
+    "lefts": Direction.LEFT,
+    "rights": Direction.RIGHT,
+}
+_SIDE_WORDS: Final = frozenset({"on", "at", "to", "in", "into", "onto", "along", "down"})
+_BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "got", "with", "see", "need", "want"})
+"""Words behind which "no" says that there is none, and corrects nothing."""
+_ADJECTIVES: Final = frozenset({"fast", "slow", "quick", "quickly", "slowly", "far", "much", "hard", "close", "early"})
+_STATES: Final = frozenset(
+    {
+        "start",
+        "starts",
+        "begin",
+        "begins",
+        "end",
+        "ends",
+        "is",
+        "are",
+        "stands",
+        "lies",
+        "finishes",
+        "stops",
+        "parked",
+        "over",
+    }
+)
+_BESIDE: Final = frozenset({"on", "at", "along", "down"})
+_DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
+_TURN_NOUNS: Final = frozenset({"turn", "turning", "one", "street", "road", "exit", "corner", "fork", "again", "turns"})
+_PRONOUNS: Final = frozenset({"it", "that", "those", "them", "this", "these", "him", "her"})
+_POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
+_IN_VIEW: Final = (
+    "comes into view",
+    "comes into sight",
+    "come into view",
+    "comes in sight",
+    "appears",
+    "pops up",
+    "shows up",
+)
+_LEAST_SPEED: Final = 5
+_UNKNOWN_WORDS: Final = 2
+"""Words between an article and the noun that the grammar need not know: "that daft red wall"."""
+
+
+def read_items(words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str]) -> list[Item]:
+    """Returns the items of a sentence.
+
+    Args:
+        words: lower-case tokens with masked names and directions, see `nlu.understand`.
+        names: values of the masked names by their token.
+        lead: first words of names that say more than the name: "next" of "next lights".
+    """
+    return _Reader(words, names, lead, route_grammar()).read()
+
+
+class _Reader:
+    def __init__(
+        self, words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str], grammar: RouteGrammar
+    ) -> None:
+        self.words, self.names, self.lead, self.grammar = words, names, lead, grammar
+        self.items: list[Item] = []
+
+    def read(self) -> list[Item]:
+        place = 0
+        rules = (self._comma, self._stop_noun, self._turn, self._quantity, self._phrase, self._noun, self._unknown)
+        while place < len(self.words):
+            self._new_clause(place)
+            place = next(end for rule in rules if (end := rule(place)) > place)
+        return self.items
+
+    def _new_clause(self, place: int) -> None:
+        """Adds the border before a subject with its verb: "go on | there's nothing coming"."""
+        before = self.words[place - 1] if place else ","
+        if self.words[place] in self.grammar.subjects and before not in (*self.grammar.subordinators, ",", "?"):
+            self.items.append(BoundaryItem("and", place))
+
+    def _unknown(self, place: int) -> int:
+        word = self.words[place]
+        if word in self.grammar.metres and len(word) > 1:
+            self.items.append(UnitItem(self.grammar.metres[word] / 1000.0))
+        else:
+            self.items.append(WordItem(word))
+        return place + 1
+
+    def _stop_noun(self, place: int) -> int:
+        """Skips "the next stop", which is an errand and no order to stop."""
+        number, behind = self._ordinal(place)
+        if (number is not None or self.words[place] in ("last", "only")) and self._word(
+            max(behind, place + 1)
+        ) == "stop":
+            return max(behind, place + 1) + 1
+        return place
+
+    def _word(self, place: int) -> str:
+        return self.words[place] if 0 <= place < len(self.words) else ""
+
+    def _comma(self, place: int) -> int:
+        if self.words[place] not in (",", "?"):
+            return place
+        self.items.append(BoundaryItem(",", place + 1))
+        return place + 1
+
+    # --- left and right ---------------------------------------------------------------------------------------------
+
+    def _turn(self, place: int) -> int:
+        """Reads a direction with the words around it: a turn, a lane, or a side."""
+        begin = place
+        preposition = self._word(place) if self._word(place) in _SIDE_WORDS else ""
+        place += preposition != ""
+        ordinal, place = self._ordinal(place)
+        while self._word(place) in self.grammar.determiners or self._word(place) in _DEGREES:
+            place += 1
+        if ordinal is None:
+            ordinal, place = self._ordinal(place)
+        while self._word(place) in _DEGREES:
+            place += 1
+        direction = _SIDES.get(self._word(place))
+        if direction is None:
+            return begin
+        several = self._word(place) in ("lefts", "rights")
+        place += 1
+        hand = self._word(place) in ("hand", "handed")
+        place += hand
+        if self._word(place) == "most":
+            place += 1
+        changed = preposition == "to" and self._word(begin - 1) in ("change", "changing", "switch", "switching")
+        if changed or self._word(place) in ("lane", "lanes", "file") or self._word(begin - 1) in ("lane", "lanes"):
+            self.items.append(LaneItem(direction))
+            return place + (self._word(place) in ("lane", "lanes", "file"))
+        aside = self._word(place) in ("side", "kerb", "curb")
+        aside = aside or (hand and preposition not in ("to", "in") and self._word(place) not in _TURN_NOUNS)
+        if aside:
+            place += self._word(place) in ("side", "kerb", "curb")
+            place = self._behind_street(place)
+        elif self._word(place) in _TURN_NOUNS:
+            place += 1
+        turning = self._word(place - 1) in _TURN_NOUNS and preposition in ("down", "along")
+        if not turning and (aside or (preposition or self._word(begin - 1)) in _BESIDE) and ordinal is None:
+            self.items.append(SideItem(direction))
+        else:
+            count = ordinal or 1 if several else 1
+            self.items.append(TurnItem(direction, None if several else ordinal, min(count, 4)))
+        return place
+
+    def _behind_street(self, place: int) -> int:
+        """Returns the place behind "of the street"."""
+        if self._word(place) == "of":
+            rest = place + 1 + (self._word(place + 1) in self.grammar.determiners)
+            return rest + 1 if self._word(rest) in ("street", "road", "car") else place
+        return place
+
+    def _ordinal(self, place: int) -> tuple[int | None, int]:
+        """Returns an ordinal or a small count, and the place behind it."""
+        start = place
+        while self._word(place) in self.grammar.determiners or self._word(place) == "very":
+            place += 1
+        word = self._word(place)
+        number = read_ordinal(word)
+        if number is None and (counts := read_cardinals([word])) and 2 <= counts[0] <= 9:
+            number = counts[0]
+        return (None, start) if number is None else (number, place + 1)
+
+    # --- numbers ----------------------------------------------------------------------------------------------------
+
+    def _quantity(self, place: int) -> int:
+        """Reads a distance or a speed."""
+        number, end = self._number(place)
+        if number is None:
+            return place
+        unit = self.grammar.speeds.get(self._word(end))
+        if unit is not None:
+            self._speed(number * unit, unit=True)
+            return end + 1
+        metres = self.grammar.metres.get(self._word(end))
+        if metres is not None:
+            hours, behind = self._per_hour(end + 1)
+            if hours is not None:
+                self._speed(number * metres * hours / 1000.0, unit=True)
+                return behind
+            if self._word(end + 1) == "and" and self._word(end + 3) == "half":  # a mile and a half
+                number, end = number + 0.5, end + 3
+            self.items.append(DistanceItem(max(1, round(number * metres))))
+            return end + 1
+        if number >= _LEAST_SPEED and self._word(end) not in (
+            "minutes",
+            "seconds",
+            "minute",
+            "hours",
+            "hour",
+            "percent",
+        ):
+            self._speed(number, unit=False)
+            return end
+        return place
+
+    def _speed(self, speed: float, *, unit: bool) -> None:
+        self.items.append(SpeedItem(max(1, round(speed)), unit))
+
+    def _per_hour(self, place: int) -> tuple[float | None, int]:
+        place += self._word(place) in ("per", "an", "a", "the")
+        hours = self.grammar.hours.get(self._word(place))
+        return hours, place + 1
+
+    def _number(self, place: int) -> tuple[float | None, int]:
+        """Returns a number, "half a", "a quarter" or "a couple of hundred" among them, and the place behind it."""
+        word, number, start = self._word(place), None, place
+        if word in ("a", "an", "another"):
+            place, word = place + 1, self._word(place + 1)
+        if word in ("half", "quarter"):
+            place += 1 + (self._word(place + 1) == "of")
+            place += self._word(place) in ("a", "an")
+            return (0.5 if word == "half" else 0.25), place
+        if word in ("couple", "few"):
+            place += 1 + (self._word(place + 1) == "of")
+            if self._word(place) == "hundred":
+                return 100.0 * (2 if word == "couple" else 3), place + 1
+            return None, start
+        if word == "hundred":
+            number, place = 100.0, place + 1
+        elif place > start and word in self.grammar.metres:
+            return 1.0, place
+        else:
+            length = self._run(place)
+            if length:
+                number = float(read_cardinals([*self.words[place : place + length]])[0])
+                place += length
+        if number == 100.0 and self._word(place) == "and" and (more := self._run(place + 1)):
+            number, place = number + read_cardinals(list(self.words[place + 1 : place + 1 + more]))[0], place + 1 + more
+        return (None, start) if number is None else (number, place)
+
+    def _run(self, place: int) -> int:
+        """Returns the number of tokens of the cardinal at a place; 0 without any."""
+        length = 0
+        while (
+            place + length < len(self.words) and len(read_cardinals(list(self.words[place : place + length + 1]))) == 1
+        ):
+            if not read_cardinals([self.words[place + length]]) and self.words[place + length] != "hundred":
+                break
+            length += 1
+        return length
+
+    # --- phrases and places -----------------------------------------------------------------------------------------
+
+    def _phrase(self, place: int) -> int:
+        """Reads a phrase of the grammar; one that is a part of a longer noun phrase is left to it."""
+        match = self.grammar.terminals.longest(self.words, place)
+        if match is None:
+            return place
+        end = place + match.length
+        if match.group == "relations":
+            return self._condition(match, place)
+        if self.words[place] == "so" and match.length == 1 and self._word(end) in _ADJECTIVES:
+            return end
+        if match.group == "repairs" and self.words[place] == "no" and match.length == 1:
+            if end in self.names or self._word(place - 1) in _BEFORE_NONE:
+                self.items.append(NegationItem("not"))
+                return end
+        noun = self._word(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
+        if noun and (match.kind == "wait" or self.words[place] in ("stop", "stops")):
+            return place  # "what's the hold up?", "that stop"
+        if match.group == "boundaries":
+            self.items.append(BoundaryItem(match.kind, end))
+        elif match.group == "repairs":
+            self.items.append(RepairItem(end))
+        elif match.group == "negations":
+            self.items.append(NegationItem(match.kind))
+        elif match.group == "verbs":
+            self.items.append(VerbItem(self.words[place], end))
+        else:
+            kind = f"lights_{match.kind}" if match.group == "lights" else match.kind
+            self.items.append(ActionItem(kind, place, end))
+        return end
+
+    def _condition(self, match: Match, place: int) -> int:
+        """Reads a relation with its place: "just past the Shell", "when the Shell comes into view"."""
+        end = place + match.length
+        found, behind = self._noun_phrase(end)
+        if found is None and match.kind == "across" and "straight" in self.words[place:end]:
+            self.items.append(ActionItem("straight", place, end))
+            return end
+        if found is None:
+            if self._word(end) not in _PRONOUNS or self._word(end - 1) in ("on", "at", "in"):
+                return end if match.length > 1 else place
+            self.items.append(ConditionItem(self._relation(match), None))
+            return end + 1
+        relation = self._relation(match)
+        rest = " ".join(self.words[behind : behind + 3])
+        for phrase in _IN_VIEW:
+            if rest.startswith(phrase):
+                relation, behind = ConditionRelation.SEEN, behind + len(phrase.split())
+                break
+        along = found.reference is not None and found.reference.street is not None and place > 0
+        if match.kind == "across" and along and self._word(place - 1) not in (",", "go", "straight", "head"):
+            self.items += [ActionItem("follow", place, end), found]  # "go around over Hubbard"
+            return behind
+        if match.kind == "across":
+            self.items.append(ActionItem("straight", place, end))
+        self.items.append(ConditionItem(relation, found))
+        while self._word(behind) in _STATES and self.words[place] in (
+            "when",
+            "once",
+            "as",
+            "soon",
+            "where",
+            "wherever",
+        ):
+            behind += 1
+        return behind
+
+    def _relation(self, match: Match) -> ConditionRelation:
+        """Returns the relation that a phrase stands for; behind a line one stops before it."""
+        if match.kind == "behind":
+            stops = any(isinstance(item, ActionItem) and item.kind == "stop" for item in self.items)
+            return ConditionRelation.BEFORE if stops else ConditionRelation.AFTER
+        return ConditionRelation.PAST if match.kind == "across" else ConditionRelation(match.kind)
+
+    def _noun(self, place: int) -> int:
+        found, behind = self._noun_phrase(place)
+        if found is None:
+            return place
+        self.items.append(found)
+        return behind
+
+    def _noun_phrase(self, place: int) -> tuple[NounPhrase | None, int]:
+        """Returns the noun phrase at a place, and the place behind it."""
+        start, ordinal, article = place, None, False
+        while True:
+            number, behind = self._ordinal(place)
+            if number is not None and self._counts(place, behind):
+                ordinal, place, article = number, behind, True
+            elif self._word(place) in self.grammar.modifiers and place not in self.names:
+                article, place = True, place + 1
+            elif (
+                self._word(place).endswith("'s")
+                and place not in self.names
+                and self._word(place) not in self.grammar.subjects
+            ):
+                article, place = True, place + 1  # "granny's house"
+            else:
+                break
+        if (match := self._reference(start)) is not None:
+            return NounPhrase(PlaceReference(reference=Anaphor(match.kind)), None), start + match.length
+        found, behind = self._head(place, ordinal)
+        skipped = 0
+        while found is None and article and skipped < _UNKNOWN_WORDS and self._is_unknown(place + skipped):
+            skipped += 1
+            found, behind = self._head(place + skipped, ordinal)
+        if found is None and ordinal is not None and skipped == 0:
+            ends = (
+                ("", ",", "?", "on", "please", "then", "and")
+                if self._word(start) in self.grammar.determiners
+                else ("on",)
+            )
+            if self._word(place) in ends:
+                return NounPhrase(None, ordinal), place  # "not the first, the second"
+        return (found, behind) if found is not None else (None, start)
+
+    def _counts(self, place: int, behind: int) -> bool:
+        """Returns whether the number between two places belongs to a noun, as in no "first the KFC" or "two lefts"."""
+        adverb = self.words[place] == "first" and self._word(behind) in (
+            *self.grammar.determiners,
+            "#landmark",
+            "#street",
+        )
+        return not adverb and _SIDES.get(self._word(behind)) is None
+
+    def _reference(self, place: int) -> Match | None:
+        if self._word(place) == "there" and self._word(place + 1) in ("is", "are", "was", "were"):
+            return None
+        return self.grammar.references.longest(self.words, place) if place < len(self.words) else None
+
+    def _is_unknown(self, place: int) -> bool:
+        word = self._word(place)
+        if not word.isalpha() or word in _SIDES or word in ("lane", "lanes"):
+            return False
+        return self.grammar.terminals.longest(self.words, place) is None
+
+    def _head(self, place: int, ordinal: int | None) -> tuple[NounPhrase | None, int]:
+        """Returns the noun phrase whose noun is at a place."""
+        value = self.names.get(place)
+        if (
+            value is not None
+            and value.label != "Queried"
+            and isinstance(value, LandmarkName | StreetName | ObjectClass)
+        ):
+            return self._named(place, value, ordinal)
+        match = self.grammar.opportunities.longest(self.words, place) if place < len(self.words) else None
+        if match is None:
+            return None, place
+        end = place + match.length
+        if self._word(end) == "of" and self.words[place].startswith("corner"):
+            end += 1 + (self._word(end + 1) in self.grammar.determiners)
+            street = self.names.get(end)
+            if isinstance(street, StreetName):
+                return NounPhrase(PlaceReference(street=street), None), end + 1
+            return None, place
+        if self._word(end) == "after" and self._word(end + 1) in ("it", "that", "next"):
+            return NounPhrase(None, 2 if self._word(end + 1) == "next" else 1), end + 2
+        return NounPhrase(None, ordinal, self.words[place] in ("block", "blocks")), end
+
+    def _named(
+        self, place: int, value: LandmarkName | StreetName | ObjectClass, ordinal: int | None
+    ) -> tuple[NounPhrase, int]:
+        if ordinal is None and self.lead.get(place) == "next":
+            ordinal = 1
+        if isinstance(value, StreetName):
+            return NounPhrase(PlaceReference(street=value, ordinal=ordinal), ordinal), place + 1
+        street, end = self._street_of(place + 1)
+        named = PlaceReference(
+            landmark=value if isinstance(value, LandmarkName) else None,
+            street=street,
+            object=value if isinstance(value, ObjectClass) else None,
+            ordinal=ordinal,
+        )
+        return NounPhrase(named, ordinal), end
+
+    def _street_of(self, place: int) -> tuple[StreetName | None, int]:
+        """Returns the street of a place, as in "on Beal" behind "the house", and the token behind it."""
+        street = self.names.get(place + 1) if self._word(place) in _POSTPOSITIONS else None
+        named = isinstance(street, StreetName) and street is not StreetName.QUERIED
+        return (street, place + 2) if named and isinstance(street, StreetName) else (None, place)

@@ -1,0 +1,89 @@
+"""Details of an utterance that follow from its driving plan: named actions, turns, speeds and distances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, Literal
+
+from dorothie_gym.dialogue.clause_moods import ORDERED
+from dorothie_gym.dialogue.directions import RouteTurn
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.routes import StepAction, StepChange
+from dorothie_gym.ontology.slots import ActionValue
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.plan_parser import PlanParse
+
+_VALUES: Final = {
+    StepAction.TURN: ActionValue.J_TURN,
+    StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
+    StepAction.LANE: ActionValue.LANE_SWITCH,
+    StepAction.U_TURN: ActionValue.U_TURN,
+    StepAction.STOP: ActionValue.STOP,
+    StepAction.WAIT: ActionValue.STOP,
+    StepAction.GO: ActionValue.START,
+    StepAction.SPEED: ActionValue.SPEED_CHANGE,
+    StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
+}
+_WEAK: Final = frozenset({ActionValue.LANE_FOLLOW, ActionValue.START})
+"""Actions that are read only where the words name no other."""
+
+_ORDER: Final = {value: number for number, value in enumerate(ActionValue)}
+_OPPOSITES: Final = frozenset({StepChange.FASTER, StepChange.SLOWER})
+_DIRECTIONS: Final = {StepAction.STRAIGHT: Direction.STRAIGHT, StepAction.U_TURN: Direction.BACK}
+
+
+def named_actions(actions: Sequence[ActionValue], parse: PlanParse) -> tuple[ActionValue, ...]:
+    """Returns the actions that a text names: those of its words, corrected by the steps that were read.
+
+    Args:
+        actions: actions that the lexicon finds.
+        parse: steps of the text.
+    """
+    steps = [step.action for step in parse.plan]
+    read = {_VALUES[action] for action in (*steps, *parse.denied) if action in _VALUES and action not in parse.implied}
+    if ActionValue.U_TURN in read and ActionValue.J_TURN in actions and ActionValue.U_TURN not in actions:
+        read = (read - {ActionValue.U_TURN}) | {ActionValue.J_TURN}  # "turn back at the junction"
+    if any(step.change in _OPPOSITES for step in parse.plan):
+        read |= {ActionValue.SPEED_CHANGE}  # "turn left slowly"
+    turns = ActionValue.J_TURN in read or any(step.action is StepAction.TURN for step in parse.described)
+    found = set(actions)
+    if not turns and (parse.aside or ActionValue.LANE_SWITCH in read):
+        found.discard(ActionValue.J_TURN)
+    if steps and ORDERED.issuperset(parse.moods) and StepAction.FOLLOW not in steps and not parse.denied:
+        found -= _WEAK - read  # "right again and back to where we started"
+    if found and len(steps) < 2:
+        read -= _WEAK
+    found |= read
+    named = [value for value in actions if value in found]
+    return (*named, *sorted(found.difference(named), key=_ORDER.__getitem__))
+
+
+def planned_turns(turns: tuple[RouteTurn, ...], parse: PlanParse) -> tuple[RouteTurn, ...]:
+    """Returns the turns of a text: those of its words, or those of the steps where words mislead."""
+    read: list[RouteTurn] = []
+    for step in parse.described:
+        direction = step.direction if step.action is StepAction.TURN else _DIRECTIONS.get(step.action)
+        if direction is not None:
+            read.append(RouteTurn(direction=direction, ordinal=step.ordinal))
+    sideways = sum(turn.direction in (Direction.LEFT, Direction.RIGHT) for turn in read)
+    found = sum(turn.direction in (Direction.LEFT, Direction.RIGHT) for turn in turns)
+    if parse.repaired or (parse.aside and not read) or sideways > found:
+        return tuple(read)
+    return turns
+
+
+def planned_change(parse: PlanParse, faster: bool | None) -> bool | None:
+    """Returns whether a speed is to grow, by the steps, or else by the words."""
+    for step in (*parse.plan, *parse.described):
+        if step.action is StepAction.SPEED and step.change is not None:
+            return step.change is StepChange.FASTER
+    return faster
+
+
+def planned_number(parse: PlanParse, field: Literal["speed", "distance"], number: int | None) -> int | None:
+    """Returns the speed [km/h] or the distance [m] of the first step that has one, or else of the words."""
+    found = (getattr(step, field) for step in parse.described)
+    if field == "distance" and any(step.speed is not None for step in parse.described):
+        number = None  # "metres" of "metres per second"
+    return next((value for value in found if value is not None), number)

@@ -1,0 +1,265 @@
+"""Steps under construction, and the state of the parser of driving plans."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from dorothie_gym.dialogue.clause_moods import ClauseMood
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.routes import (
+    Anaphor,
+    ConditionRelation,
+    PlaceReference,
+    PlanStep,
+    StepAction,
+    StepChange,
+    StepCondition,
+)
+from dorothie_gym.errors import OntologyError
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import LandmarkName
+
+NEEDING_PLACE: Final = frozenset({StepAction.FOLLOW, StepAction.VISIT, StepAction.AVOID})
+"""Actions that need a place."""
+
+TURNING: Final = frozenset({StepAction.TURN, StepAction.LANE, StepAction.U_TURN})
+"""Actions with a direction."""
+
+NEGATING: Final = frozenset({"forbid", "not", "instead"})
+"""Kinds of negations of the grammar that negate the next step."""
+
+_COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP, StepAction.STRAIGHT})
+"""Actions with an ordinal."""
+
+_MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
+_PREPOSITIONS: Final = frozenset({"down", "along", "via", "up", "by"})
+
+
+@dataclass
+class Frame:
+    """Step under construction: the fields of `PlanStep`, and what decides whether it becomes one.
+
+    Attributes:
+        relation: relation of its condition.
+        at: place of its condition.
+        mood: mood of its clause.
+        negated: whether it is negated.
+        forbidden: whether it is forbidden: "don't turn".
+        verb: verb without a meaning of its own, "take".
+        word: first word of its action.
+        bare_number: number without a unit.
+        bare: whether it is a name without a verb.
+        borrowed: whether its condition comes from the clause before.
+        ends: whether its clause ends behind the verb.
+        deferred: whether it comes after the other errands.
+        implied: whether its action is not named: "on the left, please".
+    """
+
+    action: StepAction | None = None
+    mood: ClauseMood = ClauseMood.COMMAND
+    negated: bool = False
+    forbidden: bool = False
+    verb: str = ""
+    direction: Direction | None = None
+    ordinal: int | None = None
+    distance: int | None = None
+    relation: ConditionRelation | None = None
+    at: PlaceReference | None = None
+    side: Direction | None = None
+    speed: int | None = None
+    change: StepChange | None = None
+    place: PlaceReference | None = None
+    bare_number: int | None = None
+    bare: bool = False
+    borrowed: bool = False
+    ends: bool = False
+    word: str = ""
+    deferred: bool = False
+    implied: bool = False
+
+    def step(self) -> PlanStep | None:
+        """Returns the finished step; None without an action or with parts that do not fit together."""
+        if self.action is None:
+            return None
+        ordinal = self.ordinal if self.action in _COUNTED else None
+        condition = None
+        if self.relation is not None and self.at is not None:
+            condition = StepCondition(relation=self.relation, place=self.at)
+        values: dict[str, Any] = {
+            "direction": self.direction,
+            "ordinal": ordinal,
+            "distance": self.distance,
+            "condition": condition,
+            "side": self.side,
+            "speed": self.speed,
+            "change": self.change,
+            "place": self.place,
+        }
+        try:
+            return PlanStep(action=self.action, **values)
+        except OntologyError:
+            return None
+
+
+class PlanState:
+    """State of the parser: finished steps, the step under construction, and what waits for one."""
+
+    def __init__(self) -> None:
+        """Begins without steps."""
+        self.frames: list[Frame] = []
+        self.frame: Frame | None = None
+        self.pending = Frame()  # parts that wait for their step
+        self.moods: list[ClauseMood] = []
+        self.mood = ClauseMood.COMMAND
+        self.fresh = True  # whether a boundary stands behind the last item
+        self.repairing = False  # whether the next item replaces the last one
+        self.repaired = False
+        self.negation: str | None = None
+        self.cancelled: set[LandmarkName] = set()
+        self.denied: set[StepAction] = set()
+        self.forbidding = False
+
+    def close(self) -> None:
+        """Finishes the step under construction."""
+        if self.frame is not None:
+            self._complete(self.frame)
+        self.frame, self.fresh = None, True
+
+    def _complete(self, frame: Frame) -> None:
+        """Gives a step whose clause has ended the action that its parts tell."""
+        if frame.action is None and frame.verb == "go" and frame.ends:
+            frame.action = StepAction.GO
+        if frame.action is StepAction.GO and (frame.distance is not None or frame.relation is ConditionRelation.UNTIL):
+            frame.action = StepAction.STRAIGHT  # "drive on until you see the KFC"
+        vague = frame.direction is None and frame.ordinal is None and frame.at is None and frame.distance is None
+        if frame.action is StepAction.TURN and vague and not frame.ends and not frame.negated:
+            frame.action = None  # "turn that song up"
+        if frame.verb == "leave" and frame.action is StepAction.TURN and frame.at is None:
+            frame.action = None
+        if frame.action is None and frame.verb in _MOVING_VERBS:
+            along = frame.at is not None and frame.relation in (ConditionRelation.PAST, ConditionRelation.UNTIL)
+            frame.action = StepAction.STRAIGHT if along or frame.distance is not None else None
+        if frame.action in NEEDING_PLACE and frame.place is None:
+            self._complete_placeless(frame)
+
+    def _complete_placeless(self, frame: Frame) -> None:
+        """Gives another action to "follow" or "take me to" without the place to follow or visit."""
+        measured = frame.distance is not None or (frame.at is not None and frame.word not in _PREPOSITIONS)
+        if frame.action is StepAction.VISIT and frame.at is not None:
+            frame.place, frame.at, frame.relation = frame.at, None, None
+        elif frame.word in _PREPOSITIONS and frame.distance is not None:
+            frame.action, self.pending.distance = None, frame.distance  # "half a mile down, turn left"
+        elif frame.action is StepAction.FOLLOW and measured:
+            frame.action = StepAction.STRAIGHT
+        else:
+            frame.action = None
+
+    def open_step(self, action: StepAction | None) -> Frame:
+        """Begins a step, which takes what has been waiting for one."""
+        self.close()
+        frame = Frame(action=action, mood=self.mood, negated=self.negation in NEGATING)
+        waiting, self.pending = self.pending, Frame()
+        frame.forbidden = self.negation == "forbid"
+        frame.relation, frame.at, frame.distance = waiting.relation, waiting.at, waiting.distance
+        frame.borrowed = waiting.at is not None
+        frame.ordinal = waiting.ordinal
+        frame.bare_number = waiting.bare_number
+        if action in (StepAction.STOP, StepAction.WAIT):
+            frame.side = waiting.side
+        else:
+            self.pending.side = waiting.side
+        self.frames.append(frame)
+        self.frame, self.fresh = frame, False
+        if self.negation == "instead":
+            self.negation = None
+        return frame
+
+    def replaced(self, *actions: StepAction) -> Frame | None:
+        """Returns the last step of one of some kinds, if the speaker is about to replace it."""
+        if not self.repairing:
+            return None
+        self.repairing = False
+        for frame in reversed(self.frames):
+            if frame.action is not None:
+                if not actions or frame.action in actions:
+                    self.repaired = True
+                    self.frame, self.fresh = frame, False
+                    return frame
+                return None
+        return None
+
+    def drop_last(self) -> None:
+        """Withdraws the last step, which another one replaces."""
+        self.repairing = False
+        for number in range(len(self.frames) - 1, -1, -1):
+            if self.frames[number].action is not None:
+                del self.frames[number]
+                self.frame, self.fresh, self.repaired = None, True, True
+                return
+
+    def steps_of(self, frame: Frame) -> list[PlanStep]:
+        """Returns the step of a frame after its negation; empty if there is none."""
+        if frame.negated and not self._negate_step(frame):
+            return []
+        if frame.action is StepAction.VISIT and frame.place is not None:
+            left = frame.verb == "leave" and not frame.deferred
+            if left or frame.place.landmark in self.cancelled:
+                return []
+        if frame.action is StepAction.SPEED:
+            frame.distance = None
+            frame.speed = frame.bare_number if frame.speed is None and frame.change is None else frame.speed
+            if frame.speed is None and frame.change is None:
+                return []
+        if frame.action is StepAction.STRAIGHT and frame.at is not None and frame.at.reference is Anaphor.THERE:
+            frame.relation = frame.at = None
+        step = frame.step()
+        return [] if step is None else [step]
+
+    def _negate_step(self, frame: Frame) -> bool:
+        """Negates a step, such as a forbidden street to one to avoid; returns whether a step is left."""
+        self.denied |= {frame.action} if frame.action is not None else set()
+        if frame.action in (StepAction.FOLLOW, StepAction.VISIT) and frame.place is not None:
+            frame.action = StepAction.AVOID
+            return frame.place.street is not None and frame.place.landmark is None
+        if frame.action is StepAction.STOP or frame.action in TURNING:
+            alone = sum(other.action is not None for other in self.frames) == 1
+            frame.action, frame.direction, frame.ordinal = StepAction.STRAIGHT, None, None
+            if frame.relation is ConditionRelation.BEFORE:
+                frame.relation = ConditionRelation.UNTIL
+            self.forbidding = self.forbidding or (alone and frame.forbidden)
+            return alone and frame.forbidden
+        if frame.action is StepAction.LIGHTS:
+            frame.change = StepChange.OFF if frame.change is StepChange.ON else StepChange.ON
+        return frame.action in (StepAction.SPEED, StepAction.LIGHTS)
+
+
+def append_step(steps: list[PlanStep], step: PlanStep) -> None:
+    """Adds a step, unless it only says the last one again; with more detail it replaces that one."""
+    if steps and {steps[-1].action, step.action} == {StepAction.SPEED}:
+        speed, change = steps[-1].speed or step.speed, steps[-1].change or step.change
+        told = (steps[-1].speed is None or step.speed is None) and steps[-1].change in (
+            None,
+            step.change or steps[-1].change,
+        )
+        if told and steps[-1].condition is None and step.condition is None:
+            steps[-1] = PlanStep(action=StepAction.SPEED, speed=speed, change=change)
+            return
+    if steps and _is_side_of_lane(steps[-1], step):
+        steps[-1] = step if step.action is StepAction.LANE else steps[-1]
+        return
+    if steps and steps[-1].action is step.action and step.action is not StepAction.TURN:
+        old, new = steps[-1].to_json(), step.to_json()
+        if old.items() <= new.items() or new.items() <= old.items():
+            steps[-1] = step if len(new) > len(old) else steps[-1]
+            return
+    steps.append(step)
+
+
+def _is_side_of_lane(first: PlanStep, second: PlanStep) -> bool:
+    """Returns whether two steps name the side of one lane: "the right, the right lane"."""
+    if {first.action, second.action} != {StepAction.LANE, StepAction.TURN}:
+        return False
+    turn = first if first.action is StepAction.TURN else second
+    return first.direction is second.direction and turn.to_json().keys() == {"action", "direction"}

@@ -1,0 +1,493 @@
+"""Parser of driving plans: the items of an utterance (`plan_items`) become the ordered steps that it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader, is_participle
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, append_step
+from dorothie_gym.dialogue.plan_items import (
+    ActionItem,
+    BoundaryItem,
+    ConditionItem,
+    DistanceItem,
+    Item,
+    LaneItem,
+    NegationItem,
+    NounPhrase,
+    RepairItem,
+    SideItem,
+    SpeedItem,
+    TurnItem,
+    UnitItem,
+    VerbItem,
+    WordItem,
+)
+from dorothie_gym.dialogue.plan_places import FETCHING, PlaceReader, with_details
+from dorothie_gym.dialogue.route_grammar import route_grammar
+from dorothie_gym.dialogue.routes import (
+    MAX_STEPS,
+    Anaphor,
+    ConditionRelation,
+    DrivingPlan,
+    PlaceReference,
+    PlanStep,
+    StepAction,
+    StepChange,
+)
+
+
+class Sentence(NamedTuple):
+    """Sentence as the parser reads it.
+
+    Attributes:
+        clauses: tokens, and the moods of their clauses.
+        items: items of the chunker.
+    """
+
+    clauses: ClauseReader
+    items: Sequence[Item]
+
+
+@dataclass(frozen=True)
+class PlanParse:
+    """Result of the parser.
+
+    Attributes:
+        plan: steps that the driver is asked for.
+        described: all steps that are named, also by questions and statements.
+        moods: moods of the clauses, in order.
+        repaired: whether the speaker replaced an own item.
+        denied: actions that are named in negated form.
+        aside: whether left or right is a side of the street.
+        waiting: whether a condition, number or distance waits for its step: "at the lights".
+        person: whether somebody is to be fetched.
+        implied: actions of the plan that no word names.
+        bare: whether the steps of the plan are names without a verb.
+        forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
+    """
+
+    plan: DrivingPlan
+    described: tuple[PlanStep, ...]
+    moods: tuple[ClauseMood, ...]
+    repaired: bool
+    denied: frozenset[StepAction] = frozenset()
+    aside: bool = False
+    waiting: bool = False
+    person: bool = False
+    implied: frozenset[StepAction] = frozenset()
+    forbidding: bool = False
+    bare: bool = False
+
+
+_ACTIONS: Final = {
+    "faster": StepAction.SPEED,
+    "slower": StepAction.SPEED,
+    "leave": StepAction.TURN,
+    "lights_on": StepAction.LIGHTS,
+    "lights_off": StepAction.LIGHTS,
+}
+"""Actions of the kinds of the grammar that are not named for one."""
+_CHANGES: Final = {
+    "faster": StepChange.FASTER,
+    "slower": StepChange.SLOWER,
+    "lights_on": StepChange.ON,
+    "lights_off": StepChange.OFF,
+}
+_OPPOSITE: Final = {StepChange.FASTER: StepChange.SLOWER, StepChange.SLOWER: StepChange.FASTER}
+_DEGREES: Final = frozenset({"too", "less"})
+_HERE: Final = frozenset({"here", "here's"})
+_IT: Final = frozenset({"it", "that", "them", "those"})
+_PAST: Final = frozenset({"shut", "went", "got", "closed", "ran", "came", "has", "looks"})
+
+
+def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
+    """Returns the plan of an utterance.
+
+    Args:
+        sentences: the sentences in order; conditions, places and corrections reach across them.
+    """
+    builder = _Builder()
+    for sentence in sentences:
+        builder.read(sentence)
+    return builder.finish()
+
+
+class _Builder(PlaceReader):
+    """Assembles steps from items."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
+        self.correcting = False  # whether the sentence holds a correction so far
+        self.aside = False
+        self._rules: dict[type, Callable[[Any], None]] = {
+            ActionItem: self._action,
+            VerbItem: self._verb,
+            TurnItem: self._turn,
+            LaneItem: self._lane,
+            SideItem: self._side,
+            ConditionItem: self.read_condition,
+            NounPhrase: self.read_place,
+            DistanceItem: self._distance,
+            SpeedItem: self._speed,
+            BoundaryItem: self._boundary,
+            RepairItem: self._repair,
+            NegationItem: self._negate,
+            UnitItem: self._unit,
+            WordItem: self._word,
+        }
+
+    def read(self, sentence: Sentence) -> None:
+        """Reads a sentence; it begins a clause."""
+        self.clauses = sentence.clauses
+        self.close()
+        self.negation, self.correcting = None, False
+        self._clause(0, new=True)
+        for item in sentence.items:
+            counted = self.counting
+            self._rules[type(item)](item)
+            self.counting = self.counting and not counted
+
+    def _clause(self, place: int, *, new: bool) -> None:
+        self.mood = self.clauses.mood(place, self.mood, new=new)
+        self.moods.append(self.mood)
+
+    def finish(self) -> PlanParse:
+        """Returns the result."""
+        self.close()
+        pending = self.pending
+        waiting = (pending.at, pending.ordinal, pending.distance) != (None, None, None)
+        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
+        if last is not None and last.mood in ORDERED:
+            self.stop_between()
+            if last.at is None and pending.at is not None:
+                self.attach(last, pending.relation or ConditionRelation.AT, pending.at)
+            last.distance = last.distance or pending.distance
+        self._leftovers()
+        described: list[PlanStep] = []
+        ordered: list[PlanStep] = []
+        self._drop_interjection()
+        for frame in sorted(self.frames, key=lambda frame: frame.deferred):
+            for step in self.steps_of(frame):
+                described.append(step)
+                if frame.mood in ORDERED:
+                    append_step(ordered, step)
+        return PlanParse(
+            plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
+            described=tuple(described),
+            moods=tuple(self.moods),
+            repaired=self.repaired,
+            denied=frozenset(self.denied),
+            aside=self.aside,
+            waiting=waiting,
+            person=self.person,
+            forbidding=self.forbidding,
+            bare=all(frame.bare for frame in self.frames if frame.action is not None and frame.mood in ORDERED),
+            implied=frozenset(frame.action for frame in self.frames if frame.implied and frame.action is not None),
+        )
+
+    def _drop_interjection(self) -> None:
+        """Takes back a "wait" that only opens what is asked or ordered: "hang on, can you see the bridge?"."""
+        first = self.frames[0] if self.frames else None
+        if first is None or first.action is not StepAction.WAIT or first.at is not None or not first.ends:
+            return
+        if ClauseMood.QUESTION in self.moods or any(frame.action is not None for frame in self.frames[1:]):
+            first.action = None
+
+    def _leftovers(self) -> None:
+        """Makes a step of what waits for one: "the second", "on the right-hand side, please"."""
+        if any(frame.action is not None for frame in self.frames) or not ORDERED.issuperset(self.moods):
+            return
+        if self.pending.ordinal is not None and self.negation is None and len(self.moods) > 1:
+            self.open_step(StepAction.TURN)
+        elif (
+            self.pending.side is not None
+            and len(self.clauses.words) == 3
+            and self.clauses.words[2] in ("left", "right")
+        ):
+            self.open_step(StepAction.TURN).direction = self.pending.side  # "on the left", of the ways
+            self.aside = False
+        elif self.pending.side is not None:
+            self.open_step(StepAction.STOP).implied = True
+        elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
+            self.open_step(StepAction.SPEED)
+        elif self.pending.relation is ConditionRelation.AT and self.pending.at and self.pending.at.landmark:
+            place, self.pending.at = self.pending.at, None
+            self.open_step(StepAction.VISIT).place = place
+
+    def _boundary(self, item: BoundaryItem) -> None:
+        self.fresh = True
+        self.negation = None
+        if item.kind == "then":
+            self.close()
+        self._clause(item.place, new=False)
+
+    def _repair(self, item: RepairItem) -> None:
+        self.correcting = True
+        if any(frame.action is not None for frame in self.frames):
+            self.repairing = True
+        self._boundary(BoundaryItem("and", item.place))
+
+    def _negate(self, item: NegationItem) -> None:
+        self.negation = item.kind
+
+    def _verb(self, item: VerbItem) -> None:
+        if self.frame is None or self.fresh or self.frame.action is not None:
+            frame = self.open_step(None)
+            frame.verb = item.word
+            before = self.clauses.words[item.end - 2] if item.end > 1 else ""
+            frame.ends = self._ends(item.end) and before not in ("to", "another", "a")
+        elif not self.frame.verb:
+            self.frame.verb = item.word
+
+    def _action(self, item: ActionItem) -> None:
+        if item.kind in ("accept", "defer"):
+            (self._accept if item.kind == "accept" else self._defer)()
+            return
+        action = _ACTIONS.get(item.kind) or StepAction(item.kind)
+        change = _CHANGES.get(item.kind)
+        if action is StepAction.GO and not self._ends(item.end):
+            self._verb(VerbItem("go", item.end))  # "let's go round the block"
+            return
+        if action is StepAction.SPEED and change is not None:
+            self._change(change, item)
+            return
+        if self.repairing:
+            self.drop_last()
+        frame = self.frame
+        if frame is None or self._is_complete(frame, action):
+            frame = self.open_step(action)
+        elif frame.action in NEEDING_PLACE and action is StepAction.FOLLOW and self.negation is None:
+            action = frame.action or action
+        frame.action, frame.word = action, self.clauses.words[item.place]
+        first = frame is self.frames[0] and self.negation is None
+        if self.mood is ClauseMood.COMMAND and first and is_participle(frame.word):
+            frame.mood = ClauseMood.STATEMENT  # "now I am stopping", with the first words misheard
+        said = self.clauses.words[item.place : item.end]
+        if action is StepAction.STOP and frame.at is None and not _HERE.isdisjoint(said):
+            frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
+        if self.negation in NEGATING:
+            frame.negated, frame.forbidden = True, self.negation == "forbid"
+        if change is not None:
+            frame.change = change
+        if item.kind == "leave":
+            frame.verb, frame.implied = "leave", True
+        frame.ends = self._ends(item.end)
+
+    def _ends(self, place: int) -> bool:
+        """Returns whether the clause ends at a token, apart from "now" and the like."""
+        words = self.clauses.words
+        return place >= len(words) or words[place] in route_grammar().last_words
+
+    def _is_complete(self, frame: Frame, action: StepAction) -> bool:
+        """Returns whether another action begins a step of its own behind the current one."""
+        if self.fresh:
+            return True
+        if frame.action in (StepAction.GO, StepAction.U_TURN) and action is StepAction.VISIT:
+            return False  # "let's go to the KFC"
+        if frame.action is StepAction.STRAIGHT and action is StepAction.FOLLOW:
+            return frame.at is not None or frame.distance is not None  # "go east along Bonisteel"
+        return frame.action is not None and (frame.action not in NEEDING_PLACE or frame.place is not None)
+
+    def _accept(self) -> None:
+        """Orders what a statement has named: "there's a left coming up, take it"."""
+        for frame in reversed(self.frames):
+            if frame.mood is ClauseMood.STATEMENT and frame.action in (StepAction.TURN, StepAction.LANE):
+                frame.mood = ClauseMood.COMMAND
+                return
+            if frame.mood is ClauseMood.STATEMENT and frame.place is not None and frame.action in NEEDING_PLACE:
+                frame.mood = ClauseMood.COMMAND
+                return
+        if self.last_place is not None and self.last_place.street is not None:
+            self.open_step(StepAction.FOLLOW).place = self.last_place
+
+    def _defer(self) -> None:
+        """Puts the errand named last behind the others."""
+        for frame in reversed(self.frames):
+            if frame.action is StepAction.VISIT:
+                frame.deferred, frame.mood = True, ClauseMood.COMMAND
+                return
+
+    def _change(self, change: StepChange, item: ActionItem) -> None:
+        before = self.clauses.words[item.place - 1] if item.place else ""
+        if self.negation in ("not", "forbid") or before in _DEGREES or self.clauses.words[item.place] == "too":
+            change = _OPPOSITE[change]
+        frame = self.frame
+        if frame is not None and not self.fresh and frame.action is not None:
+            if frame.action is StepAction.SPEED:
+                frame.change = frame.change or change
+                return
+            if frame.action not in NEEDING_PLACE or frame.place is not None:
+                frame.change = change
+                return
+        if frame is None or self.fresh or frame.action is not None:
+            frame = self.open_step(StepAction.SPEED)
+        frame.action, frame.change, frame.negated = StepAction.SPEED, change, False
+
+    def _turn(self, item: TurnItem) -> None:
+        frame = self.replaced(StepAction.TURN, StepAction.LANE)
+        if frame is not None:
+            frame.direction = item.direction
+            frame.ordinal = item.ordinal if item.ordinal is not None else frame.ordinal
+            frame.negated = False
+            return
+        if self._says_again(item):
+            return
+        frame = self.frame
+        if frame is not None and frame.action is StepAction.LANE and frame.direction is None:
+            frame.direction = item.direction  # "switch lanes, left"
+            return
+        if frame is not None and not self.fresh:
+            if frame.action is StepAction.TURN and frame.direction is None:
+                frame.direction = item.direction
+                frame.ordinal = frame.ordinal or item.ordinal
+                return
+            if frame.action is StepAction.U_TURN:
+                return
+            getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
+            if getting or (frame.action is None and frame.verb == "get"):
+                frame.action, frame.direction = StepAction.LANE, item.direction
+                return
+            if frame.action is None or (frame.action in NEEDING_PLACE and frame.place is None):
+                frame.action = StepAction.TURN
+                frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
+                frame.negated = self.negation in NEGATING
+                self._repeat(item)
+                return
+        named = self._bare_street()
+        frame = self.open_step(StepAction.TURN)
+        frame.direction = item.direction
+        frame.ordinal = item.ordinal if item.ordinal is not None else frame.ordinal
+        if named is not None and frame.at is None:
+            frame.relation, frame.at = ConditionRelation.AT, named
+        self._repeat(item)
+
+    def _bare_street(self) -> PlaceReference | None:
+        """Returns a street that has been named without a verb, and takes its step back: "Plymouth, and left"."""
+        last = self.frames[-1] if self.frames else None
+        if last is None or not last.bare or last.action is not StepAction.FOLLOW or last.place is None:
+            return None
+        self.frames.pop()
+        self.frame = None
+        return last.place
+
+    def _says_again(self, item: TurnItem) -> bool:
+        """Returns whether a turn behind a correction is the one said before: "no, LEFT, left at the lights"."""
+        last = self.frames[-1] if self.frames else None
+        if not self.correcting or last is None or last.action is not StepAction.TURN or self.repairing:
+            return False
+        if last.direction is not item.direction or last.at is not None:
+            return False
+        last.ordinal = item.ordinal or last.ordinal
+        if self.pending.at is not None:
+            last.relation, last.at, self.pending.at = self.pending.relation, self.pending.at, None
+        self.frame, self.fresh = last, False
+        return True
+
+    def _repeat(self, item: TurnItem) -> None:
+        for _ in range(item.times - 1):
+            self.open_step(StepAction.TURN).direction = item.direction
+
+    def _lane(self, item: LaneItem) -> None:
+        frame = self.replaced(StepAction.LANE, StepAction.TURN)
+        if frame is None:
+            frame = self.frame
+            if (
+                frame is None
+                or self.fresh
+                or frame.action not in (None, StepAction.LANE, *NEEDING_PLACE)
+                or frame.place
+            ):
+                frame = self.open_step(StepAction.LANE)
+        frame.action, frame.direction, frame.ordinal = StepAction.LANE, item.direction, None
+        frame.negated = self.negation in NEGATING
+
+    def _side(self, item: SideItem) -> None:
+        turns = sum(frame.action in (StepAction.TURN, StepAction.LANE) for frame in self.frames)
+        self._place_side(item)
+        directed = [frame for frame in self.frames if frame.action in (StepAction.TURN, StepAction.LANE)]
+        used = len(directed) > turns or any(frame.direction is item.direction for frame in directed)
+        self.aside = self.aside or not used
+
+    def _place_side(self, item: SideItem) -> None:
+        frame = self.replaced()
+        if frame is not None and frame.side is not None:
+            frame.side = item.direction
+            return
+        frame = self.frame
+        if frame is None and self.counting:
+            self.open_step(StepAction.TURN).direction = item.direction
+        elif frame is None:
+            self.pending.side = item.direction
+        elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
+            frame.direction = item.direction
+        elif self.counting:
+            self.open_step(StepAction.TURN).direction = item.direction
+        elif frame.action in (StepAction.STOP, StepAction.WAIT):
+            frame.side = item.direction
+        elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
+            frame.action, frame.direction = StepAction.TURN, item.direction
+        elif frame.action is StepAction.VISIT and frame.place is not None:
+            frame.place = with_details(frame.place, side=item.direction)
+            if frame.mood is ClauseMood.STATEMENT:
+                self.pending.side = item.direction  # "the house is on the left, stop there"
+        elif self.pending.ordinal is not None:
+            opened = self.open_step(StepAction.TURN)
+            opened.direction = item.direction
+        else:
+            self.pending.side = item.direction
+
+    def _distance(self, item: DistanceItem) -> None:
+        frame = self.replaced()
+        if frame is None:
+            frame = self.frame if self.frame is not None and not self.fresh else None
+        if frame is not None and (frame.action is not None or frame.verb):
+            frame.distance = item.metres
+        else:
+            self.pending.distance = item.metres
+
+    def _unit(self, item: UnitItem) -> None:
+        """Reads a unit that follows its number with a pause: "thirty, miles"."""
+        last = self.frames[-1] if self.frames else None
+        if self.pending.bare_number is not None:
+            self.pending.bare_number = round(self.pending.bare_number * item.factor)
+        elif last is not None and last.action is StepAction.SPEED and last.bare_number is not None:
+            last.speed = round(last.bare_number * item.factor)
+
+    def _word(self, item: WordItem) -> None:
+        """Reads an unknown word; behind a bare place it makes a statement of it: "the KFC shut ages ago"."""
+        frame = self.frame
+        speeding = frame is not None and frame.action is StepAction.SPEED and not self.fresh
+        if frame is not None and speeding and item.word == "less":  # "ten miles an hour less"
+            frame.speed, frame.change = None, StepChange.SLOWER
+            return
+        if frame is not None and frame.word in ("cross", "pass") and item.word in _IT and not self.fresh:
+            if self.last_place is not None and frame.at is None:
+                frame.relation, frame.at = ConditionRelation.PAST, self.last_place
+            return
+        if frame is not None and frame.action is StepAction.VISIT and frame.place is None and frame.word in FETCHING:
+            if item.word in route_grammar().people and not self.fresh:
+                self.fetch(frame)
+            elif item.word not in route_grammar().modifiers:
+                frame.word = ""  # things are collected, too
+            return
+        if frame is not None and frame.bare and not self.fresh and frame is self.frames[-1]:
+            if item.word in route_grammar().finite or item.word in _PAST or item.word.endswith(("ed", "'s")):
+                frame.mood, frame.bare = ClauseMood.STATEMENT, False
+
+    def _speed(self, item: SpeedItem) -> None:
+        frame = self.replaced(StepAction.SPEED)
+        if frame is None:
+            frame = self.frame if self.frame is not None and not self.fresh else None
+        if frame is not None and frame.action is not None and frame.action not in NEEDING_PLACE:
+            if item.unit or frame.action is StepAction.SPEED:
+                frame.speed = item.speed
+                frame.bare_number = None if item.unit else item.speed
+        elif item.unit or (frame is not None and frame.verb in ("do", "go", "drive", "make", "keep", "take")):
+            opened = frame if frame is not None and frame.action is None else self.open_step(StepAction.SPEED)
+            opened.action, opened.speed = StepAction.SPEED, item.speed
+        else:
+            self.pending.bare_number = item.speed

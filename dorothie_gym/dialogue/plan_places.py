@@ -1,0 +1,246 @@
+"""Places of driving plans: conditions, errands, streets to follow or avoid, and opportunities to turn."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, PlanState
+from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.plan_items import ConditionItem, NounPhrase
+    from dorothie_gym.dialogue.realization_context import Direction
+
+_INITIAL: Final = frozenset(
+    {"take", "makes", "make", "turn", "hang", "swing", "go", "want", "need", "have", "get", "be", "do"}
+)
+"""Verbs whose object can be an opportunity to turn: "take the second"."""
+
+FETCHING: Final = frozenset({"fetch", "fetching", "collect", "collecting", "pick", "picking", "after", "once"})
+"""First words of phrases by which somebody is fetched."""
+
+_LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
+"""Relations of an errand to another place than its own."""
+
+_HAVING: Final = frozenset({"be", "have", "get", "want", "need"})
+"""Verbs by which a place becomes an errand: "have a bite at the Panera"."""
+
+
+class PlaceReader(PlanState):
+    """Reads the places of a plan."""
+
+    def __init__(self) -> None:
+        """Begins without places."""
+        super().__init__()
+        self.last_place: PlaceReference | None = None
+        self.person = False  # whether somebody is to be fetched
+        self.counting = False  # whether the last item is an opportunity to turn
+
+    def read_condition(self, item: ConditionItem) -> None:
+        """Reads a condition, for the current step or for the next one."""
+        place = item.place.reference if item.place is not None else self.last_place
+        if place is not None and place.reference is Anaphor.THERE and self.last_place is not None:
+            place = self.last_place
+        if place is None:
+            if item.place is not None and item.place.ordinal is not None:
+                self._counted(item.relation, item.place.ordinal)
+            return
+        if place.reference is None:
+            self.last_place = place
+        if self.repairing and (frame := self.replaced()) is not None and frame.at is not None:
+            frame.relation, frame.at = item.relation, place
+            return
+        if self.negation == "instead":
+            self.negation = None
+            return
+        frame = self.frame
+        direct = frame is not None and (frame.at is None or frame.borrowed)
+        if frame is not None and not self.fresh and direct and (frame.action is not None or frame.verb):
+            self.attach(frame, item.relation, place)
+        elif self.mood is not ClauseMood.STATEMENT:
+            self.stop_between()
+            self.pending.relation, self.pending.at = item.relation, place
+
+    def stop_between(self) -> None:
+        """Makes an errand of a place that has waited in vain for a step: "one at the Coco, one at the KFC"."""
+        waiting = self.pending.at
+        if waiting is not None and waiting.landmark is not None and self.pending.relation is ConditionRelation.AT:
+            if (self.fresh and self.frame is None) or (self.fresh and self.frame is not None and self.frame.bare):
+                self.pending.at = None
+                self.open_step(StepAction.VISIT).place = waiting
+                self.frame, self.fresh = None, True
+
+    def attach(self, frame: Frame, relation: ConditionRelation, place: PlaceReference) -> None:
+        """Puts a condition into the current step."""
+        fetching = (
+            frame.place is not None and frame.place.landmark is LandmarkName.PERSON and place.landmark is not None
+        )
+        if fetching:
+            frame.relation, frame.at = ConditionRelation.AT, place  # "pick her up from the KFC"
+        elif frame.action is StepAction.VISIT and frame.place is None and relation not in _LATER:
+            frame.place = place
+        elif frame.action is StepAction.VISIT and frame.place is not None and _names_only_street(place):
+            frame.place = with_details(frame.place, street=place.street)
+        elif frame.action is StepAction.VISIT and frame.place == place:
+            pass  # "chicken at the KFC" names it twice
+        elif (
+            frame.action is StepAction.FOLLOW
+            and frame.place is None
+            and place.street is not None
+            and not place.landmark
+        ):
+            frame.place = place
+        elif frame.action is None and frame.verb == "be" and place.landmark is not None:
+            frame.action, frame.place = StepAction.VISIT, place
+        elif frame.action is None and frame.verb in ("have", "get", "want", "need") and place.landmark is not None:
+            frame.action, frame.place = StepAction.VISIT, place
+        else:
+            turning = frame.action in (StepAction.TURN, StepAction.STRAIGHT, StepAction.LANE)
+            beside = relation is ConditionRelation.BESIDE and turning and frame.action is not StepAction.LANE
+            frame.borrowed = False
+            frame.relation, frame.at = ConditionRelation.AT if beside else relation, place
+
+    def _counted(self, relation: ConditionRelation, ordinal: int) -> None:
+        """Puts "at the second junction" or "after the second crossing" into a step."""
+        behind = relation in (ConditionRelation.AFTER, ConditionRelation.PAST)
+        current = (
+            self.frame if self.frame is not None and not self.fresh and self.frame.action is not None else self.pending
+        )
+        if behind or current.action in (StepAction.STOP, StepAction.STRAIGHT):
+            current.relation, current.at = relation, PlaceReference(ordinal=ordinal)
+        else:
+            current.ordinal = ordinal
+
+    def read_place(self, item: NounPhrase) -> None:
+        """Reads a place or an opportunity that no relation introduces."""
+        place = item.reference
+        if place is None:
+            self._opportunity(item.ordinal, blocks=item.blocks)
+            return
+        if place.reference is None:
+            self.last_place = place
+        if self.negation == "cancel":
+            self.negation = None
+            if place.landmark is not None:
+                self.cancelled.add(place.landmark)
+            elif place.street is not None:
+                self.open_step(StepAction.AVOID).place = place
+            return
+        if self.repairing and self._corrected(place):
+            return
+        place = self._resolved(place)
+        frame = self.frame
+        if frame is None or self.fresh or frame.place is not None:
+            self._bare(place)
+        elif frame.action in NEEDING_PLACE or frame.verb == "leave":
+            self._target(frame, place)
+        elif frame.action is None:
+            self._object_of_verb(frame, place)
+        elif frame.at is None and frame.action is not StepAction.SPEED:
+            crossed = frame.action is StepAction.STRAIGHT
+            frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
+            frame.at = place
+
+    def _target(self, frame: Frame, place: PlaceReference) -> None:
+        """Completes "take me to", "follow", "avoid" with a place."""
+        if frame.action is StepAction.TURN and frame.verb == "leave":
+            if place.landmark is not None:
+                frame.action, frame.place = StepAction.VISIT, place
+            else:
+                frame.relation, frame.at = ConditionRelation.FROM, place
+        elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
+            self.fetch(frame, place)
+        elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
+            frame.action, frame.relation, frame.at = StepAction.STRAIGHT, ConditionRelation.UNTIL, place
+        elif frame.action is StepAction.FOLLOW and place.landmark is not None:
+            frame.action = None
+        else:
+            frame.place = place
+            if self.negation in NEGATING:
+                frame.negated = True
+
+    def fetch(self, frame: Frame, place: PlaceReference | None = None) -> None:
+        """Makes somebody the aim of an errand: "pick up my nephew"."""
+        street = place.street if place is not None else None
+        frame.place = PlaceReference(landmark=LandmarkName.PERSON, street=street)
+        self.person = self.person or frame.mood in ORDERED
+
+    def _object_of_verb(self, frame: Frame, place: PlaceReference) -> None:
+        if place.reference is Anaphor.HERE or place.reference is Anaphor.THERE:
+            frame.relation, frame.at = ConditionRelation.AT, place
+        elif place.landmark is not None:
+            frame.action, frame.place = StepAction.VISIT, place
+        elif place.street is not None and place.object is None:
+            frame.action, frame.place = StepAction.FOLLOW, place
+        frame.negated = self.negation in NEGATING
+
+    def _bare(self, place: PlaceReference) -> None:
+        """Reads a place without a verb: an errand, a street to take, or the place of what follows."""
+        if place.reference is not None or place.object is not None:
+            if self.mood is ClauseMood.STATEMENT and self.frame is None:
+                return
+            if place.reference in (Anaphor.HERE, Anaphor.THERE) and self.frame is not None and self.frame.at is None:
+                self.frame.relation, self.frame.at = ConditionRelation.AT, self._resolved(place)
+            elif place.reference is Anaphor.WAY_WE_CAME:
+                self.open_step(StepAction.FOLLOW).place = place
+            elif place.reference in (Anaphor.START, Anaphor.LAST_STOP):
+                self.open_step(StepAction.VISIT).place = place
+            elif place.reference is not None:
+                self.pending.relation, self.pending.at = ConditionRelation.AT, self._resolved(place)
+            return
+        if place.landmark is not None:
+            frame = self.open_step(StepAction.VISIT)
+            frame.place, frame.bare = place, True
+        elif self.negation in NEGATING or not self.pending.at:
+            frame = self.open_step(StepAction.FOLLOW)
+            frame.place, frame.bare = place, not frame.negated
+
+    def _resolved(self, place: PlaceReference) -> PlaceReference:
+        return self.last_place if place.reference is Anaphor.THERE and self.last_place is not None else place
+
+    def _corrected(self, place: PlaceReference) -> bool:
+        """Replaces the place of the last step; returns whether it did."""
+        self.repairing = False
+        for frame in reversed(self.frames):
+            for name in ("place", "at"):
+                old = getattr(frame, name)
+                if old is not None and (old.landmark is None) is (place.landmark is None):
+                    setattr(frame, name, place)
+                    self.repaired, self.frame, self.fresh = True, frame, False
+                    return True
+        return False
+
+    def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
+        self.counting = True
+        if ordinal is None:
+            frame = self.frame
+            if frame is not None and not self.fresh and frame.action is StepAction.FOLLOW and frame.place is None:
+                frame.action = StepAction.STRAIGHT  # "stay on this road"
+            return
+        frame = self.replaced(StepAction.TURN)
+        if frame is None:
+            frame = self.frame if self.frame is not None and not self.fresh else None
+        if frame is not None and frame.action in (StepAction.TURN, StepAction.STOP):
+            frame.ordinal = ordinal if self.repaired or frame.ordinal is None else frame.ordinal
+        elif frame is not None and frame.action is None and frame.verb in _INITIAL and not blocks:
+            frame.action, frame.ordinal = StepAction.TURN, ordinal
+        elif frame is not None and frame.action is StepAction.STRAIGHT and frame.at is None:
+            frame.ordinal = ordinal  # "straight over two junctions"
+        elif blocks and frame is not None and frame.action is None:
+            frame.action, frame.ordinal = StepAction.STRAIGHT, ordinal
+        else:
+            self.pending.ordinal = None if blocks else ordinal
+
+
+def _names_only_street(place: PlaceReference) -> bool:
+    return place.to_json().keys() == {"street"}
+
+
+def with_details(
+    place: PlaceReference, *, side: Direction | None = None, street: StreetName | None = None
+) -> PlaceReference:
+    """Returns the place with a side of the street, or with its street."""
+    return dataclasses.replace(place, side=side or place.side, street=street or place.street)

@@ -1,0 +1,90 @@
+"""Reader of driving plans: from the text of an utterance to its steps."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Sequence
+
+from dorothie_gym.dialogue.clause_moods import ClauseReader
+from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_lists
+from dorothie_gym.dialogue.entity_recognition import find_names
+from dorothie_gym.dialogue.lexicon import split_words
+from dorothie_gym.dialogue.plan_chunker import read_items
+from dorothie_gym.dialogue.plan_parser import PlanParse, Sentence, parse_plan
+from dorothie_gym.dialogue.route_grammar import route_grammar
+from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
+
+_SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
+_LIGHTS = frozenset({"light", "lights"})
+_NONE: frozenset[str] = frozenset()
+_COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
+"""First parts of names of lights that the lexicon knows."""
+
+
+def with_plain_lights(words: Sequence[str]) -> list[str]:
+    """Returns the words with the car's "lights" as "headlights", and those of a junction as "stoplight"."""
+    found = list(words)
+    if _LIGHTS.isdisjoint(found):
+        return found
+    grammar = route_grammar()
+    for place in range(len(found)):
+        match = grammar.lights.longest(found, place)
+        if match is not None and not _is_at_junction(found, place, _NONE):
+            for number in range(place, place + match.length):
+                if found[number] in _LIGHTS:
+                    found[number] = "headlights"
+    for place, word in enumerate(found):
+        if word in _LIGHTS and _is_at_junction(found, place):
+            found[place] = "stoplight"
+    return found
+
+
+def _is_at_junction(words: Sequence[str], place: int, compounds: frozenset[str] = _COMPOUNDS) -> bool:
+    """Returns whether the lights at a place are those of a junction: "at the next set of lights"."""
+    grammar = route_grammar()
+    place -= 1
+    if place >= 0 and words[place] in compounds:
+        return False
+    while place >= 0 and words[place] in grammar.modifiers and words[place] not in grammar.junction_words:
+        if words[place] in ("your", "my", "our"):
+            return False
+        place -= 1
+    return place >= 0 and words[place] in grammar.junction_words
+
+
+@functools.lru_cache(maxsize=2048)
+def read_plan(text: str) -> PlanParse:
+    """Returns the plan of an utterance, with the steps that it names otherwise.
+
+    Args:
+        text: free English; may be empty.
+    """
+    sentences = (_sentence(part) for part in _SENTENCE.split(text))
+    return parse_plan([sentence for sentence in sentences if sentence is not None])
+
+
+def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
+    """Returns the words without vocatives and fillers."""
+    words = without_vocative(list(words), lists)
+    fillers, kept, place = route_grammar().fillers, list[str](), 0
+    while place < len(words):
+        match = fillers.longest(words, place)
+        if match is None:
+            kept.append(words[place])
+        place += 1 if match is None else match.length
+    return without_asides(kept, lists) if kept else words
+
+
+def _sentence(text: str) -> Sentence | None:
+    lists = word_lists()
+    said = with_plain_lights(_plain(split_words(text), lists))
+    if not said:
+        return None
+    mentions, masked = find_names(said, statuses=False)
+    words = mask_directions(masked, lists)
+    names = {mention.start: mention.value for mention in mentions}
+    lead = {mention.start: mention.first for mention in mentions}
+    contracted = frozenset(mention.start for mention in mentions if mention.contracted)
+    clauses = ClauseReader(words=words, question=words[-1:] == ["?"], contracted=contracted)
+    return Sentence(clauses, read_items(words, names, lead))

@@ -1,0 +1,62 @@
+"""Order of the Co-Wizard's answers to an utterance, and what is still due of the remarks before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.policy import replace
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.speech import Remark
+
+_SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
+_PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
+
+
+def still_due(state: CoWizardState) -> tuple[Remark, ...]:
+    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled."""
+    kept: list[Remark] = []
+    dropped = False
+    for item in state.speech.queue:
+        idle = item.act.move in _SETTLED or any(said.predicate in _PLANS for said in item.meaning)
+        dropped = dropped if item.joined else idle and not item.urgent
+        if not dropped:
+            kept.append(item)
+    if len(kept) < len(state.speech.queue):
+        state.dialogue = state.dialogue.with_proposal(None)
+    return tuple(kept)
+
+
+def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
+    """Joins the answers to an utterance.
+
+    An "okay" is dropped if another remark follows, and "what?" if a part of the utterance was understood.
+    Plans come last.
+    """
+    understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
+    answers = sorted(understood or answers[:1], key=_tells_plan)
+    plain = list(map(is_plain_sign, answers))
+    leads = [following.joined for following in answers[1:]]
+    kept = [
+        item
+        for k, item in enumerate(answers)
+        if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
+    ]
+    return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def is_plain_sign(item: Remark) -> bool:
+    """Returns whether a remark is a mere "okay"."""
+    return item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots
+
+
+def _tells_plan(item: Remark) -> bool:
+    """Returns whether a remark states a plan without being asked."""
+    plan = any(said.predicate in _PLANS for said in item.meaning)
+    return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
