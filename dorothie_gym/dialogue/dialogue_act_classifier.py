@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
 from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, split_words, strings
@@ -199,6 +200,8 @@ def _plain_words(text: str) -> list[str]:
 
 def _is_bare_place(parsed: ParsedText) -> bool:
     """Returns whether the text only names a destination: no verb, no object, no question."""
+    if parsed.parse is not None and set(parsed.parse.moods) == {ClauseMood.STATEMENT}:
+        return False  # "I used to live near the KFC"
     return bool(parsed.landmarks) and not parsed.objects and not parsed.question and not _VERB.search(parsed.acted)
 
 

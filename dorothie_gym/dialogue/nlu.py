@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
-from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS, may_be_speed, read_cardinals
 from dorothie_gym.dialogue.plan_fields import named_actions, planned_change, planned_number, planned_turns
 from dorothie_gym.dialogue.plan_parser import PlanParse
 from dorothie_gym.dialogue.plan_reading import read_plan, with_plain_lights
@@ -286,7 +286,9 @@ def _quantities(words: Sequence[str]) -> tuple[int | None, int | None]:
         unit = words[place + len(run)] if place + len(run) < len(words) else ""
         if unit in _DISTANCE_UNITS:
             distance = number if distance is None else distance
-        elif number >= _LEAST_NUMBER or unit in _SPEED_UNITS:
+        elif unit in _SPEED_UNITS or (
+            number >= _LEAST_NUMBER and may_be_speed(words[place - 1] if place else "", unit)
+        ):
             speed = number if speed is None else speed
     return speed, distance
 

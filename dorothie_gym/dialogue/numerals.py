@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 _ONES = [
     "zero",
@@ -34,6 +35,10 @@ _ROUND = {word: 10 * number for number, word in enumerate(_TENS) if number > 1}
 
 NUMBER_WORDS = frozenset((*_ONES, *_ROUND, "hundred"))
 """Words that form cardinals."""
+
+_OTHER_UNITS: Final = frozenset(
+    {"second", "seconds", "minute", "minutes", "hour", "hours", "percent", "o'clock", "oclock", "am", "pm"}
+)
 
 
 def cardinal(number: int) -> str:
@@ -118,3 +123,8 @@ def read_cardinals(words: Sequence[str]) -> list[int]:
                 found.append(current)
             current = value
     return found
+
+
+def may_be_speed(before: str, after: str) -> bool:
+    """Returns whether a number without a unit may be a speed, by the words around it: not "by six", "six minutes"."""
+    return before != "by" and after not in _OTHER_UNITS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from dorothie_gym.dialogue.numerals import read_cardinals, read_ordinal
+from dorothie_gym.dialogue.numerals import may_be_speed, read_cardinals, read_ordinal
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
     BoundaryItem,
@@ -216,14 +216,7 @@ class _Reader:
                 number, end = number + 0.5, end + 3
             self.items.append(DistanceItem(max(1, round(number * metres))))
             return end + 1
-        if number >= _LEAST_SPEED and self._word(end) not in (
-            "minutes",
-            "seconds",
-            "minute",
-            "hours",
-            "hour",
-            "percent",
-        ):
+        if number >= _LEAST_SPEED and may_be_speed(self._word(place - 1), self._word(end)):
             self._speed(number, unit=False)
             return end
         return place

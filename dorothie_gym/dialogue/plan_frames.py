@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from dorothie_gym.dialogue.clause_moods import ClauseMood
+from dorothie_gym.dialogue.clause_moods import ClauseMood, is_participle
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import (
     Anaphor,
@@ -120,6 +121,7 @@ class PlanState:
         self.cancelled: set[LandmarkName] = set()
         self.denied: set[StepAction] = set()
         self.forbidding = False
+        self.preceded = False  # whether other errands come before the next one: "before we go to the KFC"
 
     def close(self) -> None:
         """Finishes the step under construction."""
@@ -162,6 +164,8 @@ class PlanState:
         frame = Frame(action=action, mood=self.mood, negated=self.negation in NEGATING)
         waiting, self.pending = self.pending, Frame()
         frame.forbidden = self.negation == "forbid"
+        if action is StepAction.TURN and self.negation == "cancel":  # "skip the next left"
+            frame.negated = frame.forbidden = True
         frame.relation, frame.at, frame.distance = waiting.relation, waiting.at, waiting.distance
         frame.borrowed = waiting.at is not None
         frame.ordinal = waiting.ordinal
@@ -198,6 +202,21 @@ class PlanState:
                 del self.frames[number]
                 self.frame, self.fresh, self.repaired = None, True, True
                 return
+
+    def open_action(self, frame: Frame) -> None:
+        """Sets what the words in front of an action say of it: whether it waits, and whether it is told."""
+        if frame.action is StepAction.VISIT:
+            frame.deferred, self.preceded = frame.deferred or self.preceded, False
+        first = frame is self.frames[0] and self.negation is None
+        if self.mood is ClauseMood.COMMAND and first and is_participle(frame.word):
+            frame.mood = ClauseMood.STATEMENT  # "now I am stopping", with the first words misheard
+
+    def inherit_directions(self) -> None:
+        """Gives a counted turn the direction of the negated one before it: "not the first left, the second"."""
+        for before, frame in itertools.pairwise(self.frames):
+            counted = frame.action is StepAction.TURN and frame.direction is None and frame.ordinal is not None
+            if counted and before.action is StepAction.TURN and before.negated:
+                frame.direction = before.direction
 
     def steps_of(self, frame: Frame) -> list[PlanStep]:
         """Returns the step of a frame after its negation; empty if there is none."""

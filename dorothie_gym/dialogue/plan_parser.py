@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader, is_participle
+from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader
 from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, append_step
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
@@ -170,6 +170,7 @@ class _Builder(PlaceReader):
         described: list[PlanStep] = []
         ordered: list[PlanStep] = []
         self._drop_interjection()
+        self.inherit_directions()
         for frame in sorted(self.frames, key=lambda frame: frame.deferred):
             for step in self.steps_of(frame):
                 described.append(step)
@@ -220,7 +221,7 @@ class _Builder(PlaceReader):
 
     def _boundary(self, item: BoundaryItem) -> None:
         self.fresh = True
-        self.negation = None
+        self.negation, self.preceded = None, False
         if item.kind == "then":
             self.close()
         self._clause(item.place, new=False)
@@ -263,9 +264,7 @@ class _Builder(PlaceReader):
         elif frame.action in NEEDING_PLACE and action is StepAction.FOLLOW and self.negation is None:
             action = frame.action or action
         frame.action, frame.word = action, self.clauses.words[item.place]
-        first = frame is self.frames[0] and self.negation is None
-        if self.mood is ClauseMood.COMMAND and first and is_participle(frame.word):
-            frame.mood = ClauseMood.STATEMENT  # "now I am stopping", with the first words misheard
+        self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
         if action is StepAction.STOP and frame.at is None and not _HERE.isdisjoint(said):
             frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
@@ -352,9 +351,9 @@ class _Builder(PlaceReader):
                 frame.action, frame.direction = StepAction.LANE, item.direction
                 return
             if frame.action is None or (frame.action in NEEDING_PLACE and frame.place is None):
-                frame.action = StepAction.TURN
+                avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
                 frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
-                frame.negated = self.negation in NEGATING
+                frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
                 self._repeat(item)
                 return
         named = self._bare_street()
@@ -459,6 +458,7 @@ class _Builder(PlaceReader):
 
     def _word(self, item: WordItem) -> None:
         """Reads an unknown word; behind a bare place it makes a statement of it: "the KFC shut ages ago"."""
+        self.preceded = self.preceded or item.word == "before"
         frame = self.frame
         speeding = frame is not None and frame.action is StepAction.SPEED and not self.fresh
         if frame is not None and speeding and item.word == "less":  # "ten miles an hour less"

@@ -90,6 +90,7 @@ def test_a_film_has_ten_frames_in_a_second(filmed: tuple[Path, list[NDArray[np.u
     assert len(frames) == 121 and {frame.shape for frame in frames} == {(720, 1280, 3)}
 
 
+@pytest.mark.long
 def test_between_decisions_a_film_shows_what_the_record_shows(filmed: tuple[Path, list[NDArray[np.uint8]]]) -> None:
     """All bodies move, and the car follows its trajectory: the record of the session gives nearly the same pictures."""
     folder, frames = filmed

@@ -48,6 +48,7 @@ def test_cloning_generalises_to_held_out_sessions(corpus: Path) -> None:
     assert cloned.action_agreement > 0.25
 
 
+@pytest.mark.long
 def test_warm_start_is_evaluated_before_training(corpus: Path, tmp_path: Path) -> None:
     small = tmp_path / "corpus"
     for session in ("train/0000", "val/seen/0026"):

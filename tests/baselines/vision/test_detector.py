@@ -55,6 +55,7 @@ def test_training_finds_cars(long_training):
     assert found > 0.3 and guessed < 0.1
 
 
+@pytest.mark.long
 def test_training_learns_places_sizes_and_headings(long_training):
     pictures, (trained, _) = frame_set(3, 4), long_training
     found, guessed = (object_figures(detected_boxes(model, pictures)) for model in (trained.model, learner().model))

@@ -69,6 +69,7 @@ def test_pictures_of_a_faulty_camera_are_left_out(corpus):
     assert len(left) and not ((left >= first) & (left <= last)).any()
 
 
+@pytest.mark.long
 def test_labels_belong_to_the_pictures(corpus, tmp_path):
     pictures = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path)["train"]
     batch = pictures.take(range(len(pictures)))
