@@ -19,6 +19,7 @@ from dorothie_gym.errors import one_line
 from dorothie_gym.lab.admission import TokenBucket
 from dorothie_gym.lab.hosts import is_same_origin
 from dorothie_gym.lab.protocols import recognise
+from dorothie_gym.support.schemas import decoder
 
 MAX_BODY: Final = 256 * 1024
 """Largest body of a request [bytes]: 50 long texts of a questionnaire take as much, marks of an utterance 1 kB."""
@@ -126,7 +127,7 @@ class Gate:
     def read(self, request: Request, kind: type[_T]) -> _T:
         """Returns the body of a request; raises `RequestError` if it is malformed."""
         try:
-            return msgspec.json.decode(request.state.body, type=kind)
+            return decoder(kind).decode(request.state.body)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise RequestError(400, self._wording.malformed.format(one_line(error))) from None
 

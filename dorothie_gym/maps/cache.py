@@ -17,7 +17,6 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, TypeAlias, TypedDict, get_type_hints
 
-import msgspec
 import numpy as np
 
 from dorothie_gym.errors import InputFileError, TownArchiveError, one_line
@@ -39,6 +38,7 @@ from dorothie_gym.maps.town import MAX_EXTENT, LightPhase, LightProgramme, Town
 from dorothie_gym.support import portable_arrays, portable_math
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
+from dorothie_gym.support.schemas import convert
 from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, remove, write_signed
 
 ARCHIVE_FORMAT = 1
@@ -200,7 +200,7 @@ class _ArrayReader:
                 yield self._floats[self._at : self._at + count].reshape(shape)
                 self._at += count
         else:
-            msgspec.convert(column, list[kind])  # checks the types; a whole number stays one
+            convert(column, list[kind])  # checks the types; a whole number stays one
             yield from map(_CONVERTERS.get(name, _frozen), column)
 
 

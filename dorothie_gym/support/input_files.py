@@ -26,6 +26,7 @@ import msgspec
 
 from dorothie_gym.errors import DorothieGymError, InputFileError, one_line
 from dorothie_gym.support.libraries import pa, pc, pq
+from dorothie_gym.support.schemas import convert
 
 if typing.TYPE_CHECKING:
     from dorothie_gym.support.files import JsonValue
@@ -257,7 +258,7 @@ def checked(value: object, kind: type[_T], where: object) -> _T:
             message names the field.
     """
     try:
-        found = msgspec.convert(value, kind)
+        found = convert(value, kind)
     except msgspec.ValidationError as error:
         reason, _, place = str(error).rpartition(" - at `$")
         field = f"field {place.rstrip('`').removeprefix('.')!r}" if reason else ""

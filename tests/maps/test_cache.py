@@ -108,7 +108,7 @@ def test_the_compiler_s_digest_covers_all_of_our_modules_that_compile() -> None:
         "print(json.dumps([m for m in sys.modules if m.startswith('dorothie_gym.')]))"
     )
     loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
-    helpers = [f"support.{name}" for name in ("copying", "files", "input_files", "libraries", "user_cache")]
+    helpers = [f"support.{name}" for name in ("copying", "files", "input_files", "libraries", "schemas", "user_cache")]
     names = ["_registration", "_startup", "_version", "errors", "support", *helpers]
     without_effect = {f"dorothie_gym.{name}" for name in names}
     covered = ("dorothie_gym.maps", "dorothie_gym.support.compilation")

@@ -22,6 +22,7 @@ from dorothie_gym.lab.annotation.rows import (
 from dorothie_gym.session.recording.files import decode_text, read_lines
 from dorothie_gym.session.recording.header import parse_version
 from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.schemas import decoder
 
 if TYPE_CHECKING:
     from dorothie_gym.lab.annotation.source_text import SourceText
@@ -87,13 +88,13 @@ def read_jsonl(path: Path, text: SourceText) -> Annotation:
         for number, line in enumerate(lines, start=1):
             decode_text(line.encode("utf-8", "surrogatepass"), f"{path}, line {number}")
             if number == 1:
-                parse_version(msgspec.json.decode(line, type=Head).annotation, str(path), VERSION)
+                parse_version(decoder(Head).decode(line).annotation, str(path), VERSION)
             elif '"spans"' in line:
-                rows.utterances.append(_utterance(msgspec.json.decode(line, type=UtteranceLine), text))
+                rows.utterances.append(_utterance(decoder(UtteranceLine).decode(line), text))
             elif '"transaction"' in line:
-                rows.transactions.append(msgspec.json.decode(line, type=TransactionRow))
+                rows.transactions.append(decoder(TransactionRow).decode(line))
             else:
-                rows.exchanges.append(msgspec.json.decode(line, type=ExchangeRow))
+                rows.exchanges.append(decoder(ExchangeRow).decode(line))
         change = change_of(rows)
         check_change(change, text)
     except (msgspec.DecodeError, RecursionError) as error:

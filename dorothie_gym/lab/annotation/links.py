@@ -15,6 +15,7 @@ from dorothie_gym.lab.annotation.workplace import Seat, SeatKind
 from dorothie_gym.session.recording.files import ANNOTATIONS_FOLDER
 from dorothie_gym.support.files import make_folder, write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, raising, read_file
+from dorothie_gym.support.schemas import decoder
 
 LINKS_FILE: Final = "links.json"
 LINKS_VERSION: Final = 1
@@ -70,7 +71,7 @@ def read_links(root: Path) -> list[LinkRow]:
         content = read_file(path, MAX_SMALL_JSON)
     remedy = "run annotate with --new-links, which replaces it"
     try:
-        page = msgspec.json.decode(content, type=LinksPage)
+        page = decoder(LinksPage).decode(content)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise AnnotationError(f"{path}: {one_line(error)}; {remedy}") from None
     if page.links_version != LINKS_VERSION:

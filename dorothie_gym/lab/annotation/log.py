@@ -24,6 +24,7 @@ from dorothie_gym.lab.annotation.rows import ChangeRows, change_of, rows_of
 from dorothie_gym.session.recording.files import ANNOTATIONS_FOLDER, decode_text, read_bytes
 from dorothie_gym.session.recording.header import parse_version
 from dorothie_gym.support.files import make_folder, sync
+from dorothie_gym.support.schemas import decoder
 
 if TYPE_CHECKING:
     from dorothie_gym.lab.annotation.source_text import SourceText
@@ -313,7 +314,7 @@ class AnnotationLog:
             )
         for line in content.split(b"\n")[0 if self._size else 1 : -1]:
             try:
-                msgspec.json.decode(line, type=LogLine)
+                decoder(LogLine).decode(line)
             except msgspec.ValidationError as error:
                 raise AnnotationError(f"{self.path}: cannot hold the edit: {one_line(error)}") from None
         return extent
@@ -332,9 +333,9 @@ class AnnotationLog:
             decode_text(line, where)
             try:
                 if number == 1:
-                    self._take_head(msgspec.json.decode(line, type=LogHead))
+                    self._take_head(decoder(LogHead).decode(line))
                 else:
-                    self._take_line(msgspec.json.decode(line, type=LogLine))
+                    self._take_line(decoder(LogLine).decode(line))
             except (msgspec.DecodeError, AnnotationError, RecursionError) as error:
                 raise SessionError(f"{where}: {one_line(error)}; the log is damaged") from None
 

@@ -18,6 +18,7 @@ from dorothie_gym.lab.studies.items import Choice, Number
 from dorothie_gym.lab.studies.study import HUMAN, Method, Scenario, Study
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.support.input_files import read_text
+from dorothie_gym.support.schemas import convert
 from dorothie_gym.tasks.parsing import load_template
 
 MAX_STUDY: Final = 1_000_000
@@ -59,7 +60,7 @@ def read_study(path: Path) -> Study:
     root = _compose(path, text)
     value = _plain(path, root)
     try:
-        study = msgspec.convert(value, Study)
+        study = convert(value, Study)
     except msgspec.ValidationError as error:
         place = _PLACE.search(str(error))
         reason, field = (str(error)[: place.start()], place[1]) if place else (str(error), "")
