@@ -17,8 +17,8 @@ import typer
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.experiment import validation_scores
 from dorothie_gym.baselines.model_entries import SIZES, find_row
-from dorothie_gym.baselines.model_io import TRAIN, VALIDATION
 from dorothie_gym.baselines.model_zoo import build_model
+from dorothie_gym.baselines.point_tensors import TRAIN, VALIDATION
 from dorothie_gym.baselines.toto import TOTOConfig
 from dorothie_gym.baselines.trainer import predict, train
 from dorothie_gym.evaluation.teacher_forced import COLUMNS

@@ -17,7 +17,7 @@ from benchmarks.timing import Progress, alternate, cpu_seconds, ignore_progress,
 from dorothie_gym.archive import Corpus
 from dorothie_gym.archive.prediction_points import Point, task_points
 from dorothie_gym.baselines.gradients import backpropagate
-from dorothie_gym.baselines.model_io import TASKS, Examples, Labels
+from dorothie_gym.baselines.point_tensors import TASKS, Examples, Labels
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.evaluation.teacher_forced.features import Columns, build, points
 from dorothie_gym.session.recording import Session

@@ -16,7 +16,7 @@ from dorothie_gym.archive.corpus import Corpus, Fold
 from dorothie_gym.baselines.encoders import text_encoder
 from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
 from dorothie_gym.baselines.encoders.encoder import TextEncoder, text_table
-from dorothie_gym.baselines.model_io import TASKS, TRAIN, Examples
+from dorothie_gym.baselines.point_tensors import TASKS, TRAIN, Examples
 from dorothie_gym.baselines.sound_inputs import SoundInputs
 from dorothie_gym.errors import CheckpointError, SessionError
 from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import build

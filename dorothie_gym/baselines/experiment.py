@@ -20,8 +20,8 @@ from dorothie_gym.baselines.checkpoints import ModelCard, sha256_of
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.learning_curves import draw_loss_curves
 from dorothie_gym.baselines.model_entries import ROWS, SIZES, ModelEntry, find_row
-from dorothie_gym.baselines.model_io import TASKS, TEST, TRAIN, VALIDATION, Predicted
 from dorothie_gym.baselines.model_zoo import make_model, needs_pieces
+from dorothie_gym.baselines.point_tensors import TASKS, TEST, TRAIN, VALIDATION, Predicted
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.trainer import BEST_FILE, Epoch, OnEpoch, TrainingSummary, predict, train
 from dorothie_gym.errors import CheckpointError

@@ -19,7 +19,7 @@ from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.gradients import backpropagate
-from dorothie_gym.baselines.model_io import TEST, TRAIN, VALIDATION, allowed_angle
+from dorothie_gym.baselines.point_tensors import TEST, TRAIN, VALIDATION, allowed_angle
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
 from dorothie_gym.envs.ufn_v0 import UfNEnv

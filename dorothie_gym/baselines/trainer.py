@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.gradients import backpropagate
-from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
+from dorothie_gym.baselines.point_tensors import Examples, Inputs, Labels, Predicted
 from dorothie_gym.errors import CheckpointError
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.model_io import Labels, join, tensor
+from dorothie_gym.baselines.point_tensors import Labels, join, tensor
 from dorothie_gym.evaluation.teacher_forced.features import Batch, BatchSpec, TownGraph
 
 TEXTS = 40

@@ -24,8 +24,8 @@ from dorothie_gym.baselines.encoders import (  # noqa: E402
 from dorothie_gym.baselines.encoders.sound import log_mel  # noqa: E402
 from dorothie_gym.baselines.experiment import Experiment, run_experiment  # noqa: E402
 from dorothie_gym.baselines.model_entries import find_row  # noqa: E402
-from dorothie_gym.baselines.model_io import UFN  # noqa: E402
 from dorothie_gym.baselines.model_zoo import make_model  # noqa: E402
+from dorothie_gym.baselines.point_tensors import UFN  # noqa: E402
 from dorothie_gym.baselines.toto import TOTOConfig  # noqa: E402
 from dorothie_gym.errors import EncoderError, SessionError  # noqa: E402
 from dorothie_gym.speech import find_synthesizer, say  # noqa: E402

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from dorothie_gym.baselines.model_entries import ROWS, find_row
-from dorothie_gym.baselines.model_io import NFD, Outputs, allowed_angle, decode
+from dorothie_gym.baselines.point_tensors import NFD, Outputs, allowed_angle, decode
 from dorothie_gym.baselines.toto import (
     ABLATIONS,
     ALL_CHANNELS,

@@ -7,7 +7,7 @@ import torch
 
 from dorothie_gym.baselines.checkpoints import about, restore, save
 from dorothie_gym.baselines.learning_curves import draw_loss_curves
-from dorothie_gym.baselines.model_io import Examples
+from dorothie_gym.baselines.point_tensors import Examples
 from dorothie_gym.baselines.toto import TOTOConfig
 from dorothie_gym.baselines.trainer import BEST_FILE, LAST_FILE, batches, predict, train
 from dorothie_gym.errors import CheckpointError

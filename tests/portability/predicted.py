@@ -10,8 +10,8 @@ from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel
 from dorothie_gym.baselines.checkpoints import restore
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.experiment import Experiment, task_predictions
-from dorothie_gym.baselines.model_io import TEST
 from dorothie_gym.baselines.model_zoo import build_model
+from dorothie_gym.baselines.point_tensors import TEST
 from dorothie_gym.baselines.trainer import predict
 from dorothie_gym.evaluation.teacher_forced import write_predictions
 from dorothie_gym.policies.pretrained import pretrained_folder

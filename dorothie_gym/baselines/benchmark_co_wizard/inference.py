@@ -18,8 +18,8 @@ from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.encoders import text_encoder
 from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
 from dorothie_gym.baselines.model_entries import stored_row
-from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.baselines.model_zoo import build_model, refresh_text_tables
+from dorothie_gym.baselines.point_tensors import Examples, Inputs, Labels, Predicted
 from dorothie_gym.baselines.toto.config import TOTOConfig
 from dorothie_gym.errors import CheckpointError, DorothieGymError, ModelFileError, one_line
 from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable, points

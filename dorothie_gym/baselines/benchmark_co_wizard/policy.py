@@ -36,7 +36,7 @@ from dorothie_gym.sim.state.codes import Motion
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel, TownModel
-    from dorothie_gym.baselines.model_io import Predicted
+    from dorothie_gym.baselines.point_tensors import Predicted
     from dorothie_gym.session.spaces.fields import SpaceLimits
 
 _DIRECTION_VALUES: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)

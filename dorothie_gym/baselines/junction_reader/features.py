@@ -20,7 +20,7 @@ from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.model_io import Inputs
+    from dorothie_gym.baselines.point_tensors import Inputs
     from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 
 _PARTS: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+")

@@ -22,7 +22,7 @@ from dorothie_gym.baselines.junction_reader.features import (
     recent,
     ways,
 )
-from dorothie_gym.baselines.model_io import (
+from dorothie_gym.baselines.point_tensors import (
     NFD,
     TAKES_ANGLE,
     TAKES_SIDE,

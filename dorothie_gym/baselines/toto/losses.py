@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.model_io import NFD, RFN, Labels, Outputs
+from dorothie_gym.baselines.point_tensors import NFD, RFN, Labels, Outputs
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS, VECTOR_SLOTS
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.encoders.sound import SoundReader
-from dorothie_gym.baselines.model_io import Inputs, Labels, Outputs, Predicted, decode
+from dorothie_gym.baselines.point_tensors import Inputs, Labels, Outputs, Predicted, decode
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import Block, GraphAttention, segment_softmax, time_encoding
 from dorothie_gym.baselines.toto.losses import point_losses

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.model_io import tensor
+from dorothie_gym.baselines.point_tensors import tensor
 from dorothie_gym.maps.lane_graph import FEATURES
 
 if TYPE_CHECKING:

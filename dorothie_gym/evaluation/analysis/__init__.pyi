@@ -2,10 +2,6 @@
 
 from .agreement import agreement as agreement
 from .agreement import inconsistencies as inconsistencies
-from .behaviour import CLAIMS as CLAIMS
-from .behaviour import BehaviourClaim as BehaviourClaim
-from .behaviour import BehaviourVerdict as BehaviourVerdict
-from .behaviour import verdicts_of as verdicts_of
 from .corpus_stats import ANCHOR_TOLERANCE as ANCHOR_TOLERANCE
 from .corpus_stats import PAPER as PAPER
 from .corpus_stats import Anchors as Anchors
@@ -21,6 +17,10 @@ from .exception_attribution import handled_by as handled_by
 from .exception_attribution import handling as handling
 from .exception_attribution import handling_of_events as handling_of_events
 from .intervals import RESAMPLES as RESAMPLES
+from .paper_claims import CLAIMS as CLAIMS
+from .paper_claims import BehaviourClaim as BehaviourClaim
+from .paper_claims import BehaviourVerdict as BehaviourVerdict
+from .paper_claims import verdicts_of as verdicts_of
 from .phenomena.catalogue import PHENOMENA as PHENOMENA
 from .phenomena.dialogue_view import DialogueView as DialogueView
 from .phenomena.dialogue_view import Occurrence as Occurrence

@@ -113,13 +113,13 @@ def read_face(view: View, optics: Optics, mesh: Mesh, row: int, textures: Textur
     rise = math.sqrt(x * x + y * y) * optics.sun_z
     light[1], light[2] = 0.06 + min(1.2 * TEXEL * rise / max(cosine, 0.05), 1.5), 0.78 + 0.22 * z
     if texture != PLAIN:
-        _read_axis(view, mesh.u_axes[row], mesh.corners[row, 0], face.u)
-        _read_axis(view, mesh.v_axes[row], mesh.corners[row, 0], face.v)
+        _read_texture_axis(view, mesh.u_axes[row], mesh.corners[row, 0], face.u)
+        _read_texture_axis(view, mesh.v_axes[row], mesh.corners[row, 0], face.v)
         _read_footprint(view, mesh, row, textures, face)
 
 
 @inlined
-def _read_axis(view: View, axis: NDArray[np.float32], corner: NDArray[np.float32], out: Array) -> None:
+def _read_texture_axis(view: View, axis: NDArray[np.float32], corner: NDArray[np.float32], out: Array) -> None:
     origin, axes = view.origin, view.axes
     out[0] = float(axis[3])
     out[1] = out[2] = out[3] = 0.0

@@ -7,7 +7,7 @@ import torch
 from dorothie_gym.baselines.junction_reader import JunctionReader, exit_table, mentions
 from dorothie_gym.baselines.junction_reader.features import label_words
 from dorothie_gym.baselines.model_entries import reader_config
-from dorothie_gym.baselines.model_io import NFD
+from dorothie_gym.baselines.point_tensors import NFD
 from dorothie_gym.baselines.toto import FrozenTexts, Towns
 from dorothie_gym.evaluation.teacher_forced.features import build
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, EdgeType
