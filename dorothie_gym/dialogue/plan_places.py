@@ -48,6 +48,8 @@ class PlaceReader(PlanState):
             if item.place is not None and item.place.ordinal is not None:
                 self._counted(item.relation, item.place.ordinal)
             return
+        if self._excludes(place):
+            return
         if place.reference is None:
             self.last_place = place
         if self.repairing and (frame := self.replaced()) is not None and frame.at is not None:
@@ -63,6 +65,16 @@ class PlaceReader(PlanState):
         elif self.mood is not ClauseMood.STATEMENT:
             self.stop_between()
             self.pending.relation, self.pending.at = item.relation, place
+
+    def _excludes(self, place: PlaceReference) -> bool:
+        """Returns whether a negated place is no condition: "not onto Beal, take Fuller", "not at the KFC"."""
+        if self.negation != "not" or (self.frame is not None and self.frame.action is not None and not self.fresh):
+            return False
+        self.negation = None
+        if _names_only_street(place) and self.mood in ORDERED and not self.repairing:
+            self.open_step(StepAction.AVOID).place = place
+            self.frame, self.fresh = None, True
+        return True
 
     def stop_between(self) -> None:
         """Makes an errand of a place that has waited in vain for a step: "one at the Coco, one at the KFC"."""
