@@ -29,7 +29,7 @@ _NO_VERBS: Final = frozenset(
 )
 """First words of actions that as well end the clause before them."""
 
-_WISHING: Final = frozenset(["be", "helps", "help", "mind", "appreciated", "appreciate", "grateful", "love", "like", "ask", "what", "better"])
+_WISHING: Final = frozenset(["be", "help", "helps", "mind", "appreciate", "grateful", "love", "like", "ask", "what"])
 """Words behind which "if" begins what is wished for."""
 
 _NEAR: Final = 4

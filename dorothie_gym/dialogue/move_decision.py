@@ -7,6 +7,7 @@ them, the cues of `dialogue_act_classifier` do.
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
 from typing import Final
 
@@ -46,6 +47,7 @@ _NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
 _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
+_OTHER: Final = ("other way", "the other way ,", "wrong way", "not that", "not this", "not the")
 _MEANT: Final = (
     "i said",
     "i meant",
@@ -61,7 +63,22 @@ _ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that yes and no answer."""
 _SPEAKERS: Final = frozenset({"i", "we", "you", "he", "she", "they"})
 _PAST: Final = frozenset(
-    {"lost", "missed", "passed", "saw", "went", "left", "forgot", "overshot", "ran", "took", "came", "found", "drove"}
+    {
+        "lost",
+        "missed",
+        "passed",
+        "saw",
+        "went",
+        "left",
+        "#left",
+        "forgot",
+        "overshot",
+        "ran",
+        "took",
+        "came",
+        "found",
+        "drove",
+    }
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
 _REPAIRING: Final = frozenset(
@@ -88,6 +105,10 @@ _REPAIRING: Final = frozenset(
     }
 )
 """Words of which a correction has one; others need not be tried."""
+_FORBIDDING: Final = frozenset({"never", "don't", "dont"})
+_RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
+"""Words by which a speaker tells rather than orders that an errand is off."""
+_SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
 _DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
 
 
@@ -123,9 +144,15 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
     if after in _NEWS and _corrects(parsed):
         return DialogueMove.CLARIFY
     requested = ClauseMood.REQUEST in parse.moods
-    ordered = bool(parse.plan.steps) or bool(parse.denied and requested)
+    if after not in _ANSWERED and _forbids(parsed, move):
+        return DialogueMove.INSTRUCT
+    ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)
     if ordered:
         return _order(parsed, move, after, requested=requested)
+    if move is DialogueMove.EXPLAIN and parse.cancelled and not _RULED_OUT.search(parsed.masked):
+        return DialogueMove.INSTRUCT
+    if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
+        return DialogueMove.QUERY_YN  # "can we make it by six"
     if move is DialogueMove.IRRELEVANT and parsed.told is not None:
         return DialogueMove.EXPLAIN
     words = parsed.masked.split()
@@ -147,8 +174,12 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     parse = parsed.parse
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
+    named = named and parse is not None and len(parse.plan.steps) < 2
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
+    commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
+    if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
+        return DialogueMove.INSTRUCT  # "do the Shell first"
     if move in _ASKED and requested and not (move is DialogueMove.QUERY_W and parsed.question):
         offered = any(f"{words} " in f"{parsed.masked} " for words in _OFFERS)
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
@@ -171,6 +202,16 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     return move
 
 
+def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
+    """Returns whether what looks like a "no" or a question forbids or corrects: "never stop on a bridge"."""
+    if parsed.question or parsed.parse is None or move not in (DialogueMove.REPLY_N, DialogueMove.QUERY_YN):
+        return False
+    words = parsed.masked.split()
+    repaired = parsed.parse.repaired and bool(parsed.plan.steps)
+    denied = bool(parsed.parse.denied) and (words[0] in _FORBIDDING or words[1:2] == ["#acting"])
+    return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith("no turning")
+
+
 def _first_answer(parsed: ParsedText) -> DialogueMove | None:
     """Returns the answer with which a span begins, before its first comma; None without any."""
     words = _without_restart(split_words(parsed.text))
@@ -189,7 +230,7 @@ def _corrects(parsed: ParsedText) -> bool:
     """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
     if parsed.question:
         return False
-    if any(phrase in parsed.masked for phrase in _MEANT):
+    if any(phrase in parsed.masked for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
         return True
     if not (parsed.plan.steps or parsed.values):
         return False
@@ -230,6 +271,10 @@ def in_context(
 def belong_together(head: str, rest: str) -> bool:
     """Returns whether the words before and after a comma are one span: a condition and its order, or a correction."""
     first, second = read_plan(head), read_plan(rest)
+    if (first.conditional and not first.described) or (second.conditional and not second.described):
+        return True  # "if the road is blocked, take Murfin"
+    if _SIDE_ONLY.fullmatch(rest.strip(" .,!?").lower()) and not first.plan.steps:
+        return True  # "it has a red door, on the right"
     opens = route_grammar().terminals.longest(split_words(head), 0) if split_words(head) else None
     when = opens is not None and opens.group == "relations"
     if (

@@ -243,6 +243,8 @@ def _meant(named: list[SlotValue], actions: Sequence[ActionValue], parse: PlanPa
     if parse.person:
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)
+    if parse.cancelled and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
+        found.append(GoalStatus.ABANDONED)  # "drop the KFC"
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)
     if parse.repaired or (driving and not any(isinstance(value, LandmarkName) for value in found)):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, Bishop"

@@ -72,6 +72,8 @@ _IN_VIEW: Final = (
     "appears",
     "pops up",
     "shows up",
+    "in view",
+    "in sight",
 )
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})

@@ -174,6 +174,8 @@ class PlanState:
         frame.forbidden, frame.contingent = self.negation == "forbid", self.contingent
         if action is StepAction.TURN and self.negation == "cancel":  # "skip the next left"
             frame.negated = frame.forbidden = True
+        elif self.negation == "cancel" and action in (StepAction.U_TURN, StepAction.LANE, StepAction.STOP):
+            frame.negated = True  # "never mind the U-turn"
         frame.relation, frame.at, frame.distance = waiting.relation, waiting.at, waiting.distance
         frame.borrowed = waiting.at is not None
         frame.ordinal = waiting.ordinal

@@ -69,6 +69,7 @@ class PlanParse:
         person: whether somebody is to be fetched.
         implied: actions of the plan that no word names.
         contingent: steps that are ordered in case of a condition of the world, and are no part of the plan.
+        cancelled: whether errands are given up.
         conditional: whether there is a condition of the world.
         bare: whether the steps of the plan are names without a verb.
         forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
@@ -86,6 +87,7 @@ class PlanParse:
     forbidding: bool = False
     contingent: tuple[PlanStep, ...] = ()
     conditional: bool = False
+    cancelled: bool = False
     bare: bool = False
 
 
@@ -191,6 +193,7 @@ class _Builder(TurnReader):
             described=tuple(described),
             contingent=tuple(contingent),
             conditional=self.conditional,
+            cancelled=bool(self.cancelled),
             moods=tuple(self.moods),
             repaired=self.repaired,
             denied=frozenset(self.denied),

@@ -93,7 +93,11 @@ class PlaceReader(PlanState):
         if fetching:
             frame.relation, frame.at = ConditionRelation.AT, place  # "pick her up from the KFC"
         elif frame.action is StepAction.VISIT and frame.place is None and relation not in _LATER:
+            if _names_only_street(place) and relation is ConditionRelation.AT:
+                frame.action = StepAction.FOLLOW  # "get us onto the highway"
             frame.place = place
+        elif self._orders_errands(frame, relation, place):
+            pass
         elif frame.action is StepAction.VISIT and frame.place is not None and _names_only_street(place):
             frame.place = with_details(frame.place, street=place.street)
         elif frame.action is StepAction.VISIT and frame.place == place:
@@ -114,6 +118,22 @@ class PlaceReader(PlanState):
             beside = relation is ConditionRelation.BESIDE and turning and frame.action is not StepAction.LANE
             frame.borrowed = False
             frame.relation, frame.at = ConditionRelation.AT if beside else relation, place
+
+    def _orders_errands(self, frame: Frame, relation: ConditionRelation, place: PlaceReference) -> bool:
+        """Returns whether a relation puts two errands in order: "do the Shell before the Coco"."""
+        errand = frame.action is StepAction.VISIT and frame.place is not None and frame.mood in ORDERED
+        named = place.landmark is not None and frame.place != place
+        if (
+            not errand
+            or not named
+            or frame.negated
+            or relation not in (ConditionRelation.BEFORE, ConditionRelation.AFTER)
+        ):
+            return False
+        other = Frame(action=StepAction.VISIT, mood=frame.mood, place=place, contingent=frame.contingent)
+        number = self.frames.index(frame)
+        self.frames.insert(number + (relation is ConditionRelation.BEFORE), other)
+        return True
 
     def _counted(self, relation: ConditionRelation, ordinal: int) -> None:
         """Puts "at the second junction" or "after the second crossing" into a step."""
