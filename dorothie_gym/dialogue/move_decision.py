@@ -48,6 +48,7 @@ _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
 _OTHER: Final = ("other way", "the other way ,", "wrong way", "not that", "not this", "not the")
+_ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
 _MEANT: Final = (
     "i said",
     "i meant",
@@ -153,6 +154,8 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return DialogueMove.INSTRUCT
     if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
         return DialogueMove.QUERY_YN  # "can we make it by six"
+    if move is DialogueMove.QUERY_W and not parsed.question and parsed.masked.startswith(_ALERTS):
+        return DialogueMove.INSTRUCT
     if move is DialogueMove.IRRELEVANT and parsed.told is not None:
         return DialogueMove.EXPLAIN
     words = parsed.masked.split()

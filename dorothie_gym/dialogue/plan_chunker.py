@@ -77,6 +77,7 @@ _IN_VIEW: Final = (
 )
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
+_WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
@@ -99,6 +100,7 @@ class _Reader(QuantityReader):
         rules = (
             self._comma,
             self._contingency,
+            self._cancelled,
             self._stop_noun,
             self._turn,
             self.read_quantity,
@@ -229,6 +231,7 @@ class _Reader(QuantityReader):
                 self.items.append(NegationItem("not"))
                 return end
         noun = self.word_at(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
+        noun = noun or (match.kind == "wait" and self.word_at(place - 1) in _WAITING)
         if noun and (match.kind == "wait" or self.words[place] in ("stop", "stops")):
             return place  # "what's the hold up?", "that stop"
         if match.group == "boundaries":
@@ -377,7 +380,8 @@ class _Reader(QuantityReader):
         return not adverb and _SIDES.get(self.word_at(behind)) is None
 
     def _reference(self, place: int) -> Match | None:
-        if self.word_at(place) == "there" and self.word_at(place + 1) in ("is", "are", "was", "were"):
+        asked = self.word_at(place - 1) in ("is", "are") and self.word_at(place + 1) in ("a", "any", "an")
+        if self.word_at(place) == "there" and (asked or self.word_at(place + 1) in ("is", "are", "was", "were")):
             return None
         return self.grammar.references.longest(self.words, place) if place < len(self.words) else None
 

@@ -255,7 +255,12 @@ class PlanState:
     def _negate_step(self, frame: Frame) -> bool:
         """Negates a step, such as a forbidden street to one to avoid; returns whether a step is left."""
         self.denied |= {frame.action} if frame.action is not None else set()
+        if frame.action is StepAction.STOP and frame.at is not None and frame.at.reference is None:
+            frame.at = None  # "never stop on a bridge" says nothing of where to go on
         if frame.action in (StepAction.FOLLOW, StepAction.VISIT) and frame.place is not None:
+            needless = frame.verb in ("need", "want") or frame.word in ("go", "head", "stop")
+            if frame.action is StepAction.VISIT and frame.place.landmark is not None and needless:
+                self.cancelled.add(frame.place.landmark)  # "we don't need the KFC any more"
             frame.action = StepAction.AVOID
             return frame.place.street is not None and frame.place.landmark is None
         if frame.action is StepAction.STOP or frame.action in TURNING:

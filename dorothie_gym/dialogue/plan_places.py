@@ -247,6 +247,10 @@ class PlaceReader(PlanState):
 
     def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
         self.counting = True
+        if self.negation == "cancel" and ordinal is not None:
+            self.open_step(StepAction.TURN)  # "skip the next turn"
+            self.negation = None
+            return
         if ordinal is None:
             frame = self.frame
             if frame is not None and not self.fresh and frame.action is StepAction.FOLLOW and frame.place is None:

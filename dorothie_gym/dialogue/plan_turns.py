@@ -24,7 +24,7 @@ class TurnReader(PlaceReader):
 
     def read_turn(self, item: TurnItem) -> None:
         """Reads a direction to turn."""
-        if self._passes(item):
+        if self._passes(item) or self._denies_side():
             return
         frame = self.replaced(StepAction.TURN, StepAction.LANE)
         if frame is not None:
@@ -62,6 +62,12 @@ class TurnReader(PlaceReader):
         if named is not None and frame.at is None:
             frame.relation, frame.at = ConditionRelation.AT, named
         self._repeat(item)
+
+    def _denies_side(self) -> bool:
+        """Returns whether a direction is a side that is not meant: "stop on the right, not the left"."""
+        last = self.frames[-1] if self.frames else None
+        sided = last is not None and last.action is StepAction.STOP and last.side is not None
+        return sided and self.negation in NEGATING
 
     def _passes(self, item: TurnItem) -> bool:
         """Returns whether a turn is one to be passed by: "ignore two lefts, take the third"."""
