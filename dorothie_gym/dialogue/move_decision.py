@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
@@ -22,6 +22,9 @@ from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.spellings import parse_move
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.plan_parser import PlanParse
 
 _FILLER: Final = "Filler"
 _DECIDING: Final = frozenset({DialogueMove.CONFUSE.label, DialogueMove.CONFIRM.label})
@@ -107,6 +110,8 @@ _REPAIRING: Final = frozenset(
 )
 """Words of which a correction has one; others need not be tried."""
 _FORBIDDING: Final = frozenset({"never", "don't", "dont"})
+_SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+_OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
@@ -144,12 +149,17 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return answer
     if after in _NEWS and _corrects(parsed):
         return DialogueMove.CLARIFY
-    requested = ClauseMood.REQUEST in parse.moods
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
+    requested = ClauseMood.REQUEST in parse.moods
     ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)
     if ordered:
         return _order(parsed, move, after, requested=requested)
+    return _unordered(parsed, parse, move, after)
+
+
+def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of words that order no step."""
     if move is DialogueMove.EXPLAIN and parse.cancelled and not _RULED_OUT.search(parsed.masked):
         return DialogueMove.INSTRUCT
     if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
@@ -158,6 +168,11 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return DialogueMove.INSTRUCT
     if move is DialogueMove.IRRELEVANT and parsed.told is not None:
         return DialogueMove.EXPLAIN
+    return _stated(parsed, parse, move, after)
+
+
+def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of words that may state something."""
     words = parsed.masked.split()
     if after in _ANSWERED and words[:1] in (["not"], ["ain't"]) and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N
@@ -180,6 +195,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     named = named and parse is not None and len(parse.plan.steps) < 2
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
+    if after is None and move in _SIGNS_FIRST and _runs_on(parsed):
+        return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
     commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
     if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
         return DialogueMove.INSTRUCT  # "do the Shell first"
@@ -203,6 +220,12 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     if move is DialogueMove.CLARIFY and parsed.parse is not None and parsed.parse.repaired and after is None:
         return DialogueMove.INSTRUCT
     return move
+
+
+def _runs_on(parsed: ParsedText) -> bool:
+    """Returns whether no comma stands behind the yes with which an order begins."""
+    words = split_words(parsed.text)
+    return len(words) > 3 and words[0] in _OPENING_YES and words[1] != ","
 
 
 def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:

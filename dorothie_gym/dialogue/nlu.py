@@ -86,6 +86,7 @@ _SPEED_STEMS = frozenset(
 _LIGHT_STEMS = frozenset({"ligh", "beam", "head", "lamp"})
 _ORDER_WORDS = frozenset({"before", "after"})
 _VAGUE = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quick|important|like)\b")
+_TICKED = re.compile(r"\b(tick|check) (?:\w+ ){0,4}off\b")
 _PAST = frozenset({"past", "behind", "beyond"})
 _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
@@ -244,6 +245,8 @@ def _meant(named: list[SlotValue], actions: Sequence[ActionValue], parse: PlanPa
     if parse.person:
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)
+    if parse.cancelled and _TICKED.search(joined):
+        found = [value for value in found if value is not GoalStatus.ABANDONED] + [GoalStatus.COMPLETE]
     if parse.cancelled and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
         found.append(GoalStatus.ABANDONED)  # "drop the KFC"
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)

@@ -57,6 +57,8 @@ def named_actions(actions: Sequence[ActionValue], parse: PlanParse) -> tuple[Act
         read -= _WEAK
     if any(step.action is StepAction.FOLLOW and _ends_somewhere(step) for step in parse.plan):
         found.add(ActionValue.LANE_FOLLOW)  # "take Murfin as far as the bridge"
+    if StepAction.LANE in steps and StepAction.TURN not in steps and not parse.denied:
+        found.discard(ActionValue.J_TURN)  # "the right, the right lane"
     found |= read
     named = [value for value in actions if value in found]
     return (*named, *sorted(found.difference(named), key=_ORDER.__getitem__))
