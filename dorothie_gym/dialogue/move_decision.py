@@ -233,7 +233,8 @@ def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     if parsed.question or parsed.parse is None or move not in (DialogueMove.REPLY_N, DialogueMove.QUERY_YN):
         return False
     words = parsed.masked.split()
-    repaired = parsed.parse.repaired and bool(parsed.plan.steps)
+    corrected = bool(parsed.plan.steps) and words[:3] == ["no", ",", "not"]
+    repaired = corrected or (parsed.parse.repaired and bool(parsed.plan.steps))
     denied = bool(parsed.parse.denied) and (words[0] in _FORBIDDING or words[1:2] == ["#acting"])
     return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith("no turning")
 
@@ -357,7 +358,8 @@ def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> 
     parse, rest = read_plan(segment), read_plan(following)
     if parse.waiting and not parse.described and rest.plan.steps and len(rest.plan) == 1:
         return True
-    denial = after in _NEWS and formula_move(words) is DialogueMove.REPLY_N
+    corrects = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
+    denial = corrects and formula_move(words) is DialogueMove.REPLY_N
     return denial and bool(rest.plan.steps or not _DENIALS.isdisjoint(split_words(following)))
 
 
