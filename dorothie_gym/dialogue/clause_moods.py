@@ -28,6 +28,7 @@ _BASE_FORMS: Final = frozenset({"speed", "proceed", "need", "bring", "swing"})
 _SUBJECT_WORDS: Final = 6
 """Words of a clause among which its finite verb is sought."""
 
+_MODALS: Final = frozenset({"could", "can", "would", "will"})
 _NO_SUBJECTS: Final = frozenset({"let's", "here's", "that's", "it's", "there's", "what's", "hour's"})
 _SUBORDINATING: Final = frozenset({"where", "when", "what", "which", "how"})
 _RELATIVE: Final = (["i"], ["we"], ["you"], ["that"], ["who"])
@@ -65,8 +66,10 @@ class ClauseReader:
 
     def _inherited(self, place: int, before: ClauseMood, *, new: bool) -> ClauseMood:
         """Returns the mood of a clause whose opening does not tell it."""
-        if self._states(place):
+        if self._states(self._behind_soft(place)):
             return ClauseMood.STATEMENT
+        if new and self.question and self._asks_for(place):
+            return ClauseMood.REQUEST  # "from the KFC on, could you go slow?"
         if new:
             return ClauseMood.QUESTION if self.question and "," not in self.words[place:] else ClauseMood.COMMAND
         if before is not ClauseMood.STATEMENT:
@@ -74,6 +77,21 @@ class ClauseReader:
         word = self.words[place] if place < len(self.words) else ""
         past = word.endswith("ed") and word not in _BASE_FORMS
         return ClauseMood.STATEMENT if past or is_participle(word) or self._names_only(place) else ClauseMood.COMMAND
+
+    def _behind_soft(self, place: int) -> int:
+        """Returns the place behind words that only open a clause: "look, the Panera's on your left"."""
+        openers = route_grammar().openers
+        while place < len(self.words):
+            match = openers.longest(self.words, place)
+            if match is None or match.kind != "soft":
+                break
+            place += match.length
+        return place
+
+    def _asks_for(self, place: int) -> bool:
+        """Returns whether "could you" and the like occur behind a condition or a place."""
+        pairs = zip(self.words[place:], self.words[place + 1 :], strict=False)
+        return any(first in _MODALS and second == "you" for first, second in pairs)
 
     def _names_only(self, place: int) -> bool:
         """Returns whether a clause goes on with nothing but a name: "it's on the left, the Panera, stop there"."""

@@ -254,6 +254,8 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
             values.discard(ActionValue.LANE_FOLLOW)  # "don't turn" names a turn
         elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
             values -= set(parsed.denied)  # "don't turn, keep going"
+    if move is DialogueMove.INSTRUCT and not parsed.landmarks:
+        values.discard(GoalStatus.COMPLETE)  # "right, then left, done"
     # One goal is abandoned in favour of another.
     if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1:
         values.add(GoalStatus.ONGOING)

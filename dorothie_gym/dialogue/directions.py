@@ -89,7 +89,11 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
         after = words[place + 1] if place + 1 < len(words) else ""
         if word == "right":
             following = words[place + 2] if place + 2 < len(words) else ""
-            listed = place == 0 and list(words[1:3]) == [",", "then"] and not _LISTED.isdisjoint(words[3:6])
+            listed = (
+                place == 0
+                and after == ","
+                and (following in _LISTED or (following == "then" and not _LISTED.isdisjoint(words[3:6])))
+            )
             masked[place] = "right" if listed else _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):
             masked[place] = "#left"

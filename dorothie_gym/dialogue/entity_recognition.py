@@ -111,7 +111,7 @@ def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Men
         The mentions in order, and the words with each mention replaced by "#landmark", "#street", "#object" or
         "#status", or by "#what" for a queried value.
     """
-    index, known = _index(), _known_words()
+    index, known = _index(), known_words()
     words = tuple(words)
     mentions: list[Mention] = []
     masked: list[str] = []
@@ -148,7 +148,7 @@ def _at(words: tuple[str, ...], place: int, statuses: bool) -> tuple[SlotValue |
     word = words[place].removesuffix("'s")
     if word != words[place] and (word,) in load_lexicon().names:
         return load_lexicon().names[word,], 1
-    if len(word) >= _SHORTEST and word not in _known_words() and not word.endswith(_VERB_ENDINGS):
+    if len(word) >= _SHORTEST and word not in known_words() and not word.endswith(_VERB_ENDINGS):
         return nearest_name(word), 1
     return None, 1
 
@@ -195,7 +195,7 @@ def _proper_words(value: SlotValue, forms: Mapping[str, tuple[str, ...]]) -> lis
 
 
 @functools.cache
-def _known_words() -> frozenset[str]:
+def known_words() -> frozenset[str]:
     """Returns the words that are never matched approximately."""
     spoken = " ".join(read_talk_files().values()).lower()
     listed = strings("cues.yaml: known", read_data("cues.yaml").get("known"))

@@ -7,8 +7,9 @@ them, the cues of `dialogue_act_classifier` do.
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
@@ -21,6 +22,9 @@ from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.spellings import parse_move
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.plan_parser import PlanParse
 
 _FILLER: Final = "Filler"
 _DECIDING: Final = frozenset({DialogueMove.CONFUSE.label, DialogueMove.CONFIRM.label})
@@ -46,6 +50,8 @@ _NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
 _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
+_OTHER: Final = ("other way", "the other way ,", "wrong way", "not that", "not this", "not the")
+_ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
 _MEANT: Final = (
     "i said",
     "i meant",
@@ -61,7 +67,22 @@ _ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that yes and no answer."""
 _SPEAKERS: Final = frozenset({"i", "we", "you", "he", "she", "they"})
 _PAST: Final = frozenset(
-    {"lost", "missed", "passed", "saw", "went", "left", "forgot", "overshot", "ran", "took", "came", "found", "drove"}
+    {
+        "lost",
+        "missed",
+        "passed",
+        "saw",
+        "went",
+        "left",
+        "#left",
+        "forgot",
+        "overshot",
+        "ran",
+        "took",
+        "came",
+        "found",
+        "drove",
+    }
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
 _REPAIRING: Final = frozenset(
@@ -88,6 +109,12 @@ _REPAIRING: Final = frozenset(
     }
 )
 """Words of which a correction has one; others need not be tried."""
+_FORBIDDING: Final = frozenset({"never", "don't", "dont"})
+_SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+_OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
+_RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
+"""Words by which a speaker tells rather than orders that an errand is off."""
+_SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
 _DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
 
 
@@ -122,12 +149,30 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return answer
     if after in _NEWS and _corrects(parsed):
         return DialogueMove.CLARIFY
+    if after not in _ANSWERED and _forbids(parsed, move):
+        return DialogueMove.INSTRUCT
     requested = ClauseMood.REQUEST in parse.moods
-    ordered = bool(parse.plan.steps) or bool(parse.denied and requested)
+    ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)
     if ordered:
         return _order(parsed, move, after, requested=requested)
+    return _unordered(parsed, parse, move, after)
+
+
+def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of words that order no step."""
+    if move is DialogueMove.EXPLAIN and parse.cancelled and not _RULED_OUT.search(parsed.masked):
+        return DialogueMove.INSTRUCT
+    if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
+        return DialogueMove.QUERY_YN  # "can we make it by six"
+    if move is DialogueMove.QUERY_W and not parsed.question and parsed.masked.startswith(_ALERTS):
+        return DialogueMove.INSTRUCT
     if move is DialogueMove.IRRELEVANT and parsed.told is not None:
         return DialogueMove.EXPLAIN
+    return _stated(parsed, parse, move, after)
+
+
+def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of words that may state something."""
     words = parsed.masked.split()
     if after in _ANSWERED and words[:1] in (["not"], ["ain't"]) and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N
@@ -147,8 +192,14 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     parse = parsed.parse
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
+    named = named and parse is not None and len(parse.plan.steps) < 2
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
+    if after is None and move in _SIGNS_FIRST and _runs_on(parsed):
+        return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
+    commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
+    if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
+        return DialogueMove.INSTRUCT  # "do the Shell first"
     if move in _ASKED and requested and not (move is DialogueMove.QUERY_W and parsed.question):
         offered = any(f"{words} " in f"{parsed.masked} " for words in _OFFERS)
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
@@ -171,6 +222,23 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     return move
 
 
+def _runs_on(parsed: ParsedText) -> bool:
+    """Returns whether no comma stands behind the yes with which an order begins."""
+    words = split_words(parsed.text)
+    return len(words) > 3 and words[0] in _OPENING_YES and words[1] != ","
+
+
+def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
+    """Returns whether what looks like a "no" or a question forbids or corrects: "never stop on a bridge"."""
+    if parsed.question or parsed.parse is None or move not in (DialogueMove.REPLY_N, DialogueMove.QUERY_YN):
+        return False
+    words = parsed.masked.split()
+    corrected = bool(parsed.plan.steps) and words[:3] == ["no", ",", "not"]
+    repaired = corrected or (parsed.parse.repaired and bool(parsed.plan.steps))
+    denied = bool(parsed.parse.denied) and (words[0] in _FORBIDDING or words[1:2] == ["#acting"])
+    return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith("no turning")
+
+
 def _first_answer(parsed: ParsedText) -> DialogueMove | None:
     """Returns the answer with which a span begins, before its first comma; None without any."""
     words = _without_restart(split_words(parsed.text))
@@ -189,7 +257,7 @@ def _corrects(parsed: ParsedText) -> bool:
     """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
     if parsed.question:
         return False
-    if any(phrase in parsed.masked for phrase in _MEANT):
+    if any(phrase in parsed.masked for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
         return True
     if not (parsed.plan.steps or parsed.values):
         return False
@@ -230,6 +298,10 @@ def in_context(
 def belong_together(head: str, rest: str) -> bool:
     """Returns whether the words before and after a comma are one span: a condition and its order, or a correction."""
     first, second = read_plan(head), read_plan(rest)
+    if (first.conditional and not first.described) or (second.conditional and not second.described):
+        return True  # "if the road is blocked, take Murfin"
+    if _SIDE_ONLY.fullmatch(rest.strip(" .,!?").lower()) and not first.plan.steps:
+        return True  # "it has a red door, on the right"
     opens = route_grammar().terminals.longest(split_words(head), 0) if split_words(head) else None
     when = opens is not None and opens.group == "relations"
     if (
@@ -286,7 +358,8 @@ def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> 
     parse, rest = read_plan(segment), read_plan(following)
     if parse.waiting and not parse.described and rest.plan.steps and len(rest.plan) == 1:
         return True
-    denial = after in _NEWS and formula_move(words) is DialogueMove.REPLY_N
+    corrects = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
+    denial = corrects and formula_move(words) is DialogueMove.REPLY_N
     return denial and bool(rest.plan.steps or not _DENIALS.isdisjoint(split_words(following)))
 
 

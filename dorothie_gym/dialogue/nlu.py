@@ -85,6 +85,8 @@ _SPEED_STEMS = frozenset(
 )
 _LIGHT_STEMS = frozenset({"ligh", "beam", "head", "lamp"})
 _ORDER_WORDS = frozenset({"before", "after"})
+_VAGUE = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quick|important|like)\b")
+_TICKED = re.compile(r"\b(tick|check) (?:\w+ ){0,4}off\b")
 _PAST = frozenset({"past", "behind", "beyond"})
 _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
@@ -202,7 +204,7 @@ def understand(text: str) -> ParsedText:
     acted, actions, denied = _actions(masked, stems)
     actions = named_actions(actions, parse)
     named = _distinct([*(mention.value for mention in mentions), *_queried_values(masked, words)])
-    named = _meant(named, actions, parse)
+    named = _meant(named, actions, parse, spoken)
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
     turns = planned_turns(find_turns(words, lists), parse)
     return ParsedText(
@@ -237,12 +239,16 @@ def understand(text: str) -> ParsedText:
     )
 
 
-def _meant(named: list[SlotValue], actions: Sequence[ActionValue], parse: PlanParse) -> list[SlotValue]:
+def _meant(named: list[SlotValue], actions: Sequence[ActionValue], parse: PlanParse, joined: str) -> list[SlotValue]:
     """Returns the values that the words name, with somebody who is to be fetched, and without withdrawn orders."""
-    found = list(named)
+    found = [value for value in named if value is not ObjectClass.UNLABELED or not _VAGUE.search(joined)]
     if parse.person:
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)
+    if parse.cancelled and _TICKED.search(joined):
+        found = [value for value in found if value is not GoalStatus.ABANDONED] + [GoalStatus.COMPLETE]
+    if parse.cancelled and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
+        found.append(GoalStatus.ABANDONED)  # "drop the KFC"
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)
     if parse.repaired or (driving and not any(isinstance(value, LandmarkName) for value in found)):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, Bishop"

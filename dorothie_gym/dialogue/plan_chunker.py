@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from dorothie_gym.dialogue.numerals import may_be_speed, read_cardinals, read_ordinal
+from dorothie_gym.dialogue.contingencies import find_contingency
+from dorothie_gym.dialogue.numerals import read_cardinals, read_ordinal
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
     BoundaryItem,
     ConditionItem,
-    DistanceItem,
+    ContingencyItem,
     Item,
     LaneItem,
     NegationItem,
     NounPhrase,
     RepairItem,
     SideItem,
-    SpeedItem,
     TurnItem,
     UnitItem,
     VerbItem,
     WordItem,
 )
+from dorothie_gym.dialogue.plan_quantities import QuantityReader
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.dialogue.route_grammar import Match, RouteGrammar, route_grammar
+from dorothie_gym.dialogue.route_grammar import Match, route_grammar
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
 
@@ -71,8 +72,13 @@ _IN_VIEW: Final = (
     "appears",
     "pops up",
     "shows up",
+    "in view",
+    "in sight",
 )
-_LEAST_SPEED: Final = 5
+_WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
+_TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
+_WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
+_JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
 
@@ -88,16 +94,20 @@ def read_items(words: Sequence[str], names: Mapping[int, SlotValue], lead: Mappi
     return _Reader(words, names, lead, route_grammar()).read()
 
 
-class _Reader:
-    def __init__(
-        self, words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str], grammar: RouteGrammar
-    ) -> None:
-        self.words, self.names, self.lead, self.grammar = words, names, lead, grammar
-        self.items: list[Item] = []
-
+class _Reader(QuantityReader):
     def read(self) -> list[Item]:
         place = 0
-        rules = (self._comma, self._stop_noun, self._turn, self._quantity, self._phrase, self._noun, self._unknown)
+        rules = (
+            self._comma,
+            self._contingency,
+            self._cancelled,
+            self._stop_noun,
+            self._turn,
+            self.read_quantity,
+            self._phrase,
+            self._noun,
+            self._unknown,
+        )
         while place < len(self.words):
             self._new_clause(place)
             place = next(end for rule in rules if (end := rule(place)) > place)
@@ -120,14 +130,11 @@ class _Reader:
     def _stop_noun(self, place: int) -> int:
         """Skips "the next stop", which is an errand and no order to stop."""
         number, behind = self._ordinal(place)
-        if (number is not None or self.words[place] in ("last", "only")) and self._word(
+        if (number is not None or self.words[place] in ("last", "only")) and self.word_at(
             max(behind, place + 1)
         ) == "stop":
             return max(behind, place + 1) + 1
         return place
-
-    def _word(self, place: int) -> str:
-        return self.words[place] if 0 <= place < len(self.words) else ""
 
     def _comma(self, place: int) -> int:
         if self.words[place] not in (",", "?"):
@@ -135,42 +142,54 @@ class _Reader:
         self.items.append(BoundaryItem(",", place + 1))
         return place + 1
 
+    def _contingency(self, place: int) -> int:
+        """Skips a condition of the world, unless it is a relation to a place: "once we've passed the KFC"."""
+        found = find_contingency(self.words, place, self.grammar)
+        if found is None:
+            return place
+        match = self.grammar.terminals.longest(self.words, place)
+        if match is not None and match.group == "relations" and self._noun_phrase(place + match.length)[0] is not None:
+            if self.words[place] not in ("if", "unless") or match.length > 1:
+                return place
+        self.items.append(ContingencyItem(found.end, found.leading))
+        return found.end
+
     # --- left and right ---------------------------------------------------------------------------------------------
 
     def _turn(self, place: int) -> int:
         """Reads a direction with the words around it: a turn, a lane, or a side."""
         begin = place
-        preposition = self._word(place) if self._word(place) in _SIDE_WORDS else ""
+        preposition = self.word_at(place) if self.word_at(place) in _SIDE_WORDS else ""
         place += preposition != ""
         ordinal, place = self._ordinal(place)
-        while self._word(place) in self.grammar.determiners or self._word(place) in _DEGREES:
+        while self.word_at(place) in self.grammar.determiners or self.word_at(place) in _DEGREES:
             place += 1
         if ordinal is None:
             ordinal, place = self._ordinal(place)
-        while self._word(place) in _DEGREES:
+        while self.word_at(place) in _DEGREES:
             place += 1
-        direction = _SIDES.get(self._word(place))
+        direction = _SIDES.get(self.word_at(place))
         if direction is None:
             return begin
-        several = self._word(place) in ("lefts", "rights")
+        several = self.word_at(place) in ("lefts", "rights")
         place += 1
-        hand = self._word(place) in ("hand", "handed")
+        hand = self.word_at(place) in ("hand", "handed")
         place += hand
-        if self._word(place) == "most":
+        if self.word_at(place) == "most":
             place += 1
-        changed = preposition == "to" and self._word(begin - 1) in ("change", "changing", "switch", "switching")
-        if changed or self._word(place) in ("lane", "lanes", "file") or self._word(begin - 1) in ("lane", "lanes"):
+        changed = preposition == "to" and self.word_at(begin - 1) in ("change", "changing", "switch", "switching")
+        if changed or self.word_at(place) in ("lane", "lanes", "file") or self.word_at(begin - 1) in ("lane", "lanes"):
             self.items.append(LaneItem(direction))
-            return place + (self._word(place) in ("lane", "lanes", "file"))
-        aside = self._word(place) in ("side", "kerb", "curb")
-        aside = aside or (hand and preposition not in ("to", "in") and self._word(place) not in _TURN_NOUNS)
+            return place + (self.word_at(place) in ("lane", "lanes", "file"))
+        aside = self.word_at(place) in ("side", "kerb", "curb")
+        aside = aside or (hand and preposition not in ("to", "in") and self.word_at(place) not in _TURN_NOUNS)
         if aside:
-            place += self._word(place) in ("side", "kerb", "curb")
+            place += self.word_at(place) in ("side", "kerb", "curb")
             place = self._behind_street(place)
-        elif self._word(place) in _TURN_NOUNS:
+        elif self.word_at(place) in _TURN_NOUNS:
             place += 1
-        turning = self._word(place - 1) in _TURN_NOUNS and preposition in ("down", "along")
-        if not turning and (aside or (preposition or self._word(begin - 1)) in _BESIDE) and ordinal is None:
+        turning = self.word_at(place - 1) in _TURN_NOUNS and preposition in ("down", "along")
+        if not turning and (aside or (preposition or self.word_at(begin - 1)) in _BESIDE) and ordinal is None:
             self.items.append(SideItem(direction))
         else:
             count = ordinal or 1 if several else 1
@@ -179,93 +198,21 @@ class _Reader:
 
     def _behind_street(self, place: int) -> int:
         """Returns the place behind "of the street"."""
-        if self._word(place) == "of":
-            rest = place + 1 + (self._word(place + 1) in self.grammar.determiners)
-            return rest + 1 if self._word(rest) in ("street", "road", "car") else place
+        if self.word_at(place) == "of":
+            rest = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
+            return rest + 1 if self.word_at(rest) in ("street", "road", "car") else place
         return place
 
     def _ordinal(self, place: int) -> tuple[int | None, int]:
         """Returns an ordinal or a small count, and the place behind it."""
         start = place
-        while self._word(place) in self.grammar.determiners or self._word(place) == "very":
+        while self.word_at(place) in self.grammar.determiners or self.word_at(place) == "very":
             place += 1
-        word = self._word(place)
+        word = self.word_at(place)
         number = read_ordinal(word)
         if number is None and (counts := read_cardinals([word])) and 2 <= counts[0] <= 9:
             number = counts[0]
         return (None, start) if number is None else (number, place + 1)
-
-    # --- numbers ----------------------------------------------------------------------------------------------------
-
-    def _quantity(self, place: int) -> int:
-        """Reads a distance or a speed."""
-        number, end = self._number(place)
-        if number is None:
-            return place
-        unit = self.grammar.speeds.get(self._word(end))
-        if unit is not None:
-            self._speed(number * unit, unit=True)
-            return end + 1
-        metres = self.grammar.metres.get(self._word(end))
-        if metres is not None:
-            hours, behind = self._per_hour(end + 1)
-            if hours is not None:
-                self._speed(number * metres * hours / 1000.0, unit=True)
-                return behind
-            if self._word(end + 1) == "and" and self._word(end + 3) == "half":  # a mile and a half
-                number, end = number + 0.5, end + 3
-            self.items.append(DistanceItem(max(1, round(number * metres))))
-            return end + 1
-        if number >= _LEAST_SPEED and may_be_speed(self._word(place - 1), self._word(end)):
-            self._speed(number, unit=False)
-            return end
-        return place
-
-    def _speed(self, speed: float, *, unit: bool) -> None:
-        self.items.append(SpeedItem(max(1, round(speed)), unit))
-
-    def _per_hour(self, place: int) -> tuple[float | None, int]:
-        place += self._word(place) in ("per", "an", "a", "the")
-        hours = self.grammar.hours.get(self._word(place))
-        return hours, place + 1
-
-    def _number(self, place: int) -> tuple[float | None, int]:
-        """Returns a number, "half a", "a quarter" or "a couple of hundred" among them, and the place behind it."""
-        word, number, start = self._word(place), None, place
-        if word in ("a", "an", "another"):
-            place, word = place + 1, self._word(place + 1)
-        if word in ("half", "quarter"):
-            place += 1 + (self._word(place + 1) == "of")
-            place += self._word(place) in ("a", "an")
-            return (0.5 if word == "half" else 0.25), place
-        if word in ("couple", "few"):
-            place += 1 + (self._word(place + 1) == "of")
-            if self._word(place) == "hundred":
-                return 100.0 * (2 if word == "couple" else 3), place + 1
-            return None, start
-        if word == "hundred":
-            number, place = 100.0, place + 1
-        elif place > start and word in self.grammar.metres:
-            return 1.0, place
-        else:
-            length = self._run(place)
-            if length:
-                number = float(read_cardinals([*self.words[place : place + length]])[0])
-                place += length
-        if number == 100.0 and self._word(place) == "and" and (more := self._run(place + 1)):
-            number, place = number + read_cardinals(list(self.words[place + 1 : place + 1 + more]))[0], place + 1 + more
-        return (None, start) if number is None else (number, place)
-
-    def _run(self, place: int) -> int:
-        """Returns the number of tokens of the cardinal at a place; 0 without any."""
-        length = 0
-        while (
-            place + length < len(self.words) and len(read_cardinals(list(self.words[place : place + length + 1]))) == 1
-        ):
-            if not read_cardinals([self.words[place + length]]) and self.words[place + length] != "hundred":
-                break
-            length += 1
-        return length
 
     # --- phrases and places -----------------------------------------------------------------------------------------
 
@@ -277,13 +224,14 @@ class _Reader:
         end = place + match.length
         if match.group == "relations":
             return self._condition(match, place)
-        if self.words[place] == "so" and match.length == 1 and self._word(end) in _ADJECTIVES:
+        if self.words[place] == "so" and match.length == 1 and self.word_at(end) in _ADJECTIVES:
             return end
         if match.group == "repairs" and self.words[place] == "no" and match.length == 1:
-            if end in self.names or self._word(place - 1) in _BEFORE_NONE:
+            if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
                 return end
-        noun = self._word(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
+        noun = self.word_at(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
+        noun = noun or (match.kind == "wait" and self.word_at(place - 1) in _WAITING)
         if noun and (match.kind == "wait" or self.words[place] in ("stop", "stops")):
             return place  # "what's the hold up?", "that stop"
         if match.group == "boundaries":
@@ -299,6 +247,42 @@ class _Reader:
             self.items.append(ActionItem(kind, place, end))
         return end
 
+    def _cancelled(self, place: int) -> int:
+        """Reads the giving up of an errand or a turn: "drop the KFC", "forget that left"."""
+        if not self._cancels(place):
+            return place
+        self.items.append(NegationItem("cancel"))
+        return place + 1
+
+    def _cancels(self, place: int) -> bool:
+        word, end = self.words[place], place + 2
+        if word == "forget" and self.word_at(place + 1) in ("that", "it"):
+            return self.word_at(end) in _SIDES or end in self.names or self.word_at(end) in ("turn", "one", "stop")
+        if word not in ("drop", "dropping", "lose", "remove", "scrub", "ditch"):
+            return False
+        behind = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
+        named = isinstance(self.names.get(behind), LandmarkName) and self.names[behind] is not LandmarkName.PERSON
+        return named and self.word_at(behind + 1) in (
+            "",
+            ",",
+            "?",
+            "please",
+            "then",
+            "and",
+            "from",
+            "for",
+            "off",
+            "now",
+        )
+
+    def _is_next_junction(self, found: NounPhrase, behind: int) -> bool:
+        """Returns whether a noun phrase is a junction without a number: "at the corner"."""
+        last = self.items[-1] if self.items else None
+        uncounted = found.reference is None and found.ordinal is None
+        if isinstance(last, ActionItem) and last.kind == "u_turn":
+            return False
+        return uncounted and self.word_at(behind - 1) in _JUNCTIONS and self.word_at(behind) != "of"
+
     def _condition(self, match: Match, place: int) -> int:
         """Reads a relation with its place: "just past the Shell", "when the Shell comes into view"."""
         end = place + match.length
@@ -306,8 +290,10 @@ class _Reader:
         if found is None and match.kind == "across" and "straight" in self.words[place:end]:
             self.items.append(ActionItem("straight", place, end))
             return end
+        if found is not None and match.kind == "at" and self._is_next_junction(found, behind):
+            found = NounPhrase(None, 1)
         if found is None:
-            if self._word(end) not in _PRONOUNS or self._word(end - 1) in ("on", "at", "in"):
+            if self.word_at(end) not in _PRONOUNS or self.word_at(end - 1) in ("on", "at", "in"):
                 return end if match.length > 1 else place
             self.items.append(ConditionItem(self._relation(match), None))
             return end + 1
@@ -317,23 +303,24 @@ class _Reader:
             if rest.startswith(phrase):
                 relation, behind = ConditionRelation.SEEN, behind + len(phrase.split())
                 break
-        along = found.reference is not None and found.reference.street is not None and place > 0
-        if match.kind == "across" and along and self._word(place - 1) not in (",", "go", "straight", "head"):
+        if self.words[place] in _WORDY and found.reference is not None and found.reference.object is not None:
+            left = self.grammar.leaving.longest(self.words, behind) if self.word_at(behind) else None
+            if left is not None:  # "when this lorry is gone"
+                relation, behind = ConditionRelation.AFTER, behind + left.length
+        if match.kind == "across" and self._goes_along(found, place):
             self.items += [ActionItem("follow", place, end), found]  # "go around over Hubbard"
             return behind
         if match.kind == "across":
             self.items.append(ActionItem("straight", place, end))
         self.items.append(ConditionItem(relation, found))
-        while self._word(behind) in _STATES and self.words[place] in (
-            "when",
-            "once",
-            "as",
-            "soon",
-            "where",
-            "wherever",
-        ):
+        while self.word_at(behind) in _STATES and self.words[place] in _TEMPORAL:
             behind += 1
         return behind
+
+    def _goes_along(self, found: NounPhrase, place: int) -> bool:
+        """Returns whether "over" and "across" mean along a street, as behind a verb of another kind."""
+        street = found.reference is not None and found.reference.street is not None
+        return street and place > 0 and self.word_at(place - 1) not in (",", "go", "straight", "head")
 
     def _relation(self, match: Match) -> ConditionRelation:
         """Returns the relation that a phrase stands for; behind a line one stops before it."""
@@ -356,12 +343,12 @@ class _Reader:
             number, behind = self._ordinal(place)
             if number is not None and self._counts(place, behind):
                 ordinal, place, article = number, behind, True
-            elif self._word(place) in self.grammar.modifiers and place not in self.names:
+            elif self.word_at(place) in self.grammar.modifiers and place not in self.names:
                 article, place = True, place + 1
             elif (
-                self._word(place).endswith("'s")
+                self.word_at(place).endswith("'s")
                 and place not in self.names
-                and self._word(place) not in self.grammar.subjects
+                and self.word_at(place) not in self.grammar.subjects
             ):
                 article, place = True, place + 1  # "granny's house"
             else:
@@ -376,29 +363,30 @@ class _Reader:
         if found is None and ordinal is not None and skipped == 0:
             ends = (
                 ("", ",", "?", "on", "please", "then", "and")
-                if self._word(start) in self.grammar.determiners
+                if self.word_at(start) in self.grammar.determiners
                 else ("on",)
             )
-            if self._word(place) in ends:
+            if self.word_at(place) in ends:
                 return NounPhrase(None, ordinal), place  # "not the first, the second"
         return (found, behind) if found is not None else (None, start)
 
     def _counts(self, place: int, behind: int) -> bool:
         """Returns whether the number between two places belongs to a noun, as in no "first the KFC" or "two lefts"."""
-        adverb = self.words[place] == "first" and self._word(behind) in (
+        adverb = self.words[place] == "first" and self.word_at(behind) in (
             *self.grammar.determiners,
             "#landmark",
             "#street",
         )
-        return not adverb and _SIDES.get(self._word(behind)) is None
+        return not adverb and _SIDES.get(self.word_at(behind)) is None
 
     def _reference(self, place: int) -> Match | None:
-        if self._word(place) == "there" and self._word(place + 1) in ("is", "are", "was", "were"):
+        asked = self.word_at(place - 1) in ("is", "are") and self.word_at(place + 1) in ("a", "any", "an")
+        if self.word_at(place) == "there" and (asked or self.word_at(place + 1) in ("is", "are", "was", "were")):
             return None
         return self.grammar.references.longest(self.words, place) if place < len(self.words) else None
 
     def _is_unknown(self, place: int) -> bool:
-        word = self._word(place)
+        word = self.word_at(place)
         if not word.isalpha() or word in _SIDES or word in ("lane", "lanes"):
             return False
         return self.grammar.terminals.longest(self.words, place) is None
@@ -416,14 +404,14 @@ class _Reader:
         if match is None:
             return None, place
         end = place + match.length
-        if self._word(end) == "of" and self.words[place].startswith("corner"):
-            end += 1 + (self._word(end + 1) in self.grammar.determiners)
+        if self.word_at(end) == "of" and self.words[place].startswith("corner"):
+            end += 1 + (self.word_at(end + 1) in self.grammar.determiners)
             street = self.names.get(end)
             if isinstance(street, StreetName):
                 return NounPhrase(PlaceReference(street=street), None), end + 1
             return None, place
-        if self._word(end) == "after" and self._word(end + 1) in ("it", "that", "next"):
-            return NounPhrase(None, 2 if self._word(end + 1) == "next" else 1), end + 2
+        if self.word_at(end) == "after" and self.word_at(end + 1) in ("it", "that", "next"):
+            return NounPhrase(None, 2 if self.word_at(end + 1) == "next" else 1), end + 2
         return NounPhrase(None, ordinal, self.words[place] in ("block", "blocks")), end
 
     def _named(
@@ -444,6 +432,6 @@ class _Reader:
 
     def _street_of(self, place: int) -> tuple[StreetName | None, int]:
         """Returns the street of a place, as in "on Beal" behind "the house", and the token behind it."""
-        street = self.names.get(place + 1) if self._word(place) in _POSTPOSITIONS else None
+        street = self.names.get(place + 1) if self.word_at(place) in _POSTPOSITIONS else None
         named = isinstance(street, StreetName) and street is not StreetName.QUERIED
         return (street, place + 2) if named and isinstance(street, StreetName) else (None, place)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from dorothie_gym.dialogue.clause_moods import ORDERED
 from dorothie_gym.dialogue.directions import RouteTurn
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.dialogue.routes import StepAction, StepChange
+from dorothie_gym.dialogue.routes import ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology.slots import ActionValue
 
 if TYPE_CHECKING:
@@ -48,15 +48,24 @@ def named_actions(actions: Sequence[ActionValue], parse: PlanParse) -> tuple[Act
         read |= {ActionValue.SPEED_CHANGE}  # "turn left slowly"
     turns = ActionValue.J_TURN in read or any(step.action is StepAction.TURN for step in parse.described)
     found = set(actions)
-    if not turns and (parse.aside or ActionValue.LANE_SWITCH in read):
+    only = bool(steps) and ORDERED.issuperset(parse.moods) and not {StepAction.FOLLOW, StepAction.STRAIGHT} & set(steps)
+    if not turns and (only or parse.aside or ActionValue.LANE_SWITCH in read):
         found.discard(ActionValue.J_TURN)
     if steps and ORDERED.issuperset(parse.moods) and StepAction.FOLLOW not in steps and not parse.denied:
         found -= _WEAK - read  # "right again and back to where we started"
     if found and len(steps) < 2:
         read -= _WEAK
+    if any(step.action is StepAction.FOLLOW and _ends_somewhere(step) for step in parse.plan):
+        found.add(ActionValue.LANE_FOLLOW)  # "take Murfin as far as the bridge"
+    if StepAction.LANE in steps and StepAction.TURN not in steps and not parse.denied:
+        found.discard(ActionValue.J_TURN)  # "the right, the right lane"
     found |= read
     named = [value for value in actions if value in found]
     return (*named, *sorted(found.difference(named), key=_ORDER.__getitem__))
+
+
+def _ends_somewhere(step: PlanStep) -> bool:
+    return step.condition is not None and step.condition.relation is ConditionRelation.UNTIL
 
 
 def planned_turns(turns: tuple[RouteTurn, ...], parse: PlanParse) -> tuple[RouteTurn, ...]:

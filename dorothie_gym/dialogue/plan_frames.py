@@ -31,9 +31,13 @@ TURNING: Final = frozenset({StepAction.TURN, StepAction.LANE, StepAction.U_TURN}
 NEGATING: Final = frozenset({"forbid", "not", "instead"})
 """Kinds of negations of the grammar that negate the next step."""
 
+PASSING: Final = frozenset({"pass", "ignore", "skip"})
+"""Words of actions by which turns are left alone."""
+
 _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP, StepAction.STRAIGHT})
 """Actions with an ordinal."""
 
+_NEXT_JUNCTION: Final = PlaceReference(ordinal=1)
 _MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
 _PREPOSITIONS: Final = frozenset({"down", "along", "via", "up", "by"})
 
@@ -56,6 +60,7 @@ class Frame:
         ends: whether its clause ends behind the verb.
         deferred: whether it comes after the other errands.
         implied: whether its action is not named: "on the left, please".
+        contingent: whether it depends on a condition of the world.
     """
 
     action: StepAction | None = None
@@ -79,6 +84,7 @@ class Frame:
     word: str = ""
     deferred: bool = False
     implied: bool = False
+    contingent: bool = False
 
     def step(self) -> PlanStep | None:
         """Returns the finished step; None without an action or with parts that do not fit together."""
@@ -121,6 +127,8 @@ class PlanState:
         self.cancelled: set[LandmarkName] = set()
         self.denied: set[StepAction] = set()
         self.forbidding = False
+        self.contingent = False  # whether the rest of the sentence depends on a condition of the world
+        self.conditional = False  # whether there has been such a condition
         self.preceded = False  # whether other errands come before the next one: "before we go to the KFC"
 
     def close(self) -> None:
@@ -163,9 +171,11 @@ class PlanState:
         self.close()
         frame = Frame(action=action, mood=self.mood, negated=self.negation in NEGATING)
         waiting, self.pending = self.pending, Frame()
-        frame.forbidden = self.negation == "forbid"
+        frame.forbidden, frame.contingent = self.negation == "forbid", self.contingent
         if action is StepAction.TURN and self.negation == "cancel":  # "skip the next left"
             frame.negated = frame.forbidden = True
+        elif self.negation == "cancel" and action in (StepAction.U_TURN, StepAction.LANE, StepAction.STOP):
+            frame.negated = True  # "never mind the U-turn"
         frame.relation, frame.at, frame.distance = waiting.relation, waiting.at, waiting.distance
         frame.borrowed = waiting.at is not None
         frame.ordinal = waiting.ordinal
@@ -217,6 +227,11 @@ class PlanState:
             counted = frame.action is StepAction.TURN and frame.direction is None and frame.ordinal is not None
             if counted and before.action is StepAction.TURN and before.negated:
                 frame.direction = before.direction
+            if counted and before.action is StepAction.STRAIGHT and before.direction is not None:
+                frame.direction, before.action = before.direction, None  # "ignore two lefts, take the third"
+        for frame in self.frames:
+            if frame.action is StepAction.STRAIGHT:
+                frame.direction = None
 
     def steps_of(self, frame: Frame) -> list[PlanStep]:
         """Returns the step of a frame after its negation; empty if there is none."""
@@ -231,7 +246,8 @@ class PlanState:
             frame.speed = frame.bare_number if frame.speed is None and frame.change is None else frame.speed
             if frame.speed is None and frame.change is None:
                 return []
-        if frame.action is StepAction.STRAIGHT and frame.at is not None and frame.at.reference is Anaphor.THERE:
+        here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
+        if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
         step = frame.step()
         return [] if step is None else [step]
@@ -239,7 +255,12 @@ class PlanState:
     def _negate_step(self, frame: Frame) -> bool:
         """Negates a step, such as a forbidden street to one to avoid; returns whether a step is left."""
         self.denied |= {frame.action} if frame.action is not None else set()
+        if frame.action is StepAction.STOP and frame.at is not None and frame.at.reference is None:
+            frame.at = None  # "never stop on a bridge" says nothing of where to go on
         if frame.action in (StepAction.FOLLOW, StepAction.VISIT) and frame.place is not None:
+            needless = frame.verb in ("need", "want") or frame.word in ("go", "head", "stop")
+            if frame.action is StepAction.VISIT and frame.place.landmark is not None and needless:
+                self.cancelled.add(frame.place.landmark)  # "we don't need the KFC any more"
             frame.action = StepAction.AVOID
             return frame.place.street is not None and frame.place.landmark is None
         if frame.action is StepAction.STOP or frame.action in TURNING:

@@ -90,6 +90,13 @@ class NegationItem(NamedTuple):
     kind: str
 
 
+class ContingencyItem(NamedTuple):
+    """Condition of the world; `place` is the token behind it, `leading` whether what depends on it follows."""
+
+    place: int
+    leading: bool
+
+
 class UnitItem(NamedTuple):
     """Unit of speed without a number: "thirty, miles"; the factor to km/h."""
 
@@ -115,6 +122,7 @@ Item: TypeAlias = (
     | BoundaryItem
     | RepairItem
     | NegationItem
+    | ContingencyItem
     | UnitItem
     | WordItem
 )

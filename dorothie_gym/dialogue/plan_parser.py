@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, append_step
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
     BoundaryItem,
     ConditionItem,
+    ContingencyItem,
     DistanceItem,
     Item,
     LaneItem,
@@ -25,7 +27,8 @@ from dorothie_gym.dialogue.plan_items import (
     VerbItem,
     WordItem,
 )
-from dorothie_gym.dialogue.plan_places import FETCHING, PlaceReader, with_details
+from dorothie_gym.dialogue.plan_places import FETCHING
+from dorothie_gym.dialogue.plan_turns import TurnReader
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import (
     MAX_STEPS,
@@ -65,6 +68,9 @@ class PlanParse:
         waiting: whether a condition, number or distance waits for its step: "at the lights".
         person: whether somebody is to be fetched.
         implied: actions of the plan that no word names.
+        contingent: steps that are ordered in case of a condition of the world, and are no part of the plan.
+        cancelled: whether errands are given up.
+        conditional: whether there is a condition of the world.
         bare: whether the steps of the plan are names without a verb.
         forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
     """
@@ -79,6 +85,9 @@ class PlanParse:
     person: bool = False
     implied: frozenset[StepAction] = frozenset()
     forbidding: bool = False
+    contingent: tuple[PlanStep, ...] = ()
+    conditional: bool = False
+    cancelled: bool = False
     bare: bool = False
 
 
@@ -97,6 +106,7 @@ _CHANGES: Final = {
     "lights_off": StepChange.OFF,
 }
 _OPPOSITE: Final = {StepChange.FASTER: StepChange.SLOWER, StepChange.SLOWER: StepChange.FASTER}
+_AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
 _DEGREES: Final = frozenset({"too", "less"})
 _HERE: Final = frozenset({"here", "here's"})
 _IT: Final = frozenset({"it", "that", "them", "those"})
@@ -115,21 +125,21 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(PlaceReader):
+class _Builder(TurnReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:
         super().__init__()
         self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
-        self.correcting = False  # whether the sentence holds a correction so far
-        self.aside = False
+        self.begun = 0  # number of steps before the sentence
         self._rules: dict[type, Callable[[Any], None]] = {
             ActionItem: self._action,
             VerbItem: self._verb,
-            TurnItem: self._turn,
-            LaneItem: self._lane,
-            SideItem: self._side,
+            TurnItem: self.read_turn,
+            LaneItem: self.read_lane,
+            SideItem: self.read_side,
             ConditionItem: self.read_condition,
+            ContingencyItem: self._contingency,
             NounPhrase: self.read_place,
             DistanceItem: self._distance,
             SpeedItem: self._speed,
@@ -144,7 +154,8 @@ class _Builder(PlaceReader):
         """Reads a sentence; it begins a clause."""
         self.clauses = sentence.clauses
         self.close()
-        self.negation, self.correcting = None, False
+        self.begun = len(self.frames)
+        self.negation, self.correcting, self.contingent = None, False, False
         self._clause(0, new=True)
         for item in sentence.items:
             counted = self.counting
@@ -169,16 +180,20 @@ class _Builder(PlaceReader):
         self._leftovers()
         described: list[PlanStep] = []
         ordered: list[PlanStep] = []
+        contingent: list[PlanStep] = []
         self._drop_interjection()
         self.inherit_directions()
         for frame in sorted(self.frames, key=lambda frame: frame.deferred):
             for step in self.steps_of(frame):
                 described.append(step)
                 if frame.mood in ORDERED:
-                    append_step(ordered, step)
+                    append_step(contingent if frame.contingent else ordered, step)
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
             described=tuple(described),
+            contingent=tuple(contingent),
+            conditional=self.conditional,
+            cancelled=bool(self.cancelled),
             moods=tuple(self.moods),
             repaired=self.repaired,
             denied=frozenset(self.denied),
@@ -200,7 +215,11 @@ class _Builder(PlaceReader):
 
     def _leftovers(self) -> None:
         """Makes a step of what waits for one: "the second", "on the right-hand side, please"."""
-        if any(frame.action is not None for frame in self.frames) or not ORDERED.issuperset(self.moods):
+        acting = [frame for frame in self.frames if frame.action is not None]
+        if self.pending.ordinal is not None and acting and acting[-1].action is StepAction.TURN and acting[-1].negated:
+            self.open_step(StepAction.TURN)  # "not the next right, the third"
+            return
+        if acting or not ORDERED.issuperset(self.moods):
             return
         if self.pending.ordinal is not None and self.negation is None and len(self.moods) > 1:
             self.open_step(StepAction.TURN)
@@ -226,6 +245,18 @@ class _Builder(PlaceReader):
             self.close()
         self._clause(item.place, new=False)
 
+    def _contingency(self, item: ContingencyItem) -> None:
+        """Lets what depends on a condition of the world wait: what follows, or what has been said in this sentence."""
+        self.conditional = True
+        if not item.leading:
+            for frame in self.frames[self.begun :]:
+                frame.contingent = frame.contingent or frame.action not in (StepAction.WAIT, StepAction.GO)
+            return
+        self.moods.pop()
+        self.close()
+        self.contingent = True
+        self._clause(item.place, new=False)
+
     def _repair(self, item: RepairItem) -> None:
         self.correcting = True
         if any(frame.action is not None for frame in self.frames):
@@ -233,6 +264,8 @@ class _Builder(PlaceReader):
         self._boundary(BoundaryItem("and", item.place))
 
     def _negate(self, item: NegationItem) -> None:
+        if item.kind == "cancel" and self.frame is not None and not self.fresh and self.frame.action is None:
+            self.frame.verb = ""  # "let's skip the KFC"
         self.negation = item.kind
 
     def _verb(self, item: VerbItem) -> None:
@@ -318,6 +351,11 @@ class _Builder(PlaceReader):
         if frame is not None and not self.fresh and frame.action is not None:
             if frame.action is StepAction.SPEED:
                 frame.change = frame.change or change
+                if before.isdecimal() or before in NUMBER_WORDS:
+                    frame.speed = frame.bare_number = None  # "go ten faster"
+                return
+            if frame.action is StepAction.STRAIGHT and before in _AMOUNTS:
+                frame.action, frame.change = StepAction.SPEED, change  # "go a bit quicker"
                 return
             if frame.action not in NEEDING_PLACE or frame.place is not None:
                 frame.change = change
@@ -325,119 +363,6 @@ class _Builder(PlaceReader):
         if frame is None or self.fresh or frame.action is not None:
             frame = self.open_step(StepAction.SPEED)
         frame.action, frame.change, frame.negated = StepAction.SPEED, change, False
-
-    def _turn(self, item: TurnItem) -> None:
-        frame = self.replaced(StepAction.TURN, StepAction.LANE)
-        if frame is not None:
-            frame.direction = item.direction
-            frame.ordinal = item.ordinal if item.ordinal is not None else frame.ordinal
-            frame.negated = False
-            return
-        if self._says_again(item):
-            return
-        frame = self.frame
-        if frame is not None and frame.action is StepAction.LANE and frame.direction is None:
-            frame.direction = item.direction  # "switch lanes, left"
-            return
-        if frame is not None and not self.fresh:
-            if frame.action is StepAction.TURN and frame.direction is None:
-                frame.direction = item.direction
-                frame.ordinal = frame.ordinal or item.ordinal
-                return
-            if frame.action is StepAction.U_TURN:
-                return
-            getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
-            if getting or (frame.action is None and frame.verb == "get"):
-                frame.action, frame.direction = StepAction.LANE, item.direction
-                return
-            if frame.action is None or (frame.action in NEEDING_PLACE and frame.place is None):
-                avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
-                frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
-                frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
-                self._repeat(item)
-                return
-        named = self._bare_street()
-        frame = self.open_step(StepAction.TURN)
-        frame.direction = item.direction
-        frame.ordinal = item.ordinal if item.ordinal is not None else frame.ordinal
-        if named is not None and frame.at is None:
-            frame.relation, frame.at = ConditionRelation.AT, named
-        self._repeat(item)
-
-    def _bare_street(self) -> PlaceReference | None:
-        """Returns a street that has been named without a verb, and takes its step back: "Plymouth, and left"."""
-        last = self.frames[-1] if self.frames else None
-        if last is None or not last.bare or last.action is not StepAction.FOLLOW or last.place is None:
-            return None
-        self.frames.pop()
-        self.frame = None
-        return last.place
-
-    def _says_again(self, item: TurnItem) -> bool:
-        """Returns whether a turn behind a correction is the one said before: "no, LEFT, left at the lights"."""
-        last = self.frames[-1] if self.frames else None
-        if not self.correcting or last is None or last.action is not StepAction.TURN or self.repairing:
-            return False
-        if last.direction is not item.direction or last.at is not None:
-            return False
-        last.ordinal = item.ordinal or last.ordinal
-        if self.pending.at is not None:
-            last.relation, last.at, self.pending.at = self.pending.relation, self.pending.at, None
-        self.frame, self.fresh = last, False
-        return True
-
-    def _repeat(self, item: TurnItem) -> None:
-        for _ in range(item.times - 1):
-            self.open_step(StepAction.TURN).direction = item.direction
-
-    def _lane(self, item: LaneItem) -> None:
-        frame = self.replaced(StepAction.LANE, StepAction.TURN)
-        if frame is None:
-            frame = self.frame
-            if (
-                frame is None
-                or self.fresh
-                or frame.action not in (None, StepAction.LANE, *NEEDING_PLACE)
-                or frame.place
-            ):
-                frame = self.open_step(StepAction.LANE)
-        frame.action, frame.direction, frame.ordinal = StepAction.LANE, item.direction, None
-        frame.negated = self.negation in NEGATING
-
-    def _side(self, item: SideItem) -> None:
-        turns = sum(frame.action in (StepAction.TURN, StepAction.LANE) for frame in self.frames)
-        self._place_side(item)
-        directed = [frame for frame in self.frames if frame.action in (StepAction.TURN, StepAction.LANE)]
-        used = len(directed) > turns or any(frame.direction is item.direction for frame in directed)
-        self.aside = self.aside or not used
-
-    def _place_side(self, item: SideItem) -> None:
-        frame = self.replaced()
-        if frame is not None and frame.side is not None:
-            frame.side = item.direction
-            return
-        frame = self.frame
-        if frame is None and self.counting:
-            self.open_step(StepAction.TURN).direction = item.direction
-        elif frame is None:
-            self.pending.side = item.direction
-        elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
-            frame.direction = item.direction
-        elif self.counting:
-            self.open_step(StepAction.TURN).direction = item.direction
-        elif frame.action in (StepAction.STOP, StepAction.WAIT):
-            frame.side = item.direction
-        elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
-            frame.action, frame.direction = StepAction.TURN, item.direction
-        elif frame.action is StepAction.VISIT and frame.place is not None:
-            frame.place = with_details(frame.place, side=item.direction)
-            if frame.mood is ClauseMood.STATEMENT:
-                self.pending.side = item.direction  # "the house is on the left, stop there"
-        elif self.pending.ordinal is not None:
-            opened = self.open_step(StepAction.TURN)
-            opened.direction = item.direction
-        else:
-            self.pending.side = item.direction
 
     def _distance(self, item: DistanceItem) -> None:
         frame = self.replaced()

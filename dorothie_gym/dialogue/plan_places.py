@@ -48,6 +48,8 @@ class PlaceReader(PlanState):
             if item.place is not None and item.place.ordinal is not None:
                 self._counted(item.relation, item.place.ordinal)
             return
+        if self._excludes(place):
+            return
         if place.reference is None:
             self.last_place = place
         if self.repairing and (frame := self.replaced()) is not None and frame.at is not None:
@@ -63,6 +65,16 @@ class PlaceReader(PlanState):
         elif self.mood is not ClauseMood.STATEMENT:
             self.stop_between()
             self.pending.relation, self.pending.at = item.relation, place
+
+    def _excludes(self, place: PlaceReference) -> bool:
+        """Returns whether a negated place is no condition: "not onto Beal, take Fuller", "not at the KFC"."""
+        if self.negation != "not" or (self.frame is not None and self.frame.action is not None and not self.fresh):
+            return False
+        self.negation = None
+        if _names_only_street(place) and self.mood in ORDERED and not self.repairing:
+            self.open_step(StepAction.AVOID).place = place
+            self.frame, self.fresh = None, True
+        return True
 
     def stop_between(self) -> None:
         """Makes an errand of a place that has waited in vain for a step: "one at the Coco, one at the KFC"."""
@@ -81,7 +93,11 @@ class PlaceReader(PlanState):
         if fetching:
             frame.relation, frame.at = ConditionRelation.AT, place  # "pick her up from the KFC"
         elif frame.action is StepAction.VISIT and frame.place is None and relation not in _LATER:
+            if _names_only_street(place) and relation is ConditionRelation.AT:
+                frame.action = StepAction.FOLLOW  # "get us onto the highway"
             frame.place = place
+        elif self._orders_errands(frame, relation, place):
+            pass
         elif frame.action is StepAction.VISIT and frame.place is not None and _names_only_street(place):
             frame.place = with_details(frame.place, street=place.street)
         elif frame.action is StepAction.VISIT and frame.place == place:
@@ -102,6 +118,22 @@ class PlaceReader(PlanState):
             beside = relation is ConditionRelation.BESIDE and turning and frame.action is not StepAction.LANE
             frame.borrowed = False
             frame.relation, frame.at = ConditionRelation.AT if beside else relation, place
+
+    def _orders_errands(self, frame: Frame, relation: ConditionRelation, place: PlaceReference) -> bool:
+        """Returns whether a relation puts two errands in order: "do the Shell before the Coco"."""
+        errand = frame.action is StepAction.VISIT and frame.place is not None and frame.mood in ORDERED
+        named = place.landmark is not None and frame.place != place
+        if (
+            not errand
+            or not named
+            or frame.negated
+            or relation not in (ConditionRelation.BEFORE, ConditionRelation.AFTER)
+        ):
+            return False
+        other = Frame(action=StepAction.VISIT, mood=frame.mood, place=place, contingent=frame.contingent)
+        number = self.frames.index(frame)
+        self.frames.insert(number + (relation is ConditionRelation.BEFORE), other)
+        return True
 
     def _counted(self, relation: ConditionRelation, ordinal: int) -> None:
         """Puts "at the second junction" or "after the second crossing" into a step."""
@@ -215,6 +247,10 @@ class PlaceReader(PlanState):
 
     def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
         self.counting = True
+        if self.negation == "cancel" and ordinal is not None:
+            self.open_step(StepAction.TURN)  # "skip the next turn"
+            self.negation = None
+            return
         if ordinal is None:
             frame = self.frame
             if frame is not None and not self.fresh and frame.action is StepAction.FOLLOW and frame.place is None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from dorothie_gym.dialogue.clause_moods import ClauseReader
 from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_lists
-from dorothie_gym.dialogue.entity_recognition import find_names
+from dorothie_gym.dialogue.entity_recognition import find_names, known_words
 from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.plan_chunker import read_items
 from dorothie_gym.dialogue.plan_parser import PlanParse, Sentence, parse_plan
@@ -16,6 +16,8 @@ from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 
 _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
+_CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
+_PERSON = "#person"
 _LIGHTS = frozenset({"light", "lights"})
 _NONE: frozenset[str] = frozenset()
 _COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
@@ -76,13 +78,18 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
     return without_asides(kept, lists) if kept else words
 
 
+def _strangers(text: str) -> frozenset[str]:
+    """Returns the words within a sentence that are written as names, and are none of the town's."""
+    return frozenset(word.lower() for word in _CAPITALISED.findall(text)) - known_words()
+
+
 def _sentence(text: str) -> Sentence | None:
     lists = word_lists()
     said = with_plain_lights(_plain(split_words(text), lists))
     if not said:
         return None
     mentions, masked = find_names(said, statuses=False)
-    words = mask_directions(masked, lists)
+    words = [_PERSON if word in _strangers(text) else word for word in mask_directions(masked, lists)]
     names = {mention.start: mention.value for mention in mentions}
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)

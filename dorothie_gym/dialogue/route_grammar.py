@@ -123,6 +123,8 @@ class RouteGrammar:
         opportunities: nouns that count opportunities to turn.
         openers: openings of clauses, by what the clause does: soft, request, question, statement.
         lights: phrases about the lights of the car.
+        contingencies: conditions of the world, and phrases that look like them and are politeness or places.
+        leaving: what an object does that leaves.
         fillers: words that change nothing.
         modifiers: words that may stand before the noun of a place.
         determiners: articles and the like.
@@ -142,6 +144,8 @@ class RouteGrammar:
     opportunities: PhraseIndex
     openers: PhraseIndex
     lights: PhraseIndex
+    contingencies: PhraseIndex
+    leaving: PhraseIndex
     fillers: PhraseIndex
     modifiers: frozenset[str]
     determiners: frozenset[str]
@@ -174,6 +178,8 @@ def route_grammar() -> RouteGrammar:
         openers=PhraseIndex(list(_phrases(data, "openers")), adverbs=False),
         fillers=PhraseIndex(list(_phrases(data, "fillers")), adverbs=False),
         lights=PhraseIndex(list(_phrases(data, "lights"))),
+        leaving=PhraseIndex(list(_phrases(data, "leaving"))),
+        contingencies=PhraseIndex(list(_phrases(data, "contingencies")), adverbs=False),
         modifiers=_words(data, "modifiers"),
         determiners=_words(data, "determiners"),
         junction_words=_words(data, "junction_words"),

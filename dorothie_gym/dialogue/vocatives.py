@@ -12,7 +12,7 @@ _AFTER_ADDRESSEE = frozenset(
     {
         ",", "?", "please", "can", "could", "would", "will", "are", "do", "did", "have", "is", "how", "what", "where",
         "which", "who", "i", "we", "let's", "turn", "stop", "go", "take", "drive", "slow", "keep", "head", "follow",
-        "make", "pull",
+        "make", "pull", "just",
     }
 )  # fmt: skip
 """Words behind a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""

@@ -325,3 +325,80 @@ def test_the_longest_phrase_is_found():
     assert index.longest(["go", "on"], 0).kind == "go"
     assert index.longest(["on"], 0) is None
     assert route_grammar().terminals.longest(["pull", "over"], 0).kind == "stop"
+
+
+@pytest.mark.parametrize(
+    ("text", "waits"),
+    [
+        ("if the bridge is closed, go left", "turn left"),
+        ("in case it snows drive slower", "drive slower"),
+        ("as soon as the rain lets up turn the lights off", "switch the lights off"),
+        ("pull over if anybody feels sick", "stop"),
+        ("unless there's a queue, take Hayward", "follow Hayward"),
+        ("if you miss the turn, go back", "turn around"),
+    ],
+)
+def test_what_depends_on_the_world_is_not_ordered_now(text, waits):
+    parsed = understand(text)
+    assert parsed.plan.steps == ()
+    assert DrivingPlan(parsed.parse.contingent).describe() == waits
+    assert [span.act.move for span in guess_spans(text)] == [DialogueMove.INSTRUCT]
+
+
+@pytest.mark.parametrize(
+    ("text", "plan"),
+    [
+        ("turn right if you would", "turn right"),
+        ("stop as soon as it's safe", "stop"),
+        ("it would be nice if you went a bit slower", "drive slower"),
+        ("go to the Coco, and if it's shut go home", "drive to the Coco"),
+        ("turn left once that bus has passed", "turn left after that car"),
+    ],
+)
+def test_politeness_and_places_are_no_conditions_of_the_world(text, plan):
+    assert planned(text).describe() == plan
+
+
+@pytest.mark.parametrize(
+    ("text", "plan"),
+    [
+        ("ignore three rights, take the fourth", "take the fourth right"),
+        ("not the next left, the second", "take the second left"),
+        ("forget that right, go straight on", "go straight on"),
+        ("don't dawdle", "drive faster"),
+        ("go twenty slower", "drive slower"),
+        ("not into Draper, take Upland", "avoid Draper, then follow Upland"),
+        ("do the Ikea before the KFC", "drive to IKEA, then drive to the KFC"),
+        ("drop the Panera and go to the KFC", "drive to the KFC"),
+        ("stop at the junction", "stop at the next junction"),
+        ("I wonder if we should stop here", "stop here"),
+        ("stop on the left, not the right", "stop on the left-hand side"),
+        ("pick up Susan from the Ikea", "drive to my friend at IKEA"),
+        ("when you see the bridge, slow down to thirty", "drive at 30 km/h at the sight of the bridge"),
+    ],
+)
+def test_what_is_passed_dropped_or_put_first_is_understood(text, plan):
+    assert planned(text).describe() == plan
+
+
+@pytest.mark.parametrize(
+    ("text", "after", "move"),
+    [
+        ("do the Coco before the Shell", None, "Instruct"),
+        ("never turn on a bridge", None, "Instruct"),
+        ("no, not right, left!", None, "Instruct"),
+        ("can we make it by eight", None, "QueryYN"),
+        ("how was your weekend?", None, "Irrelevant"),
+        ("is there any chance we could stop at the Shell", None, "Instruct"),
+        ("oh right", DialogueMove.EXPLAIN, "Acknowledge"),
+        ("not that lane, the one on the other side", DialogueMove.EXPLAIN, "Clarify"),
+    ],
+)
+def test_what_looks_like_another_act_is_told_by_the_parse(text, after, move):
+    assert guess_spans(text, after)[0].act.move.label == move
+
+
+def test_a_dropped_errand_is_abandoned():
+    parsed = understand("get rid of the Qdoba")
+    assert parsed.plan.steps == ()
+    assert [value.label for value in parsed.statuses] == ["Abandoned"]

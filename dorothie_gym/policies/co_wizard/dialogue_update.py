@@ -131,7 +131,9 @@ def _instruction(
     if words.parse is not None and words.parse.forbidding:
         actions = (ActionValue.LANE_FOLLOW,)  # "don't turn here"
     streets = tuple(name for name in act.values(Slot.STREET) if isinstance(name, StreetName))
-    if not actions and landmarks:
+    if words.parse is not None and words.parse.contingent and not words.plan.steps:
+        state.say(intend(Function.REQUEST, wording=Wording(topic="tell_if")))  # "stop as soon as the rain stops"
+    elif not actions and landmarks:
         _instructed_place(state, view, act, words, rng)
     elif words.distance is not None and not view.standing and _STOP_AHEAD & set(actions):
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None

@@ -1,0 +1,150 @@
+"""Quantities of route talk: distances and speeds, with their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+from dorothie_gym.dialogue.numerals import may_be_speed, read_cardinals
+from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, Item, SpeedItem
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.route_grammar import RouteGrammar
+    from dorothie_gym.ontology.slots import SlotValue
+
+_BEHIND_SPEED: Final = frozenset(
+    [
+        "",
+        ",",
+        "?",
+        "when",
+        "at",
+        "until",
+        "till",
+        "by",
+        "before",
+        "after",
+        "and",
+        "then",
+        "please",
+        "once",
+        "max",
+        "tops",
+    ]
+)
+"""Words behind a number that is a speed."""
+_LEAST_SPEED: Final = 5
+
+
+class QuantityReader:
+    """Tokens of a sentence with the items found so far; reads quantities."""
+
+    def __init__(
+        self, words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str], grammar: RouteGrammar
+    ) -> None:
+        """Begins with the tokens, the names and first words of `read_items`, and the grammar."""
+        self.words, self.names, self.lead, self.grammar = words, names, lead, grammar
+        self.items: list[Item] = []
+
+    def word_at(self, place: int) -> str:
+        """Returns the token at a place; "" where there is none."""
+        return self.words[place] if 0 <= place < len(self.words) else ""
+
+    def read_quantity(self, place: int) -> int:
+        """Reads a distance or a speed."""
+        begin, aimed = place, self.word_at(place) in ("to", "at", "down", "of", "under", "below", "above", "over")
+        number, end = self._number(place + aimed)
+        if number is None:
+            return place
+        if aimed and not self._is_speed(place + 1, end):
+            return place
+        place += aimed
+        unit = self.grammar.speeds.get(self.word_at(end))
+        if unit is not None:
+            self._speed(number * unit, unit=True)
+            return end + 1
+        metres = self.grammar.metres.get(self.word_at(end))
+        if metres is not None:
+            hours, behind = self._per_hour(end + 1)
+            if hours is not None:
+                self._speed(number * metres * hours / 1000.0, unit=True)
+                return behind
+            if self.word_at(end + 1) == "and" and self.word_at(end + 3) == "half":  # a mile and a half
+                number, end = number + 0.5, end + 3
+            self.items.append(DistanceItem(max(1, round(number * metres))))
+            return end + 1
+        if number >= _LEAST_SPEED and may_be_speed(self.word_at(place - 1), self.word_at(end)):
+            self._speed(number, unit=False)
+            return end
+        return begin
+
+    def _is_speed(self, place: int, end: int) -> bool:
+        """Returns whether a number behind "to" is a speed: "slow down to twenty"."""
+        word, following = self.word_at(end), self.word_at(place - 2)
+        if word in self.grammar.speeds or (word in self.grammar.metres and self._per_hour(end + 1)[0] is not None):
+            return True
+        last = self.items[-1] if self.items else None
+        changing = isinstance(last, ActionItem) and last.kind in ("slower", "faster", "speed")
+        ends = word in (
+            "",
+            ",",
+            "?",
+            "when",
+            "at",
+            "until",
+            "till",
+            "by",
+            "before",
+            "after",
+            "and",
+            "then",
+            "please",
+            "once",
+        )
+        return changing and ends and following != "the"
+
+    def _speed(self, speed: float, *, unit: bool) -> None:
+        self.items.append(SpeedItem(max(1, round(speed)), unit))
+
+    def _per_hour(self, place: int) -> tuple[float | None, int]:
+        place += self.word_at(place) in ("per", "an", "a", "the")
+        hours = self.grammar.hours.get(self.word_at(place))
+        return hours, place + 1
+
+    def _number(self, place: int) -> tuple[float | None, int]:
+        """Returns a number, "half a", "a quarter" or "a couple of hundred" among them, and the place behind it."""
+        word, number, start = self.word_at(place), None, place
+        if word in ("a", "an", "another"):
+            place, word = place + 1, self.word_at(place + 1)
+        if word in ("half", "quarter"):
+            place += 1 + (self.word_at(place + 1) == "of")
+            place += self.word_at(place) in ("a", "an")
+            return (0.5 if word == "half" else 0.25), place
+        if word in ("couple", "few"):
+            place += 1 + (self.word_at(place + 1) == "of")
+            if self.word_at(place) == "hundred":
+                return 100.0 * (2 if word == "couple" else 3), place + 1
+            return None, start
+        if word == "hundred":
+            number, place = 100.0, place + 1
+        elif place > start and word in self.grammar.metres:
+            return 1.0, place
+        else:
+            length = self._run(place)
+            if length:
+                number = float(read_cardinals([*self.words[place : place + length]])[0])
+                place += length
+        if number == 100.0 and self.word_at(place) == "and" and (more := self._run(place + 1)):
+            number, place = number + read_cardinals(list(self.words[place + 1 : place + 1 + more]))[0], place + 1 + more
+        return (None, start) if number is None else (number, place)
+
+    def _run(self, place: int) -> int:
+        """Returns the number of tokens of the cardinal at a place; 0 without any."""
+        length = 0
+        while (
+            place + length < len(self.words) and len(read_cardinals(list(self.words[place : place + length + 1]))) == 1
+        ):
+            if not read_cardinals([self.words[place + length]]) and self.words[place + length] != "hundred":
+                break
+            length += 1
+        return length

@@ -1,0 +1,157 @@
+"""Turns, lanes and sides of driving plans."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dorothie_gym.dialogue.clause_moods import ClauseMood
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING
+from dorothie_gym.dialogue.plan_places import PlaceReader, with_details
+from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, StepAction
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.plan_items import LaneItem, SideItem, TurnItem
+
+
+class TurnReader(PlaceReader):
+    """Reads the turns, lanes and sides of a plan."""
+
+    def __init__(self) -> None:
+        """Begins without steps."""
+        super().__init__()
+        self.correcting = False  # whether the sentence holds a correction so far
+        self.aside = False  # whether left or right is a side of the street
+
+    def read_turn(self, item: TurnItem) -> None:
+        """Reads a direction to turn."""
+        if self._passes(item) or self._denies_side():
+            return
+        frame = self.replaced(StepAction.TURN, StepAction.LANE)
+        if frame is not None:
+            frame.direction = item.direction
+            frame.ordinal = item.ordinal if item.ordinal is not None else frame.ordinal
+            frame.negated = False
+            return
+        if self._says_again(item):
+            return
+        frame = self.frame
+        if frame is not None and frame.action is StepAction.LANE and frame.direction is None:
+            frame.direction = item.direction  # "switch lanes, left"
+            return
+        if frame is not None and not self.fresh:
+            if frame.action is StepAction.TURN and frame.direction is None:
+                frame.direction = item.direction
+                frame.ordinal = frame.ordinal or item.ordinal
+                return
+            if frame.action is StepAction.U_TURN:
+                return
+            getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
+            if getting or (frame.action is None and frame.verb == "get"):
+                frame.action, frame.direction = StepAction.LANE, item.direction
+                return
+            if frame.action is None or (frame.action in NEEDING_PLACE and frame.place is None):
+                avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
+                frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
+                frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
+                self._repeat(item)
+                return
+        named = self._bare_street()
+        frame = self.open_step(StepAction.TURN)
+        frame.direction = item.direction
+        frame.ordinal = item.ordinal if item.ordinal is not None else frame.ordinal
+        if named is not None and frame.at is None:
+            frame.relation, frame.at = ConditionRelation.AT, named
+        self._repeat(item)
+
+    def _denies_side(self) -> bool:
+        """Returns whether a direction is a side that is not meant: "stop on the right, not the left"."""
+        last = self.frames[-1] if self.frames else None
+        sided = last is not None and last.action is StepAction.STOP and last.side is not None
+        return sided and self.negation in NEGATING
+
+    def _passes(self, item: TurnItem) -> bool:
+        """Returns whether a turn is one to be passed by: "ignore two lefts, take the third"."""
+        frame = self.frame
+        if frame is None or self.fresh or frame.word not in PASSING or frame.at is not None:
+            return False
+        frame.direction, frame.ordinal = item.direction, item.ordinal if item.ordinal != 1 else None
+        if item.times > 1:
+            frame.ordinal = item.times
+        return True
+
+    def _bare_street(self) -> PlaceReference | None:
+        """Returns a street that has been named without a verb, and takes its step back: "Plymouth, and left"."""
+        last = self.frames[-1] if self.frames else None
+        if last is None or not last.bare or last.action is not StepAction.FOLLOW or last.place is None:
+            return None
+        self.frames.pop()
+        self.frame = None
+        return last.place
+
+    def _says_again(self, item: TurnItem) -> bool:
+        """Returns whether a turn behind a correction is the one said before: "no, LEFT, left at the lights"."""
+        last = self.frames[-1] if self.frames else None
+        if not self.correcting or last is None or last.action is not StepAction.TURN or self.repairing:
+            return False
+        if last.direction is not item.direction or last.at is not None:
+            return False
+        last.ordinal = item.ordinal or last.ordinal
+        if self.pending.at is not None:
+            last.relation, last.at, self.pending.at = self.pending.relation, self.pending.at, None
+        self.frame, self.fresh = last, False
+        return True
+
+    def _repeat(self, item: TurnItem) -> None:
+        for _ in range(item.times - 1):
+            self.open_step(StepAction.TURN).direction = item.direction
+
+    def read_lane(self, item: LaneItem) -> None:
+        """Reads a lane by its side."""
+        frame = self.replaced(StepAction.LANE, StepAction.TURN)
+        if frame is None:
+            frame = self.frame
+            if (
+                frame is None
+                or self.fresh
+                or frame.action not in (None, StepAction.LANE, *NEEDING_PLACE)
+                or frame.place
+            ):
+                frame = self.open_step(StepAction.LANE)
+        frame.action, frame.direction, frame.ordinal = StepAction.LANE, item.direction, None
+        frame.negated = self.negation in NEGATING
+
+    def read_side(self, item: SideItem) -> None:
+        """Reads a side of the street."""
+        turns = sum(frame.action in (StepAction.TURN, StepAction.LANE) for frame in self.frames)
+        self._place_side(item)
+        directed = [frame for frame in self.frames if frame.action in (StepAction.TURN, StepAction.LANE)]
+        used = len(directed) > turns or any(frame.direction is item.direction for frame in directed)
+        self.aside = self.aside or not used
+
+    def _place_side(self, item: SideItem) -> None:
+        frame = self.replaced()
+        if frame is not None and frame.side is not None:
+            frame.side = item.direction
+            return
+        frame = self.frame
+        if frame is None and self.counting:
+            self.open_step(StepAction.TURN).direction = item.direction
+        elif frame is None:
+            self.pending.side = item.direction
+        elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
+            frame.direction = item.direction
+        elif self.counting:
+            self.open_step(StepAction.TURN).direction = item.direction
+        elif frame.action in (StepAction.STOP, StepAction.WAIT):
+            frame.side = item.direction
+        elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
+            frame.action, frame.direction = StepAction.TURN, item.direction
+        elif frame.action is StepAction.VISIT and frame.place is not None:
+            frame.place = with_details(frame.place, side=item.direction)
+            if frame.mood is ClauseMood.STATEMENT:
+                self.pending.side = item.direction  # "the house is on the left, stop there"
+        elif self.pending.ordinal is not None:
+            opened = self.open_step(StepAction.TURN)
+            opened.direction = item.direction
+        else:
+            self.pending.side = item.direction
