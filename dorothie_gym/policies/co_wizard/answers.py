@@ -61,8 +61,11 @@ def answer_yes_no(
     """Answers a yes/no question from the Co-Wizard's beliefs."""
     asked = asked_proposition(act, words)
     place = act_builders.first_name(act.values(Slot.LANDMARK))
-    if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
+    requests = words.asked is None and _REQUEST.search(words.text.lower()) is not None
+    if requests and place is not None:
         set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
+    elif requests:
+        ask_back(state, view, words)  # a request that was misheard is not refused
     elif asked is None:
         ask_back(state, view, words, question=True)
     elif words.asked is None and ActionValue.SPEED_CHANGE in act.values(Slot.ACTION):

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.dialogue.conversation import resembles_request_to_repeat
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.proposals import propose_way
+from dorothie_gym.policies.co_wizard.repairs import repeat_last
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.sim.state.codes import Motion
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 TWICE = 2
 """Number of failures after which the car stops rather than asks."""
 
-_QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
+IN_REPLY = 6.0
+"""Time within which an utterance is a reaction to the last remark [s]."""
 
 
 def ask_back(state: CoWizardState, view: CoWizardView, words: ParsedText, *, question: bool = False) -> None:
@@ -41,7 +43,9 @@ def ask_back(state: CoWizardState, view: CoWizardView, words: ParsedText, *, que
         words: what was heard.
         question: whether it was a question, which only needs an answer.
     """
-    if state.speech.may_ask_back(view.time):
+    if _may_be_asked_back(state, view, words):
+        repeat_last(state)  # "calm again?"
+    elif state.speech.may_ask_back(view.time):
         state.say(intend(Function.NEGATIVE_FEEDBACK))
     elif question:
         state.say(intend(Function.UNCERTAIN_ANSWER))
@@ -73,6 +77,12 @@ def explain_differently(state: CoWizardState, view: CoWizardView, words: ParsedT
             _narrow(state, view, words)
     else:
         state.say(intend(Function.INFORM, wording=Wording(topic="unimportant")))
+
+
+def _may_be_asked_back(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether the participant has probably not understood the last remark, which was not repeated yet."""
+    just_spoken = state.speech.has_just_spoken(view.time, IN_REPLY) and not state.speech.turns_of_repair(view.time)
+    return just_spoken and resembles_request_to_repeat(words.text)
 
 
 def _has_just_asked(state: CoWizardState) -> bool:

@@ -225,11 +225,12 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place.
 
-    A third unsuccessful instruction is replaced by the question why the car stands; then the car is told to go straight
-    on, in case it waits before a junction, and to start.
+    The instructions count as unsuccessful until the car has moved by more than a few metres. A third one is replaced
+    by the question why the car stands; then the car is told to go straight on, in case it waits before a junction, and
+    to start.
     """
-    since = view.time if state.motion.standing_since is None else state.motion.standing_since
-    state.guidance = state.guidance.after_nudging(view.time, since)
+    left = state.route.to_goal.left(view.station)
+    state.guidance = state.guidance.after_nudging(view.time, left)
     again, attempt = divmod(state.guidance.nudges, IN_VAIN + 1)
     if attempt == 0:
         return why_standing(state, view)
@@ -237,7 +238,6 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
         return order(DialogueMove.INSTRUCT, ActionValue.START)
     if again:
         return straight_on()
-    left = state.route.to_goal.left(view.station)
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
     reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
+from dorothie_gym.dialogue.conversation import is_partly_inaudible, resembles_request_to_repeat, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.heard_utterance import HeardUtterance
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
+
+IN_REPLY = 6.0
+"""Time within which an utterance of the car is a reaction to the last remark [s]."""
 
 _WORTH_REPEATING = act_builders.QUESTIONS | {DialogueMove.EXPLAIN}
 """Moves whose repetition the participant requests."""
@@ -59,15 +62,19 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
     return True
 
 
-def ask_back(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+def ask_back(state: ParticipantState, view: ParticipantView, words: ParsedText, rng: np.random.Generator) -> None:
     """Reacts to a question of the car that was not understood: asks once, and then says where the car shall go.
 
     Args:
         state: working copy of the state.
         view: observation.
+        words: what was heard.
         rng: random generator of the decision.
     """
-    if state.speech.may_ask_back(view.time):
+    just_spoken = state.speech.has_just_spoken(view.time, IN_REPLY) and not state.speech.turns_of_repair(view.time)
+    if just_spoken and resembles_request_to_repeat(words.text):
+        explain_again(state, view, rng)
+    elif state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
     elif not tell_way(state, view, rng):
         state.say_first(intend(CommunicativeFunction.UNCERTAIN_ANSWER))

@@ -143,7 +143,7 @@ def _open_question(
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
-        ask_back(state, view, rng)
+        ask_back(state, view, words, rng)
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:

@@ -160,7 +160,7 @@ def answer_yes_no(
         place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
         asked = words.asked or place or (checked(state, act, words) if act.slots else None)
         if asked is None:
-            ask_back(state, view, rng)
+            ask_back(state, view, words, rng)
             return
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)

@@ -44,7 +44,8 @@ _ACTIONS: Final = {
 def stale_remarks(session: Session) -> Iterator[Case]:
     """Yields the remarks that something has happened a number of times; wrong are those made before it has.
 
-    An action counts if it was taken, or ordered and not taken, since the errand began; a place, if it was passed.
+    An action counts if it was taken, or ordered and not taken, since the errand began; a place, if it was passed, or
+    where none is named, if the car has been there before.
     """
     for move in session.moves():
         for said in move.meaning:
@@ -59,13 +60,23 @@ def _times(session: Session, said: Proposition, move: MoveRecord) -> float:
     if said.predicate is Predicate.PASSED:
         return _passes(session, place, since, move.start) if isinstance(place, LandmarkName) else math.inf
     kinds = [action] if isinstance(action, ActionValue) else list(_ACTIONS)
-    counts = [0]
+    counts = [0 if isinstance(action, ActionValue) else _visits(session, since, move.start)]
     for kind in kinds:
         taken = [row for row in session.physical_actions if row.action is _ACTIONS.get(kind)]
         counts.append(sum(since <= row.frame / FRAME_RATE <= move.start for row in taken))
         ordered = (other for other in session.moves(Role.PARTICIPANT) if since <= other.end <= move.start)
         counts.append(sum(kind in other.act.slots for other in ordered))
     return max(counts)
+
+
+def _visits(session: Session, since: float, until: float) -> int:
+    """Returns how often the car has been where it is at the second time, since the first [s]."""
+    rows = session.trajectory
+    part = rows[(rows["frame"] >= since * FRAME_RATE) & (rows["frame"] <= until * FRAME_RATE)]
+    if not len(part):
+        return 0
+    close = np.hypot(part["x"] - part["x"][-1], part["y"] - part["y"][-1]) <= PASSING
+    return int((np.diff(close.astype(int)) == 1).sum()) + int(bool(close[0]))
 
 
 def _passes(session: Session, place: LandmarkName, since: float, until: float) -> float:
