@@ -33,22 +33,7 @@ def is_partly_inaudible(text: str) -> bool:
 
 
 _ASKING_TO_REPEAT = frozenset(
-    [
-        "again",
-        "pardon",
-        "sorry",
-        "huh",
-        "what",
-        "hear",
-        "catch",
-        "understand",
-        "follow",
-        "repeat",
-        "missed",
-        "excuse",
-        "apologies",
-        "say",
-    ]
+    {"again", "pardon", "sorry", "huh", "what", "hear", "catch", "understand", "follow", "repeat", "missed", "excuse"}
 )
 _LONGEST_REQUEST = 6  # words of a request to repeat
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from dorothie_gym.policies.persona import Persona
 from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
 from dorothie_gym.policies.speech_timing import Delivery
 from dorothie_gym.session.spaces.actions import Speech
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Span
 
 LONGEST_BREATH = 3
 """Maximum number of acts that are worded together."""
@@ -359,12 +362,19 @@ class SpeechState:
             return max(round(self.reply_at - now, 2), 0.0)
         return round(float(rng.uniform(0.0, 0.9 * interval)), 2)
 
-    def _has_just_worded(self, move: DialogueMove, text: str) -> bool:
-        """Returns whether one of the latest remarks had these words, for moves that are worded anew each time."""
-        if move in _UNCHANGED:
-            return False
-        words = _plain(text)
-        return any(_plain(item.text) == words for item in self.said)
+    def _newest(self, move: DialogueMove, options: Iterator[Sequence[Span]]) -> Sequence[Span]:
+        """Returns the first wording that differs from those of the latest remarks, or from that of the last one.
+
+        Signs of attention and short answers may be repeated.
+        """
+        spans = next(options)
+        said = [_plain(item.text) for item in self.said] if move not in _UNCHANGED else []
+        while said and _plain(spans[0].text) in said:
+            other = next(options, None)
+            if other is None:
+                break
+            spans = other if _plain(other[0].text) != said[-1] else spans
+        return spans
 
     def _worded(
         self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, continues: bool
@@ -375,10 +385,10 @@ class SpeechState:
         joined = self.last.act.move if continues and self.last is not None else None
         context = replace(scene, joined=joined, last=self.other, mentioned=self.heard)
         acts, wordings = [item.act for item in breath], [item.wording for item in breath]
-        for _ in range(REWORDINGS):
-            spans = word_acts(acts, self.role, rng, wordings, style=self.style, scene=context)
-            if not self._has_just_worded(acts[0].move, spans[0].text):
-                break
+        options = (
+            word_acts(acts, self.role, rng, wordings, style=self.style, scene=context) for _ in range(REWORDINGS)
+        )
+        spans = self._newest(acts[0].move, options)
         worded = tuple(replace(item, text=span.text) for item, span in zip(breath, spans, strict=True))
         return (*worded, *queue[len(breath) :])
 

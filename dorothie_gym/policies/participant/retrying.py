@@ -63,7 +63,7 @@ def _more_slowly(state: ParticipantState, view: ParticipantView) -> tuple[Remark
     if state.route.to_goal.left(view.station) > SOON_AGAIN or state.guidance.slowed_early:
         return ()
     state.guidance = state.guidance.after_slowing_early()
-    wording = Wording(faster=False, speed=max(state.config.careful_speeds))
+    wording = Wording(faster=False, speed=max(state.config.careful_speeds), topic="this_time")
     return (order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording),)
 
 
@@ -119,9 +119,10 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
 
 
 def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark | None) -> None:
-    """Plans a route that avoids manoeuvres, and says why, if there is a reason to say."""
+    """Plans a route that avoids manoeuvres, each time at a larger detour, and says why if there is a reason to say."""
     progress = state.route.to_goal
-    cost = state.config.way_round_cost
+    cost = state.config.way_round_cost * (1 + state.guidance.retries)
+    state.guidance = replace(state.guidance, retries=state.guidance.retries + 1)
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
     state.route = state.route.with_progress(progress).sparing_worn(state.town, view.place)
     progress = state.route.to_goal

@@ -221,6 +221,7 @@ class GuidanceState:
         repeats: number of repetitions of that step.
         u_turns: number of U-turns announced on the way to the target.
         passes: number of times that the car has driven past the place.
+        retries: number of other routes that were tried.
         wrong_turns: turns that were announced and not taken.
         lane_changes: lanes that the car was instructed to leave, and the times of the instructions [s].
         approach_announced: whether the car has been informed that the place is near.
@@ -243,6 +244,7 @@ class GuidanceState:
     repeats: int = 0
     u_turns: int = 0
     passes: int = 0
+    retries: int = 0
     wrong_turns: tuple[StepKey, ...] = ()
     lane_changes: tuple[tuple[int, float], ...] = ()
     approach_announced: bool = False

@@ -21,6 +21,7 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
 from dorothie_gym.evaluation.analysis.truth_checks.perceivable import perceived_at
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case
 from dorothie_gym.evaluation.analysis.truth_checks.truth import agrees, is_true
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.maps.catalogue import find_town
@@ -31,7 +32,6 @@ from dorothie_gym.tasks.purposes import find_items, read_people
 
 if TYPE_CHECKING:
     from dorothie_gym.archive.corpus import Corpus
-    from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.recording.session import Session
 
@@ -188,7 +188,7 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None, name:
     _check_answers(checks, session)
     _check_exceptions(checks, session, world)
     checks.add("story", mentions_story(session))
-    checks.add("loops", not has_loop(session))
+    checks.judge("loops", Case(not has_loop(session), 0.0, ""), name)
     for figure, check in _PASSAGES.items():
         for case in check(session):
             checks.judge(figure, case, name)

@@ -106,14 +106,15 @@ def arrival_claims(world: SessionWorld) -> Iterator[Case]:
 def references(session: Session) -> Iterator[Case]:
     """Yields destinations that the participant names of a kind of which the town has several.
 
-    Right are those whose words tell which one is meant: by a street on which there is one, or by a name.
+    Changes of the list of errands ("that house later") do not count. Right are those whose words tell which one is
+    meant: by a street on which there is one, or by a name.
     """
     people = read_people(session.header.story, *(str(row["description"]) for row in session.header.subgoals))
     names = {word.casefold() for name in people for word in name.split()}
     introduced: set[str] = set()
-    for event in (*session.moves(Role.PARTICIPANT),):
+    for event in session.moves(Role.PARTICIPANT):
         kinds = [value for value in event.act.values(Slot.LANDMARK) if value in _SHARED]
-        if not kinds or event.act.move not in _NAMING:
+        if not kinds or event.act.move not in _NAMING or event.act.values(Slot.STATUS):
             continue
         words = {word.removesuffix("'s") for word in re.findall(r"[a-z'-]+", event.span.casefold())}
         errand = f"{kinds[0].label} {_errands_done(session, event.start)}"

@@ -18,7 +18,6 @@ ANSWERED_WITHIN: Final = 12.0
 
 _QUESTIONS: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CHECK})
 _BARE: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
-_REQUESTS: Final = frozenset({DialogueMove.INSTRUCT})
 
 
 def answers_given(session: Session) -> Iterator[Case]:
@@ -46,9 +45,9 @@ def forms_of_answers(session: Session) -> Iterator[Case]:
 
 
 def refusals(session: Session) -> Iterator[Case]:
-    """Yields the replies to requests; wrong are those that are only a no."""
+    """Yields the replies to utterances that end with a request; wrong are those that are only a no."""
     for said, reply in _exchanges(session):
-        if any(move.act.move in _REQUESTS for move in said.moves):
+        if said.moves[-1].act.move is DialogueMove.INSTRUCT:
             bare = all(move.act.move is DialogueMove.REPLY_N and not move.act.slots for move in reply.moves)
             yield judged(not bare, said, reply)
 
