@@ -23,7 +23,7 @@ WAY_ROUND = 60.0
 WORN_OUT = 2
 """Number of times that a section of road is driven on the way to one goal before another route is taken."""
 
-WORN_DETOUR = 800.0
+WORN_DETOUR = 350.0
 """Largest additional length of such a route [m]."""
 
 MOST_AVOIDED = 3

@@ -217,9 +217,15 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
         return False
     waited = view.time - max(since, state.guidance.nudged_at, state.speech.last_end, state.conversation.heard_at)
     patient = abs(left) <= config.arrived_within or not state.guidance.guiding
-    if waited > (PATIENT_TIME if patient else config.ready_time):
+    cycles = state.guidance.nudges // (IN_VAIN + 1)  # the more was said in vain, the longer the wait
+    if waited > (PATIENT_TIME if patient else config.ready_time) * (1 + cycles) and not _is_excused(state, view):
         state.say(creep_instruction(state, view))
     return True
+
+
+def _is_excused(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has just said what keeps it from driving on, when asked why it stands."""
+    return state.guidance.nudges > IN_VAIN and view.time < state.motion.excused_until
 
 
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:

@@ -226,6 +226,8 @@ def _answer_to_why(
     stands at the place of a previous errand.
     """
     goal, said, places, asked = state.task.goal, words.text.lower(), act.values(Slot.LANDMARK), state.speech.last
+    if act.values(Slot.OBJECT):
+        state.motion = state.motion.excused(view.time + state.config.excuse_time)
     if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:
         return
     if _LACKS_WAY.search(said):

@@ -26,6 +26,9 @@ IN_VAIN = 2
 SOON_AGAIN = 250.0
 """Way back to a place that was missed up to which the car is asked to drive slowly [m]."""
 
+LARGER = 0.25
+"""Growth of the detour that is accepted to avoid a manoeuvre, with each attempt."""
+
 _ANSWERS = MoveGroup.REPLY.moves
 
 REMARK_EXPIRES = 8.0
@@ -121,7 +124,7 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
 def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark | None) -> None:
     """Plans a route that avoids manoeuvres, each time at a larger detour, and says why if there is a reason to say."""
     progress = state.route.to_goal
-    cost = state.config.way_round_cost * (1 + state.guidance.retries)
+    cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, IN_VAIN))
     state.guidance = replace(state.guidance, retries=state.guidance.retries + 1)
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
     state.route = state.route.with_progress(progress).sparing_worn(state.town, view.place)
