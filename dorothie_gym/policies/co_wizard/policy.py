@@ -151,7 +151,6 @@ def _update_route(state: CoWizardState, view: CoWizardView) -> None:
     if state.route.progress is None or view.manoeuvring:
         return
     before = state.route.progress.left(view.station)
-    state.route = state.route.entering(state.town, view.lane)
     former = state.route.progress.followed(state.town, view.lane, view.station)
     state.route = state.route.with_progress(former)
     if former.astray >= state.config.replan_after:

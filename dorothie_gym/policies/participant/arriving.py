@@ -81,7 +81,8 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if view.standing:
         return _guide_standing(state, view, left)
     close = left < config.stop_distance
-    if not state.guidance.guiding or view.time - state.guidance.nudged_at < config.nudge_time:
+    sent_a_little = view.time - state.guidance.nudged_at < config.nudge_time and state.guidance.nudges <= IN_VAIN
+    if not state.guidance.guiding or sent_a_little:
         return close  # a car that was sent on a little stops by itself
     prepare_stop(state, view, left, rng)
     if _is_time_to_stop(state, view, left):

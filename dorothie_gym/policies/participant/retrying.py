@@ -52,7 +52,9 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
     if passed and passes >= IN_VAIN:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
         elided, wording = ("place", "times"), Wording(topic="passed_again")
-        reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
+        reason: Remark | None = intend(
+            CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view)
+        )
     else:
         here = section(state.town, view.lane)
         been_here = state.route.driven.count(here) >= IN_VAIN

@@ -310,7 +310,7 @@ class GuidanceState:
 
     def for_another_approach(self) -> GuidanceState:
         """Prepares another announcement of the approach."""
-        return replace(self, approach_announced=False, stop_text="", points_out=False)
+        return replace(self, approach_announced=False, stop_text="", points_out=False, nudges=0, nudged_from=math.inf)
 
     def after_miss(self) -> GuidanceState:
         """Prepares another request to slow down."""
