@@ -196,10 +196,19 @@ def _insertions() -> tuple[str, ...]:
     return strings("cues.yaml: inserted", read_data("cues.yaml").get("inserted"))
 
 
+_MARKUP = re.compile(r"^==.*$|#.*$|^<[^>]*>\s*=|[{<][^}>]*[}>]", re.MULTILINE)
+"""What is not spoken in a file of the grammar: titles of sections, comments, and names of phrases and gaps."""
+
+
+def _words_of_grammar(text: str) -> str:
+    """Returns a file of the grammar without its labels, which nobody says."""
+    return _MARKUP.sub(" ", text)
+
+
 @functools.cache
 def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
     """Returns the vocabulary of the recogniser by phonetic key: all generated words and common words like names."""
-    spoken = " ".join(read_talk_files().values()).lower()
+    spoken = " ".join(map(_words_of_grammar, read_talk_files().values())).lower()
     known = split_words(" ".join(strings("cues.yaml: known", read_data("cues.yaml").get("known"))))
     words = {word for word in re.findall(r"\b[a-z][a-z']+\b", spoken)} | set(known) | set(proper_words())
     found: dict[str, list[str]] = defaultdict(list)

@@ -32,6 +32,18 @@ def is_partly_inaudible(text: str) -> bool:
     return any(word.startswith(INAUDIBLE) for word in text.split())
 
 
+_ASKING_TO_REPEAT = frozenset(
+    {"again", "pardon", "sorry", "huh", "what", "hear", "catch", "understand", "follow", "repeat", "missed", "excuse"}
+)
+_LONGEST_REQUEST = 6  # words of a request to repeat
+
+
+def resembles_request_to_repeat(text: str) -> bool:
+    """Returns whether words without sense may be those of a listener who has not understood: "calm again?"."""
+    words = [word.strip(".,?!'").lower() for word in text.split()]
+    return len(words) <= _LONGEST_REQUEST and not _ASKING_TO_REPEAT.isdisjoint(words)
+
+
 def speech_seconds(text: str, words_per_second: float = WORDS_PER_SECOND) -> float:
     """Returns the duration of a spoken text [s].
 

@@ -101,6 +101,7 @@ class WordingContext:
         exception: whether an exception is in progress; selects alarm markers.
         owner: person whose house is the destination: "Mateo's house".
         friend: name of the person who is the destination: "my friend Priya".
+        passenger: name of that person if it is to be picked up: "our passenger Aunt Mei".
     """
 
     joined: DialogueMove | None = None
@@ -111,3 +112,4 @@ class WordingContext:
     exception: bool = False
     owner: str | None = None
     friend: str | None = None
+    passenger: str | None = None

@@ -18,7 +18,7 @@ from dorothie_gym.dialogue.phrases import Register, manner_of
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.errors import PhraseFileError
-from dorothie_gym.ontology.dialogue_acts import DialogueAct, in_label_order
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, in_label_order
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, GoalStatus, LandmarkName, Slot, SlotValue
 from dorothie_gym.ontology.world_exceptions import PropKind
 
@@ -67,6 +67,7 @@ class SlotRealizer:
 
     __slots__ = (
         "_names",
+        "_naming",
         "_of_rider",
         "_plurals",
         "_scene",
@@ -114,6 +115,7 @@ class SlotRealizer:
         self._style = style
         self._scene = scene
         self._names = names
+        self._naming = act.move in _NAMING
         self._of_rider = of_rider
         self._without: LandmarkName | None = None
         self._plurals: list[str] = []
@@ -281,15 +283,26 @@ class SlotRealizer:
         return name
 
     def _of_person(self, value: SlotValue) -> str | None:
-        """Returns a name by a person, "Mateo's house" or "my friend Priya"; None if unknown, or at random."""
+        """Returns a name by a person, "Mateo's house" or "my friend Priya"; None if unknown, or at random.
+
+        A destination that is named to the car always has the name, because there may be several houses on a street.
+        """
         scene = self._scene
         owner, friend = value is LandmarkName.HOUSE and scene.owner, value is LandmarkName.PERSON and scene.friend
+        passenger = value is LandmarkName.PERSON and scene.passenger
         elsewhere = not _ELSEWHERE.isdisjoint(self.values.get(Slot.STATUS, ()))
-        if not (owner or friend) or elsewhere or self.random() >= _NAMES_PERSON:
+        if not (owner or friend or passenger) or elsewhere:
             return None
-        return f"{owner}'s house" if owner else f"my friend {friend}"
+        if not self._naming and self.random() >= _NAMES_PERSON:
+            return None
+        if owner:
+            return f"{owner}'s house"
+        as_passenger = passenger and (not friend or self.random() < _AS_PASSENGER)
+        return f"our passenger {passenger}" if as_passenger else f"my friend {friend}"
 
 
+_NAMING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+_AS_PASSENGER = 0.4  # probability that a person to be picked up is called a passenger rather than a friend
 _NAMES_PERSON = 0.8  # probability that a house or a person is called by name
 _ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE})  # of other errands
 _INDEFINITE = re.compile(r"^(an?|some|another|the) ")

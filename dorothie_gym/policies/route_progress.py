@@ -46,12 +46,6 @@ LIGHT_SIGHT = 60.0
 LAG = 0.56
 """Delay of the brakes, measured at 3 to 11 m/s [s]."""
 
-NEAR_MISS = 150.0
-"""A car that leaves the route within this distance of the goal may have missed it [m]."""
-
-WAY_ROUND = 60.0
-"""A new route that is longer by more than this shows that the goal was missed [m]."""
-
 SAME_ROADBLOCK = 10.0
 """Roadblocks closer together than this on a lane count as one [m]; cells of the router are about 10 m long."""
 
@@ -341,90 +335,6 @@ class RouteProgress:
             if crossing is not None and leg.lane == crossing.exit.connector:
                 return False
         return False
-
-
-MOST_AVOIDED = 3
-"""Maximum number of places that are excluded after misses; more could close all lanes of a road."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RouteState:
-    """Route of an agent, and known places that the planner must not use.
-
-    Attributes:
-        progress: route to the goal and the progress on it; None without a place to go to.
-        blocked: places beyond roadblocks.
-        avoided: places excluded because the car missed the goal after passing them, the latest last.
-        misses: number of times that the car has driven past the goal.
-        kept_off: places on the streets that the car is to keep off.
-    """
-
-    progress: RouteProgress | None = None
-    blocked: tuple[Place, ...] = ()
-    avoided: tuple[Place, ...] = ()
-    misses: int = 0
-    kept_off: tuple[Place, ...] = ()
-
-    @property
-    def to_goal(self) -> RouteProgress:
-        """Progress on the route, for code that requires a route; raises `PolicyStateError` without one."""
-        if self.progress is None:
-            raise PolicyStateError("the agent has no route: it was given no place to go to, or gave it up")
-        return self.progress
-
-    @property
-    def closed(self) -> tuple[Place, ...]:
-        """Places that the planner must not use."""
-        return self.blocked + self.avoided + self.kept_off
-
-    def with_progress(self, progress: RouteProgress | None) -> RouteState:
-        """Sets the route, or gives it up (None)."""
-        return replace(self, progress=progress)
-
-    def for_new_goal(self) -> RouteState:
-        """Resets the misses of the previous goal; roadblocks stay known."""
-        return replace(self, misses=0, avoided=())
-
-    def replanned(self, town: Town, start: Place) -> RouteState:
-        """Plans another route to the same goal."""
-        return replace(self, progress=self.to_goal.replanned(town, start, self.closed))
-
-    def has_missed(self, before: float, station: float) -> bool:
-        """Returns whether the goal, `before` metres ahead on the previous route, now needs a long detour."""
-        return before < NEAR_MISS and self.to_goal.left(station) > before + WAY_ROUND
-
-    def after_miss(self, town: Town, start: Place, former: RouteProgress) -> RouteState:
-        """Counts a drive past the goal; after the second one, avoids the last lane change of the previous route."""
-        counted = replace(self, misses=self.misses + 1)
-        way_in = former.way_in()
-        return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted
-
-    def avoiding(self, town: Town, start: Place, place: Place) -> RouteState:
-        """Excludes a place, in addition to the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
-        return replace(self, avoided=(*self.avoided, place)[-MOST_AVOIDED:]).replanned(town, start)
-
-    def keeping_off(self, town: Town, streets: frozenset[int], here: int) -> RouteState:
-        """Excludes the lanes of some streets; junctions with them can be crossed, and the present lane left.
-
-        Args:
-            town: the map.
-            streets: indices of the streets.
-            here: lane of the car.
-        """
-        spared = (here, *lanes_beside(town, here))
-        kept = (lane for lane in town.lanes if lane.street in streets and not lane.in_junction)
-        lanes = (lane for lane in kept if lane.id not in spared)
-        places = tuple((lane.id, lane.length / 2.0) for lane in lanes)
-        return replace(self, kept_off=tuple(dict.fromkeys((*self.kept_off, *places))))
-
-    def knows_roadblock(self, place: Place) -> bool:
-        """Returns whether a roadblock at a place is one of those known."""
-        return any(lane == place[0] and abs(station - place[1]) < SAME_ROADBLOCK for lane, station in self.blocked)
-
-    def with_roadblock(self, town: Town, place: Place) -> RouteState:
-        """Adds a roadblock: its cell and the next one, because the car's own cell counts as free."""
-        behind = place[0], min(place[1] + CELL_BEHIND, town.lanes[place[0]].length)
-        return replace(self, blocked=(*self.blocked, place, behind))
 
 
 def first_new_street(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, repla
 from dorothie_gym.policies.speech_timing import Delivery
 from dorothie_gym.session.spaces.actions import Speech
 
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Span
+
 LONGEST_BREATH = 3
 """Maximum number of acts that are worded together."""
 
@@ -34,7 +37,29 @@ MEMORY = 6
 """Number of the latest remarks that are remembered."""
 
 IN_A_ROW = 15.0
-"""Silence after which asking back no longer counts as asking again [s]."""
+"""Silence after which a repair is over [s]."""
+
+REWORDINGS = 4
+"""Number of draws of other words for a remark whose words have just been said."""
+
+_REPAIRS = frozenset({DialogueMove.CONFUSE, DialogueMove.CLARIFY})
+
+_UNCHANGED = frozenset(
+    {DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U}
+)
+"""Moves that may be said twice in the same words."""
+
+_NARROWS = frozenset(
+    {
+        DialogueMove.CHECK,
+        DialogueMove.CLARIFY,
+        DialogueMove.INSTRUCT,
+        DialogueMove.QUERY_W,
+        DialogueMove.QUERY_YN,
+        DialogueMove.REPLY_U,
+    }
+)
+"""Moves after which a repair may still go on."""
 
 _WANTS_ANSWER = frozenset(
     {DialogueMove.INSTRUCT, DialogueMove.ALIGN, DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W}
@@ -142,7 +167,8 @@ class SpeechState:
         other: last move of the other speaker, None at first.
         delivery: timing of the speech.
         reply_at: time before which no reply begins, unless it is urgent [s].
-        asked_back: number of times that the speaker has said in a row that the other was not understood.
+        asked_back: number of times that the speaker has said in the present repair that the other was not understood.
+        repairs: number of the speaker's turns in the present repair: requests to repeat, clarifications, repetitions.
     """
 
     role: Role
@@ -157,6 +183,7 @@ class SpeechState:
     delivery: Delivery = field(default_factory=Delivery)
     reply_at: float = -math.inf
     asked_back: int = 0
+    repairs: int = 0
 
     @property
     def idle(self) -> bool:
@@ -169,12 +196,24 @@ class SpeechState:
         return self.last is not None and self.last.act.move is DialogueMove.CONFUSE
 
     def may_ask_back(self, now: float) -> bool:
-        """Returns whether the speaker may say that the other was not understood: not for the third time in a row.
+        """Returns whether the speaker may say that the other was not understood.
+
+        This is said once in a repair, and never in reply to the same from the other speaker.
 
         Args:
             now: time [s].
         """
-        return self.asked_back < 2 or not self.has_just_spoken(now, IN_A_ROW)
+        again = self.asked_back > 0 and self.has_just_spoken(now, IN_A_ROW)
+        return not again and self.other is not DialogueMove.CONFUSE
+
+    def turns_of_repair(self, now: float) -> int:
+        """Returns the number of turns that the speaker has spent on the present repair at a time [s]."""
+        return self.repairs if self.has_just_spoken(now, IN_A_ROW) else 0
+
+    @property
+    def last_content(self) -> Remark | None:
+        """Last remark said that is no request to repeat; None if there is none."""
+        return next((item for item in reversed(self.said) if item.act.move is not DialogueMove.CONFUSE), None)
 
     def has_just_spoken(self, now: float, within: float) -> bool:
         """Returns whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
@@ -293,12 +332,20 @@ class SpeechState:
             last_end=end,
             said=(*self.said[1 - MEMORY :], first),
             asked_back=self._count_asking_back(first, now),
+            repairs=self._count_repairs(first, now, continues=continues or first.joined),
         )
 
     def _count_asking_back(self, said: Remark, now: float) -> int:
-        if said.act.move is not DialogueMove.CONFUSE:
-            return 0
-        return (self.asked_back if self.has_just_spoken(now, IN_A_ROW) else 0) + 1
+        lately = self.asked_back if self.has_just_spoken(now, IN_A_ROW) else 0
+        if said.act.move is DialogueMove.CONFUSE:
+            return lately + 1
+        return lately if said.act.move in _NARROWS else 0
+
+    def _count_repairs(self, said: Remark, now: float, *, continues: bool) -> int:
+        lately = self.turns_of_repair(now)
+        if continues:
+            return lately
+        return lately + 1 if said.act.move in _REPAIRS or self.other is DialogueMove.CONFUSE else 0
 
     def _punctuated(self, queue: Sequence[Remark], continues: bool) -> str:
         """Returns the words of the next remark with the capital and the comma that its neighbours require."""
@@ -315,6 +362,20 @@ class SpeechState:
             return max(round(self.reply_at - now, 2), 0.0)
         return round(float(rng.uniform(0.0, 0.9 * interval)), 2)
 
+    def _newest(self, move: DialogueMove, options: Iterator[Sequence[Span]]) -> Sequence[Span]:
+        """Returns the first wording that differs from those of the latest remarks, or from that of the last one.
+
+        Signs of attention and short answers may be repeated.
+        """
+        spans = next(options)
+        said = [_plain(item.text) for item in self.said] if move not in _UNCHANGED else []
+        while said and _plain(spans[0].text) in said:
+            other = next(options, None)
+            if other is None:
+                break
+            spans = other if _plain(other[0].text) != said[-1] else spans
+        return spans
+
     def _worded(
         self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, continues: bool
     ) -> tuple[Remark, ...]:
@@ -322,16 +383,18 @@ class SpeechState:
         count = 1 + len(list(itertools.takewhile(lambda item: item.joined and not item.text, queue[1:])))
         breath = queue[: min(count, LONGEST_BREATH)]
         joined = self.last.act.move if continues and self.last is not None else None
-        spans = word_acts(
-            [item.act for item in breath],
-            self.role,
-            rng,
-            [item.wording for item in breath],
-            style=self.style,
-            scene=replace(scene, joined=joined, last=self.other, mentioned=self.heard),
+        context = replace(scene, joined=joined, last=self.other, mentioned=self.heard)
+        acts, wordings = [item.act for item in breath], [item.wording for item in breath]
+        options = (
+            word_acts(acts, self.role, rng, wordings, style=self.style, scene=context) for _ in range(REWORDINGS)
         )
+        spans = self._newest(acts[0].move, options)
         worded = tuple(replace(item, text=span.text) for item, span in zip(breath, spans, strict=True))
         return (*worded, *queue[len(breath) :])
+
+
+def _plain(text: str) -> str:
+    return text.lower().strip(" .,?!")
 
 
 def _alive(queue: tuple[Remark, ...], now: float) -> tuple[Remark, ...]:

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.dialogue import ANSWER_TIMEOUT, AsrChannel, Recogniser, Span, Utterance, guess_act, word_error_rate
+from dorothie_gym.dialogue import (
+    ANSWER_TIMEOUT,
+    AsrChannel,
+    Recogniser,
+    Span,
+    Utterance,
+    asr_channel,
+    guess_act,
+    word_error_rate,
+)
 from dorothie_gym.dialogue.asr_channel import misheard
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from tests.dialogue.talk_corpus import session
@@ -143,3 +152,10 @@ def test_recogniser_without_classification_gives_equal_transcripts() -> None:
         assert heard.text == expected.text
         for span, spoken in zip(heard.spans, utterance.spans, strict=True):
             assert span.act == spoken.act or span.act.move is DialogueMove.IRRELEVANT
+
+
+def test_recogniser_knows_no_labels_of_the_grammar():
+    known = {word for words in asr_channel._vocabulary_by_sound().values() for word in words}
+    labels = {move.label.lower() for move in DialogueMove} | {"jturn", "uturn", "laneswitch", "co_wizard", "cmd"}
+    assert not known & (labels - {"check", "clarify", "confirm", "explain", "confuse", "align", "instruct"})
+    assert {"straight", "left", "driver"} <= known, "what is said stays known"

@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
 from dorothie_gym.maps import load_town
-from dorothie_gym.policies.route_progress import MOST_AVOIDED, RouteProgress, RouteState
+from dorothie_gym.policies.route_progress import RouteProgress
+from dorothie_gym.policies.route_state import MOST_AVOIDED, RouteState
 
 TOWN_05 = Path(__file__).parents[3] / "shared" / "maps" / "Town05.xodr"
 

@@ -54,7 +54,7 @@ def test_second_u_turn_is_given_without_a_remark():
 def test_place_that_was_passed_twice_is_remarked_on():
     human = Guide(20.0, speed=6.0)
     assert human.state.task.goal is not None
-    for misses, expected in ((1, []), (2, [Predicate.PASSED, Predicate.WILL])):
+    for misses, expected in ((1, [Predicate.WILL]), (2, [Predicate.PASSED, Predicate.WILL])):
         human.state.route = replace(human.state.route, misses=misses)
         remark_on_miss(human.state, human.view, passed=True)
         assert predicates(human) == expected

@@ -15,6 +15,7 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
+from dorothie_gym.policies.co_wizard.asking_back import ask_back
 from dorothie_gym.policies.co_wizard.drive_answers import drive_answer
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.goals import set_goal
@@ -60,10 +61,13 @@ def answer_yes_no(
     """Answers a yes/no question from the Co-Wizard's beliefs."""
     asked = asked_proposition(act, words)
     place = act_builders.first_name(act.values(Slot.LANDMARK))
-    if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
+    requests = words.asked is None and _REQUEST.search(words.text.lower()) is not None
+    if requests and place is not None:
         set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
+    elif requests:
+        ask_back(state, view, words)  # a request that was misheard is not refused
     elif asked is None:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+        ask_back(state, view, words, question=True)
     elif words.asked is None and ActionValue.SPEED_CHANGE in act.values(Slot.ACTION):
         state.say(*drive_answer(state, view, Proposition.of(Predicate.DRIVES_AT), None))
     elif asked.asks:
@@ -180,7 +184,7 @@ def answer_open(
     ):
         _name_street(state, view)
     else:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
+        ask_back(state, view, words, question=True)
 
 
 def _answer_asked(state: CoWizardState, view: CoWizardView, asked: Proposition, place: LandmarkName | None) -> bool:

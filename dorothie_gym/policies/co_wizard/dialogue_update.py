@@ -18,6 +18,7 @@ from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no, asks_to_act, switch_lights_on
+from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
 from dorothie_gym.policies.co_wizard.goals import (
     abandon,
@@ -93,8 +94,9 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
     planned = planned_acts(state, heard)
-    if unclear or (_mishears(state, heard, rng) and not planned):
-        state.say(intend(Function.NEGATIVE_FEEDBACK), *before)
+    if unclear or (_mishears(state, view, heard, rng) and not planned):
+        ask_back(state, view, heard.words)
+        state.say(*before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
     note_owner(state, heard)
@@ -114,13 +116,14 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     state.speech = state.speech.cleared().plan(*before, *answer)
 
 
-def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:
+def _mishears(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
     """Returns whether an instruction is not understood; never an urgent one, nor one that would not be repeated."""
     act = heard.acts[0]
     if len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
         return False
     plain = ActionValue.J_TURN in act.values(Slot.ACTION) or bool(act.values(Slot.LANDMARK))
-    return plain and not act.values(Slot.ACTION)[1:] and rng.random() < state.style.mishears
+    overhears = plain and not act.values(Slot.ACTION)[1:] and rng.random() < state.style.mishears
+    return overhears and state.speech.may_ask_back(view.time)
 
 
 def _instruction(
@@ -159,7 +162,7 @@ def _senseless(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
         do_stop(state, view, act, words)
         return True
     if asks:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))
+        ask_back(state, view, words)
     return asks
 
 
@@ -287,7 +290,7 @@ def _explanation(
         else:
             _accept_change(state, act_builders.errand(name, GoalStatus.ABANDONED), rng)
     elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
-        _mentioned_place(state, view, act, name, rng)
+        _mentioned_place(state, view, act, words, name, rng)
     elif act.values(Slot.STREET):
         hear_description(state, view, act_builders.named_streets(act), landmarks, rng)
     elif act.slots or not _senseless(state, view, act, words, asks=False):
@@ -295,11 +298,16 @@ def _explanation(
 
 
 def _mentioned_place(
-    state: CoWizardState, view: CoWizardView, act: DialogueAct, name: LandmarkName, rng: np.random.Generator
+    state: CoWizardState,
+    view: CoWizardView,
+    act: DialogueAct,
+    words: ParsedText,
+    name: LandmarkName,
+    rng: np.random.Generator,
 ) -> None:
     """Takes a place that is mentioned while there is no goal as the next goal, unless the car stands at it."""
     if name is state.beliefs.goal:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))
+        ask_back(state, view, words)
     else:
         set_goal(state, view, name, act_builders.named_streets(act), rng, sure=False)
 
@@ -363,7 +371,7 @@ def _reply(
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
     elif is_unclear_reply(state, view, act, words):
-        state.say(intend(Function.NEGATIVE_FEEDBACK))
+        ask_back(state, view, words)
     elif rng.random() < 0.5:
         state.say(sign_of_hearing("answered"))
 
@@ -427,7 +435,7 @@ def _alignment(
     if state.beliefs.goal is not None or state.intentions.directive is not None:
         state.say(sign_of_hearing("hears" if words.about_hearing else "align"))
     else:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))
+        ask_back(state, view, words)
 
 
 def _check(
@@ -462,9 +470,12 @@ def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Propo
 def _confusion(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Repeats a remark that was not understood."""
+    """Repeats a remark that was not understood; another time, expresses it differently."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
-    repeat_last(state)
+    if state.speech.has_just_asked_back or state.speech.turns_of_repair(view.time):
+        explain_differently(state, view, words, rng)
+    else:
+        repeat_last(state)
 
 
 def _small_talk(

@@ -18,7 +18,8 @@ from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
-from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
+from dorothie_gym.policies.co_wizard.intentions import Wish
+from dorothie_gym.policies.co_wizard.proposals import propose_way
 from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -126,7 +127,7 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
         # the place may have been misheard, and asking for it helps more than asking for the way
         state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))
     elif not asked and rng.random() < state.style.proposes:
-        _propose_way(state, view, choice, rng)
+        propose_way(state, view, choice, rng)
     else:
         state.dialogue = state.dialogue.with_proposal(None)
         first = plan_remark(state, view, rng)
@@ -155,21 +156,6 @@ def _may_ask_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> bo
         if crossing is None or progress.changes_before(crossing):
             return False  # the goal or a U-turn comes before the junction
     return waiting or view.manoeuvre is not PhysicalAction.J_TURN
-
-
-def _propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: np.random.Generator) -> None:
-    """Asks whether one of the exits is meant."""
-    way = choice.exits[int(rng.integers(len(choice.exits)))]
-    direction = direction_of(way)
-    action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
-    street = street_of(view.raw, state.town, way.lane)
-    named = action is ActionValue.J_TURN and rng.random() < 0.3
-    content = act_builders.action(action, direction=direction, street=street if named else None)
-    function = Function.PROPOSITIONAL_QUESTION if rng.random() < 0.7 else Function.CHECK_QUESTION
-    state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
-    first = plan_remark(state, view, rng)
-    question = intend(function, content, wording=Wording(direction=direction), joined=bool(first))
-    state.say(*first, question)
 
 
 def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:

@@ -40,7 +40,6 @@ _WITHOUT_CONTENT = frozenset(
         DialogueMove.REPLY_Y,
         DialogueMove.REPLY_N,
         DialogueMove.REPLY_U,
-        DialogueMove.CONFUSE,
     }
 )
 """Moves that may be said without any content."""
@@ -72,9 +71,14 @@ def ask_for_known_place(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
-    """Returns whether to ask for a repetition of a partly inaudible utterance; never of a stop, which cannot wait."""
+    """Returns whether an utterance is partly inaudible and must be repeated.
+
+    A stop cannot wait. After one repetition, the parts that were understood must do.
+    """
     stops = any(ActionValue.STOP in act.values(Slot.ACTION) for act in heard.acts)
-    return is_partly_inaudible(heard.words.text) and not stops and state.speech.may_ask_back(view.time)
+    if stops or not is_partly_inaudible(heard.words.text):
+        return False
+    return state.speech.may_ask_back(view.time) or not any(act.slots for act in heard.acts)
 
 
 def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:
@@ -82,8 +86,7 @@ def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct,
     if words.order is not None or act.slots:
         return False
     asked_back = act.move is DialogueMove.CLARIFY and state.speech.has_just_asked_back
-    asked = view.time - state.dialogue.asked_at < state.config.answer_time
-    return asked or (asked_back and state.speech.may_ask_back(view.time))
+    return asked_back or view.time - state.dialogue.asked_at < state.config.answer_time
 
 
 def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
@@ -94,7 +97,7 @@ def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) ->
 
 def repeat_last(state: CoWizardState) -> None:
     """Repeats the last remark, or the last one in its utterance that has content."""
-    latest = state.speech.last
+    latest = state.speech.last_content
     if latest is not None and latest.act.move in _WITHOUT_CONTENT and not latest.act.slots and not latest.joined:
         state.say(replace(latest, text=""))
         return

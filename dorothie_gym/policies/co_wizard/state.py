@@ -19,7 +19,7 @@ from dorothie_gym.policies.co_wizard.plan_memory import PlanMemory
 from dorothie_gym.policies.knowledge import TOLD_TO_STOP, CoWizardKnowledge, Standstill
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.route_progress import RouteState
+from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.speech import SpeakingState
 
 

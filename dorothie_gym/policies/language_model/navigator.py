@@ -20,11 +20,11 @@ from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import (
     RouteJunction,
     RouteProgress,
-    RouteState,
     default_lane_distance,
     lanes_beside,
     stopping_distance,
 )
+from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.portable_math import wrap_degrees
 

@@ -81,7 +81,8 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if view.standing:
         return _guide_standing(state, view, left)
     close = left < config.stop_distance
-    if not state.guidance.guiding or view.time - state.guidance.nudged_at < config.nudge_time:
+    sent_a_little = view.time - state.guidance.nudged_at < config.nudge_time and state.guidance.nudges <= IN_VAIN
+    if not state.guidance.guiding or sent_a_little:
         return close  # a car that was sent on a little stops by itself
     prepare_stop(state, view, left, rng)
     if _is_time_to_stop(state, view, left):
@@ -217,19 +218,26 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
         return False
     waited = view.time - max(since, state.guidance.nudged_at, state.speech.last_end, state.conversation.heard_at)
     patient = abs(left) <= config.arrived_within or not state.guidance.guiding
-    if waited > (PATIENT_TIME if patient else config.ready_time):
+    cycles = state.guidance.nudges // (IN_VAIN + 1)  # the more was said in vain, the longer the wait
+    if waited > (PATIENT_TIME if patient else config.ready_time) * (1 + cycles) and not _is_excused(state, view):
         state.say(creep_instruction(state, view))
     return True
+
+
+def _is_excused(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has just said what keeps it from driving on, when asked why it stands."""
+    return state.guidance.nudges > IN_VAIN and view.time < state.motion.excused_until
 
 
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place.
 
-    A third unsuccessful instruction is replaced by the question why the car stands; then the car is told to go straight
-    on, in case it waits before a junction, and to start.
+    The instructions count as unsuccessful until the car has moved by more than a few metres. A third one is replaced
+    by the question why the car stands; then the car is told to go straight on, in case it waits before a junction, and
+    to start.
     """
-    since = view.time if state.motion.standing_since is None else state.motion.standing_since
-    state.guidance = state.guidance.after_nudging(view.time, since)
+    left = state.route.to_goal.left(view.station)
+    state.guidance = state.guidance.after_nudging(view.time, left)
     again, attempt = divmod(state.guidance.nudges, IN_VAIN + 1)
     if attempt == 0:
         return why_standing(state, view)
@@ -237,7 +245,6 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
         return order(DialogueMove.INSTRUCT, ActionValue.START)
     if again:
         return straight_on()
-    left = state.route.to_goal.left(view.station)
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
     reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE

@@ -57,6 +57,7 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         return
     config = state.config
     before = former.left(view.station)
+    state.route = state.route.entering(state.town, view.lane)
     former = former.followed(state.town, view.lane, view.station)
     if former.astray and _is_changing_for_turn(state, view):
         former = replace(former, astray=0)

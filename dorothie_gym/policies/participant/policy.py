@@ -13,6 +13,7 @@ from dorothie_gym.policies.participant.config import ParticipantConfig, Particip
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
 from dorothie_gym.policies.participant.reactions import react, scene_of
+from dorothie_gym.policies.participant.reconsidering import own_up
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
@@ -98,6 +99,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         watch(updated, view)
         guide(updated, view, rng)
         react(updated, view, rng)
+        own_up(updated, view)
         scene = None if updated.speech.idle else scene_of(updated, view)
         speech, updated.speech = updated.speech.speak(
             view.time, view.speaking, rng, scene, interval=updated.clock.interval, other_speaking=view.other_speaking

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Place
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
+    from dorothie_gym.tasks.purposes import Purpose
 
 _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION})
 """Parameters of the weather that have a reaction of their own."""
@@ -75,7 +76,15 @@ def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
         exception=is_foggy(view.raw) or is_rainy(view.raw),
         owner=purpose.owner if purpose is not None and target is LandmarkName.HOUSE else None,
         friend=_first_name(purpose.person) if purpose is not None and target is LandmarkName.PERSON else None,
+        passenger=_passenger(purpose) if purpose is not None and target is LandmarkName.PERSON else None,
     )
+
+
+def _passenger(purpose: Purpose) -> str | None:
+    """Returns the person that is picked up on an errand, if its name can follow "our passenger"."""
+    picks_up = purpose.action is not None and purpose.action.lower().startswith("pick up")
+    named = purpose.person is not None and purpose.person[0].isupper() and "'" not in purpose.person
+    return purpose.person if picks_up and named else None
 
 
 def _first_name(person: str | None) -> str | None:

@@ -6,11 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
+from dorothie_gym.dialogue.conversation import is_partly_inaudible, resembles_request_to_repeat, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.participant.guidance import next_step, note_step
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
 if TYPE_CHECKING:
@@ -19,11 +22,19 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
+IN_REPLY = 6.0
+"""Time within which an utterance of the car is a reaction to the last remark [s]."""
+
 _WORTH_REPEATING = act_builders.QUESTIONS | {DialogueMove.EXPLAIN}
 """Moves whose repetition the participant requests."""
 
 _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.EXPLAIN, DialogueMove.QUERY_W})
 """Moves of the car that show how it has understood an instruction."""
+
+_SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
+
+_AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
+"""Actions that are wanted immediately and are not steps of the route."""
 
 _SIDEWAYS = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 
@@ -40,7 +51,7 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
     if is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
         return True
-    if heard.acts[0].move is DialogueMove.CLARIFY:
+    if heard.acts[0].move is DialogueMove.CLARIFY or not state.speech.may_ask_back(view.time):
         return False
     spoke_meanwhile = state.speech.last_end > view.time - speech_seconds(heard.words.text)
     matters = any(act.move in _WORTH_REPEATING and _has_named_slot(act) for act in heard.acts)
@@ -49,6 +60,104 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
     state.conversation = state.conversation.with_puzzle(heard)
     state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
     return True
+
+
+def ask_back(state: ParticipantState, view: ParticipantView, words: ParsedText, rng: np.random.Generator) -> None:
+    """Reacts to a question of the car that was not understood: asks once, and then says where the car shall go.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        words: what was heard.
+        rng: random generator of the decision.
+    """
+    just_spoken = state.speech.has_just_spoken(view.time, IN_REPLY) and not state.speech.turns_of_repair(view.time)
+    if just_spoken and resembles_request_to_repeat(words.text):
+        explain_again(state, view, rng)
+    elif state.speech.may_ask_back(view.time):
+        state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
+    elif not tell_way(state, view, rng):
+        state.say_first(intend(CommunicativeFunction.UNCERTAIN_ANSWER))
+
+
+def tell_way(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
+    """Names the next step to a guided car, otherwise the place and its street; returns whether it names either.
+
+    Nothing is named that was named just before.
+    """
+    goal, last = state.task.goal, state.speech.last_content
+    lately = last is not None and state.speech.has_just_spoken(view.time, state.config.just_said)
+    if goal is None or not state.task.announced:
+        return False
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng) if state.guidance.guiding else None
+    stops_soon = step is not None and step[0][0] == "on" and step[1] < state.config.stop_distance
+    if step is not None and not stops_soon and not (lately and last is not None and last.act == step[2].act):
+        note_step(state, view, step[0])
+        state.say_only(step[2])
+        return True
+    place = intend(CommunicativeFunction.REQUEST, act_builders.destination(goal.name, goal.street))
+    if stops_soon or (lately and last is not None and last.act == place.act):
+        return False
+    state.task = state.task.after_reminding(view.time)
+    state.say_only(place)
+    return True
+
+
+def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Reacts to a car that has not understood a remark.
+
+    The remark is repeated once: an order as the next step or the destination, a remark about the moment as it was. Then
+    the participant takes another way: it says the place instead of the turn, or the step instead of the place, and
+    drops what is not worth it. After that it leaves the repair to the car.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        rng: random generator of the decision.
+    """
+    last, goal = state.speech.last_content, state.task.goal
+    turns = state.speech.turns_of_repair(view.time)
+    if turns > 1:
+        return
+    if turns or state.speech.has_just_asked_back:
+        _explain_differently(state, view, rng)
+        return
+    lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
+    ordered = last is not None and last.act.move is DialogueMove.INSTRUCT and bool(last.act.slots)
+    if last is not None and lately and (not ordered or _is_of_the_moment(last)):
+        state.say_first(replace(last, text="", joined=False))
+        return
+    step = next_step(state, view, DialogueMove.CLARIFY, rng) if state.guidance.step is not None else None
+    if state.guidance.guiding and step is not None:
+        if not (step[0][0] == "on" and step[1] < state.config.stop_distance):  # the stop is announced next
+            note_step(state, view, step[0])
+            state.say_only(step[2])
+    elif goal is not None and state.task.announced:
+        state.say_first(intend(CommunicativeFunction.CORRECTION, act_builders.destination(goal.name)))
+    elif last is not None:
+        state.say_first(repeated(last, CommunicativeFunction.CORRECTION))
+
+
+def _explain_differently(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Says the place and its street where a turn was not understood, and the step or a hint where the place was not."""
+    last, goal = state.speech.last_content, state.task.goal
+    about_way = last is None or last.act.slots or last.act.move in act_builders.QUESTIONS
+    if not about_way:
+        state.say_first(intend(CommunicativeFunction.INFORM, wording=Wording(topic="unimportant")))
+        return
+    turned = last is not None and bool(set(last.act.values(Slot.ACTION)) & set(_SIDEWAYS))
+    if turned and goal is not None and state.task.announced:
+        state.task = state.task.after_reminding(view.time)
+        state.say_only(intend(CommunicativeFunction.REQUEST, act_builders.destination(goal.name, goal.street)))
+    elif not tell_way(state, view, rng):
+        state.say_first(intend(CommunicativeFunction.INFORM, wording=Wording(topic="unimportant")))
+
+
+def _is_of_the_moment(said: Remark) -> bool:
+    """Returns whether a remark is repeated unchanged: a question, yes or no, small talk, an action off the route."""
+    if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
+        return True
+    return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
 
 
 def _has_named_slot(act: DialogueAct) -> bool:

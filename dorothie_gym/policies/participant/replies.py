@@ -30,7 +30,7 @@ from dorothie_gym.policies.participant.goals import announcement, describe
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.reactions import note_blocked
-from dorothie_gym.policies.participant.repairs import correction, has_missed
+from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
 from dorothie_gym.policies.participant.yes_no_answers import (
     addition,
     answer_yes_no,
@@ -44,7 +44,7 @@ from dorothie_gym.policies.participant.yes_no_answers import (
     is_just_short,
 )
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, repeated
+from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
@@ -57,16 +57,11 @@ _REPLIES = frozenset(
     {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
 )
 
-_SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
-
 _POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
 """Remarks of a car with a poor view."""
 
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 """Moves that may follow an acknowledgement in the same breath."""
-
-_AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
-"""Actions that are wanted immediately and are not steps of the route."""
 
 _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
 """Beginning of a question for the destination, the rest of which was not understood."""
@@ -148,7 +143,7 @@ def _open_question(
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
-        state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
+        ask_back(state, view, words, rng)
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
@@ -231,6 +226,8 @@ def _answer_to_why(
     stands at the place of a previous errand.
     """
     goal, said, places, asked = state.task.goal, words.text.lower(), act.values(Slot.LANDMARK), state.speech.last
+    if act.values(Slot.OBJECT):
+        state.motion = state.motion.excused(view.time + state.config.excuse_time)
     if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:
         return
     if _LACKS_WAY.search(said):
@@ -320,26 +317,9 @@ def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, w
 def _confusion(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Clarifies the last step, the target, or the last remark."""
+    """Explains again what the car has not understood."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
-    last, goal = state.speech.last, state.task.goal
-    lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
-    ordered = last is not None and last.act.move is DialogueMove.INSTRUCT and bool(last.act.slots)
-    if last is not None and lately and (not ordered or _is_of_the_moment(last)):
-        state.say_first(replace(last, text="", joined=False))
-    elif state.guidance.guiding and state.guidance.step is not None:
-        _name_step(state, view, DialogueMove.CLARIFY, rng)
-    elif goal is not None and state.task.announced:
-        state.say_first(intend(Function.CORRECTION, act_builders.destination(goal.name)))
-    elif last is not None:
-        state.say_first(repeated(last, Function.CORRECTION))
-
-
-def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated unchanged: a question, yes or no, small talk, an action off the route."""
-    if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
-        return True
-    return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
+    explain_again(state, view, rng)
 
 
 def _acknowledgement(

@@ -8,10 +8,12 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology.dialogue_acts import MoveGroup
+from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
+from dorothie_gym.policies.route_state import section
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
@@ -20,6 +22,12 @@ if TYPE_CHECKING:
 
 IN_VAIN = 2
 """Number of failures after which something else is tried."""
+
+SOON_AGAIN = 250.0
+"""Way back to a place that was missed up to which the car is asked to drive slowly [m]."""
+
+LARGER = 0.25
+"""Growth of the detour that is accepted to avoid a manoeuvre, with each attempt."""
 
 _ANSWERS = MoveGroup.REPLY.moves
 
@@ -38,14 +46,30 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
     state.guidance = replace(state.guidance, passes=state.guidance.passes + passed)
     passes, goal = state.guidance.passes, state.task.goal
     if state.route.misses < IN_VAIN or goal is None:
+        if passed:
+            state.say_only(*_more_slowly(state, view))
         return
     if passed and passes >= IN_VAIN:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
         elided, wording = ("place", "times"), Wording(topic="passed_again")
-        reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
+        reason: Remark | None = intend(
+            CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view)
+        )
     else:
-        reason = _in_vain(view, None, "tried")
+        here = section(state.town, view.lane)
+        been_here = state.route.driven.count(here) >= IN_VAIN
+        reason = _in_vain(view, None, "tried") if been_here else None
     _try_another_way(state, view, reason)
+    state.say(*(replace(slower, joined=True) for slower in _more_slowly(state, view)))
+
+
+def _more_slowly(state: ParticipantState, view: ParticipantView) -> tuple[Remark, ...]:
+    """Returns the request to drive slowly, if the car soon comes to the place again that it has driven past."""
+    if state.route.to_goal.left(view.station) > SOON_AGAIN or state.guidance.slowed_early:
+        return ()
+    state.guidance = state.guidance.after_slowing_early()
+    wording = Wording(faster=False, speed=max(state.config.careful_speeds), topic="this_time")
+    return (order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording),)
 
 
 def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView, step: StepKey) -> bool:
@@ -99,18 +123,20 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
     return intend(CommunicativeFunction.INFORM, tried, elided=("action", "times"), wording=wording, expires=_soon(view))
 
 
-def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
-    """Plans a route that avoids manoeuvres, and says why."""
+def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark | None) -> None:
+    """Plans a route that avoids manoeuvres, each time at a larger detour, and says why if there is a reason to say."""
     progress = state.route.to_goal
-    cost = state.config.way_round_cost
+    cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, IN_VAIN))
+    state.guidance = replace(state.guidance, retries=state.guidance.retries + 1)
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
-    state.route = state.route.with_progress(progress)
+    state.route = state.route.with_progress(progress).sparing_worn(state.town, view.place)
+    progress = state.route.to_goal
     state.guidance = replace(state.guidance, u_turns=0, step=None, best=progress.left(view.station))
     turns_round = progress.turns_round_first(state.town, view.station)
     another = Proposition.of(Predicate.WILL, action=ActionValue.U_TURN if turns_round else None)
     wording = Wording(topic="once_more" if turns_round else "another_way")
-    way = intend(CommunicativeFunction.REQUEST, another, elided=("action",), wording=wording, joined=True)
-    state.say_only(reason, way)
+    way = intend(CommunicativeFunction.REQUEST, another, elided=("action",), wording=wording, joined=reason is not None)
+    state.say_only(*(() if reason is None else (reason,)), way)
 
 
 def _soon(view: ParticipantView) -> float:

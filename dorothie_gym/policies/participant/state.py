@@ -18,8 +18,14 @@ from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.route_progress import RouteState
+from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.speech import Remark, SpeakingState
+
+UNSAID = 6.0
+"""Time within which an equal step replaces one that has not been said yet [s]."""
+
+NUDGED = 8.0
+"""Way of the car after which an instruction to drive on a little has worked [m]."""
 
 StepKey: TypeAlias = tuple[str, int, int]
 """Identity of a guidance step: "turn", "lane", "round" or "on", and the lanes concerned."""
@@ -215,6 +221,7 @@ class GuidanceState:
         repeats: number of repetitions of that step.
         u_turns: number of U-turns announced on the way to the target.
         passes: number of times that the car has driven past the place.
+        retries: number of other routes that were tried.
         wrong_turns: turns that were announced and not taken.
         lane_changes: lanes that the car was instructed to leave, and the times of the instructions [s].
         approach_announced: whether the car has been informed that the place is near.
@@ -224,7 +231,8 @@ class GuidanceState:
         stop_said: words of the last stop instruction, which are not repeated: they may be hard to recognise.
         stopped_at: time of the last stop instruction [s].
         nudged_at: time of the last instruction to drive on a little [s].
-        nudges: number of such instructions, and of remarks about them, while the car has stood.
+        nudges: number of such instructions, and of remarks about them, while the car has hardly moved.
+        nudged_from: distance to the place at the first of them [m].
         considered: last step for which it was decided whether to wait for a question of the car.
         left_to_ask: result of that decision.
     """
@@ -236,6 +244,7 @@ class GuidanceState:
     repeats: int = 0
     u_turns: int = 0
     passes: int = 0
+    retries: int = 0
     wrong_turns: tuple[StepKey, ...] = ()
     lane_changes: tuple[tuple[int, float], ...] = ()
     approach_announced: bool = False
@@ -246,6 +255,7 @@ class GuidanceState:
     stopped_at: float = -math.inf
     nudged_at: float = -math.inf
     nudges: int = 0
+    nudged_from: float = math.inf
     considered: StepKey | None = None
     left_to_ask: bool = False
 
@@ -282,7 +292,7 @@ class GuidanceState:
             step=step,
             step_at=now,
             repeats=self.repeats + 1 if self.step == step else 0,
-            u_turns=self.u_turns + (step[0] == "round"),
+            u_turns=self.u_turns + (step[0] == "round" and (self.step != step or now - self.step_at > UNSAID)),
             lane_changes=changes,
         )
 
@@ -300,7 +310,7 @@ class GuidanceState:
 
     def for_another_approach(self) -> GuidanceState:
         """Prepares another announcement of the approach."""
-        return replace(self, approach_announced=False, stop_text="", points_out=False)
+        return replace(self, approach_announced=False, stop_text="", points_out=False, nudges=0, nudged_from=math.inf)
 
     def after_miss(self) -> GuidanceState:
         """Prepares another request to slow down."""
@@ -322,9 +332,14 @@ class GuidanceState:
         """Records an instruction to stop; a repetition is worded plainly."""
         return replace(self, stopped_at=now, stop_text="", stop_said=self.stop_text, points_out=False)
 
-    def after_nudging(self, now: float, standing_since: float) -> GuidanceState:
-        """Records an instruction at `now` [s] to drive on a little, to a car that has stood since a time [s]."""
-        return replace(self, nudged_at=now, nudges=self.nudges + 1 if self.nudged_at >= standing_since else 1)
+    def after_nudging(self, now: float, left: float) -> GuidanceState:
+        """Records an instruction at `now` [s] to drive on a little, `left` metres before the place.
+
+        Instructions count together until the car has come `NUDGED` metres closer or is farther away.
+        """
+        if abs(self.nudged_from - left) < NUDGED:
+            return replace(self, nudged_at=now, nudges=self.nudges + 1)
+        return replace(self, nudged_at=now, nudges=1, nudged_from=left)
 
     def with_consideration(self, step: StepKey, left_to_ask: bool) -> GuidanceState:
         """Records whether a step is left to a question of the car."""

@@ -19,6 +19,7 @@ from dorothie_gym.policies.participant.goals import announcement, route_length, 
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
+from dorothie_gym.policies.participant.repairs import ask_back
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
@@ -159,7 +160,7 @@ def answer_yes_no(
         place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
         asked = words.asked or place or (checked(state, act, words) if act.slots else None)
         if asked is None:
-            state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question that was not understood at all
+            ask_back(state, view, words, rng)
             return
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)

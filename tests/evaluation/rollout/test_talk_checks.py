@@ -184,6 +184,25 @@ def test_false_statements_lower_the_figures(world):
     assert checked(world, "QueryYN", lights).share("truth") is None  # a question states nothing
 
 
+def arrival_claims(world: SessionWorld, time: float, place: LandmarkName) -> float | None:
+    """The share of right claims of arrival if the only utterance of the played session is one."""
+    said = car(time, "we're here", M.EXPLAIN, meaning=[Proposition.of(P.ARRIVED, place=place).to_json()])
+    rest = [other for other in world.session.events if other.type is not EventType.DIALOGUE_MOVE]
+    events = tuple(sorted([*rest, *said], key=lambda event: event.frame))
+    checks = TalkChecks()
+    check_session(checks, replace(world.session, events=events), world.town)
+    return checks.share("arrival_claims")
+
+
+def test_claim_of_arrival_is_compared_with_the_place(world):
+    rows = world.session.header.landmarks
+    far = next(name_of(row) for row in rows if world.arrived_at(100.0, name_of(row)) is False)
+    assert arrival_claims(world, 100.0, far) == 0.0
+    event = next(event for event in world.changes if event.data.get("cause") == "arrival")
+    there = next(name for name in LandmarkName if name.label == event.data["landmark"])
+    assert arrival_claims(world, event.time + 1.0, there) == 1.0
+
+
 def test_shares_come_with_the_number_of_their_cases(world):
     rows = checked(world, "Explain", Proposition.of(P.LIGHTS_ON)).to_json()
     assert rows["truth_n"] == 1 and rows["causes"] is None and rows["causes_n"] == 0

@@ -71,8 +71,7 @@ def _note_order(records: ParticipantState, view: ParticipantView, remark: Remark
         elif remark.wording.faster is False:
             records.guidance = records.guidance.after_slowing_early()
     elif ends and view.standing:
-        since = records.motion.standing_since
-        records.guidance = records.guidance.after_nudging(now, now if since is None else since)
+        records.guidance = records.guidance.after_nudging(now, records.route.to_goal.left(view.station))
     elif ends and remark.wording.distance is not None:
         records.guidance = records.guidance.with_approach_announced(True)
     elif ActionValue.START in actions:

@@ -11,9 +11,17 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.evaluation.analysis.exception_attribution import kind_of, times_mentioned
+from dorothie_gym.evaluation.analysis.truth_checks import (
+    laps,
+    mention_checks,
+    order_checks,
+    repair_runs,
+    reply_checks,
+)
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
 from dorothie_gym.evaluation.analysis.truth_checks.perceivable import perceived_at
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case
 from dorothie_gym.evaluation.analysis.truth_checks.truth import agrees, is_true
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.maps.catalogue import find_town
@@ -55,6 +63,20 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "relevance": "answers to what was asked",
         "story": "sessions that mention somebody or something of the story",
         "loops": "sessions without an order given three times at one place, unremarked",
+        "laps": "ways to a place without a stretch driven three times",
+        "nudges": "small distances that are ordered at most twice while the car hardly moves",
+        "unchanged_orders": "orders that are said at most twice in the same words at one place",
+        "reversals": "orders that follow another one without contradicting it for no reason",
+        "repair_lengths": "repairs that take at most four turns",
+        "repair_wordings": "successive turns of a repair in other words",
+        "repair_replies": "requests to repeat that are not met with another one",
+        "answers_given": "questions that are answered",
+        "answer_forms": "answers to open questions that are no bare yes or no",
+        "refusals": "replies to requests that are no bare no",
+        "arrival_claims": "claims of arrival that are true",
+        "stale_remarks": "remarks on a repetition that has happened so often",
+        "references": "houses and people named so that it is clear which is meant",
+        "pronouns": "descriptions of people that do not call them it",
     }
 )
 """Titles of the figures except those of the exceptions."""
@@ -70,11 +92,19 @@ class TalkChecks:
         right: number of correct cases, by figure; exceptions as "exceptions/KIND".
         cases: number of cases that can be decided.
         unperceived: number of exceptions that no role could perceive, by kind.
+        faults: passages at fault: session, figure, time [s] and words.
     """
 
     right: Counter[str] = field(default_factory=Counter)
     cases: Counter[str] = field(default_factory=Counter)
     unperceived: Counter[str] = field(default_factory=Counter)
+    faults: list[dict[str, object]] = field(default_factory=list)
+
+    def judge(self, figure: str, case: Case, session: str = "") -> None:
+        """Counts the case of a passage, and keeps the passage if it is wrong."""
+        self.add(figure, case.right)
+        if not case.right:
+            self.faults.append({"session": session, "figure": figure, "time": case.time, "words": case.words})
 
     def add(self, figure: str, right: bool | None) -> None:
         """Counts a case; None for one that the records cannot decide."""
@@ -103,6 +133,7 @@ class TalkChecks:
         rows["exceptions"] = {kind: self.share(_EXCEPTIONS + kind) for kind in kinds}
         rows["exceptions_n"] = {kind: self.cases[_EXCEPTIONS + kind] for kind in kinds}
         rows["exceptions_unperceived_n"] = dict(sorted(self.unperceived.items()))
+        rows["faults"] = self.faults
         return rows
 
 
@@ -116,21 +147,53 @@ def talk_checks_of(corpus: Corpus, on_session: Callable[[int, int], None] | None
     checks = TalkChecks()
     for number, entry in enumerate(corpus.entries, start=1):
         session = entry.load()
-        check_session(checks, session, find_town(session.header.town, entry.maps))
+        check_session(checks, session, find_town(session.header.town, entry.maps), entry.name)
         if on_session is not None:
             on_session(number, len(corpus.entries))
     return checks
 
 
-def check_session(checks: TalkChecks, session: Session, town: Town | None) -> None:
-    """Adds the cases of a session; of one in an unknown town (None), those that need no map."""
+_PASSAGES: Final[Mapping[str, Callable[[Session], Iterator[Case]]]] = MappingProxyType(
+    {
+        "laps": laps.laps,
+        "nudges": order_checks.nudges,
+        "unchanged_orders": order_checks.unchanged,
+        "reversals": order_checks.reversals,
+        "repair_lengths": repair_runs.lengths,
+        "repair_wordings": repair_runs.wordings,
+        "repair_replies": repair_runs.replies_to_repairs,
+        "answers_given": reply_checks.answers_given,
+        "answer_forms": reply_checks.forms_of_answers,
+        "refusals": reply_checks.refusals,
+        "stale_remarks": mention_checks.stale_remarks,
+        "references": mention_checks.references,
+        "pronouns": mention_checks.pronouns,
+    }
+)
+"""Checks of passages that need no map, by figure."""
+
+
+def check_session(checks: TalkChecks, session: Session, town: Town | None, name: str = "") -> None:
+    """Adds the cases of a session.
+
+    Args:
+        checks: counts.
+        session: the session.
+        town: its town; None if it is unknown, then only the cases that need no map count.
+        name: name of the session, for the passages at fault.
+    """
     world = SessionWorld(session, town) if town is not None and len(session.trajectory) else None
     if world is not None:
         _check_claims(checks, world)
     _check_answers(checks, session)
     _check_exceptions(checks, session, world)
     checks.add("story", mentions_story(session))
-    checks.add("loops", not has_loop(session))
+    checks.judge("loops", Case(not has_loop(session), 0.0, ""), name)
+    for figure, check in _PASSAGES.items():
+        for case in check(session):
+            checks.judge(figure, case, name)
+    for case in mention_checks.arrival_claims(world) if world is not None else ():
+        checks.judge("arrival_claims", case, name)
 
 
 def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:

@@ -1,0 +1,36 @@
+"""Ways that the Co-Wizard proposes: a question that a yes or a no answers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
+from dorothie_gym.policies.co_wizard.intentions import Directive
+from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.route_progress import Choice, direction_of
+from dorothie_gym.policies.speech import intend
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
+
+
+def propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: np.random.Generator) -> None:
+    """Asks whether one of the exits is meant."""
+    way = choice.exits[int(rng.integers(len(choice.exits)))]
+    direction = direction_of(way)
+    action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
+    street = street_of(view.raw, state.town, way.lane)
+    named = action is ActionValue.J_TURN and rng.random() < 0.3
+    content = act_builders.action(action, direction=direction, street=street if named else None)
+    function = Function.PROPOSITIONAL_QUESTION if rng.random() < 0.7 else Function.CHECK_QUESTION
+    state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
+    first = plan_remark(state, view, rng)
+    question = intend(function, content, wording=Wording(direction=direction), joined=bool(first))
+    state.say(*first, question)
