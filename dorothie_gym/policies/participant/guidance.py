@@ -30,6 +30,7 @@ from dorothie_gym.policies.participant.retrying import (
     why_standing,
 )
 from dorothie_gym.policies.participant.route_steps import route_step
+from dorothie_gym.policies.participant.telling_way import is_described, needs_no_reminder, tell_way
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
@@ -73,7 +74,7 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
             state.guidance = state.guidance.after_miss()
             state.route = state.route.after_miss(state.town, view.place, former)
             remark_on_miss(state, view, passed=drove_past)
-        state.guidance = state.guidance.for_another_approach()
+        state.guidance = state.guidance.for_another_approach().without_way()
         if not drove_past:
             _point_out_wrong_turn(state, view, before)
         if drove_past and not state.guidance.guiding:
@@ -142,6 +143,13 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if _slow_down_early(state, view, rng) or (key[0] == "round" and _takes_run_up(state, view)):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
+    if key[0] == "turn" and not is_described(state, view, key, distance):
+        way = tell_way(state, view, key, distance, rng)
+        if way:
+            state.say(*way)
+            return
+    if is_described(state, view, key, distance) or needs_no_reminder(state, view, key, rng):
+        return
     if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
         return
     progress = state.route.to_goal
