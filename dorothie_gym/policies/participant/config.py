@@ -199,7 +199,7 @@ class ParticipantStyle:
         plans = persona.directions is not Directions.VAGUE
         by_turns = persona.knowledge * persona.talkativeness > BACKSEAT
         return cls(
-            guides=0.15 if by_turns else 0.02,
+            guides=0.35 if by_turns else 0.06,
             names_goal=within(0.85, 1.0, persona.certainty, rng),
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),

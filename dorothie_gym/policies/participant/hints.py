@@ -95,12 +95,17 @@ def side_remark(state: ParticipantState, view: ParticipantView, last: StepKey) -
     """Returns the remark on which side of the street the target is behind a turn, if that is the last of the route."""
     goal, progress = state.task.goal, state.route.progress
     turns = [] if progress is None else list(progress.crossings(state.town, view.station))
-    if goal is None or not turns or (turns[-1].lane, turns[-1].exit.connector) != last[1:]:
+    if (
+        goal is None
+        or goal.name is LandmarkName.PERSON
+        or not turns
+        or (turns[-1].lane, turns[-1].exit.connector) != last[1:]
+    ):
         return ()
     if progress is None or any(leg.entry is LaneEntry.U_TURN for leg in progress.legs[1:]):
         return ()
     side = Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
-    return (_said(state, side, names_place=not is_in_mind(state, view)),) if side not in state.task.told else ()
+    return (_said(state, side),) if side not in state.task.told else ()
 
 
 def famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> SeenLandmark | None:

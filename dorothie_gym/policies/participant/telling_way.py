@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.hints import side_remark
-from dorothie_gym.policies.participant.way_ahead import WayStep, way_ahead, way_remarks
+from dorothie_gym.policies.participant.way_ahead import WayStep, way_ahead, way_behind_u_turn, way_remarks
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
@@ -29,8 +29,11 @@ EARLY: Final = 240.0
 _TELLING: Final = 1.7  # time to say a step [s]
 _REACTION: Final = 2.0  # time of the car to take directions up [s]
 _FORGOTTEN: Final = 40.0  # time after which one reminds of a step [s]
-_REMINDS: Final = 0.15  # probability of a reminder of a step that the car has repeated a moment ago
+_REMINDS: Final = 0.1  # probability of a reminder of a step that the car has repeated a moment ago
 _REMINDS_UNSURE: Final = 0.6  # probability of a reminder of another step
+_PLANS: Final = 2.0  # foresight of those who plan
+_SINGLE: Final = 0.2  # probability that they name one step all the same
+_SLOW: Final = 4.0  # speed up to which there is time to say more than "turn around" [m/s]
 _SIDE: Final = 0.4  # probability that the end of the way is told with the side of the street
 _ROOM: Final = 3  # number of acts in one breath behind which there is room for another one
 _BRIEF: Final = 12.0  # time within which the car takes up directions [s]
@@ -44,16 +47,15 @@ def is_described(state: ParticipantState, view: ParticipantView, key: StepKey, d
     return key in state.guidance.way and distance > state.config.turn_distance
 
 
-def needs_no_reminder(
-    state: ParticipantState, view: ParticipantView, key: StepKey, rng: np.random.Generator
-) -> bool:
+def needs_no_reminder(state: ParticipantState, view: ParticipantView, key: StepKey, rng: np.random.Generator) -> bool:
     """Returns whether a near step was described and understood, so that nothing is said; otherwise it is said again."""
     guidance = state.guidance
     if key not in guidance.way:
         return False
-    fresh = guidance.way_taken_up and view.time - guidance.way_at < _FORGOTTEN
+    age = view.time - guidance.way_at
+    fresh = guidance.way_taken_up and age < _FORGOTTEN
     rest = guidance.way[guidance.way.index(key) + 1 :]
-    if rng.random() < (_REMINDS if fresh else _REMINDS_UNSURE):
+    if age > _BRIEF and rng.random() < (_REMINDS if fresh else _REMINDS_UNSURE):
         state.guidance = replace(guidance, way=rest)
         return False
     state.guidance = guidance.after_step(key, view.time, state.config.lane_return_time)
@@ -104,11 +106,31 @@ def _steps(
 ) -> tuple[WayStep, ...]:
     """Returns the steps to describe, which begin with a given one."""
     manner, time = state.style.manner, distance / max(view.speed, 1.0) - _REACTION
-    count = min(1 + int(rng.random() * state.style.foresight), int(time / _TELLING))
+    count = min(_looks_ahead(state, rng), int(time / _TELLING))
     steps = way_ahead(state, view, count, manner, rng) if count > 0 else ()
-    if not steps or steps[0].keys[0] != key or steps[0].step.action is not StepAction.TURN:
+    if not steps or steps[0].keys[0] != key:
         return ()
+    first = steps[0].step
+    if first.action is not StepAction.TURN:
+        return steps if first.places and manner is Directions.LANDMARKS else ()
     return steps if len(steps) > 1 or len(steps[0].keys) > 1 or manner in _OWN_WORDS else ()
+
+
+def _looks_ahead(state: ParticipantState, rng: np.random.Generator) -> int:
+    """Returns the number of steps to describe: up to the foresight, and rarely one for those who plan."""
+    foresight = state.style.foresight
+    least = 1.0 if foresight < _PLANS or rng.random() < _SINGLE else 2.0
+    return int(least + rng.random() * max(foresight - least + 1.0, 0.0))
+
+
+def way_back(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns the description of the way behind a U-turn, to be said after the instruction to turn round."""
+    steps = way_behind_u_turn(state, view, _looks_ahead(state, rng) - 1, state.style.manner, rng)
+    if view.speed > _SLOW or not steps or rng.random() < state.style.waits:
+        return ()
+    keys = tuple(key for one in steps for key in one.keys)
+    state.guidance = state.guidance.after_describing(keys, view.time)
+    return tuple(replace(item, joined=True) for item in way_remarks(steps, DialogueMove.INSTRUCT))
 
 
 def _said(
@@ -145,13 +167,12 @@ def take_up_confirmation(
         rng: random generator of the decision.
     """
     told = _last_way(state, view)
-    if len(told) < 2 or not heard.acts or heard.acts[0].move not in _SIGNS:
+    if not told or not heard.acts or heard.acts[0].move not in _SIGNS or len(heard.words.plan) < 2:
         return False
-    repeated_turns = _turns(heard.words.plan)
-    if len(repeated_turns) < 2:
-        return False
-    wanted = [item.wording.direction for item in told if item.wording.direction is not None]
-    if repeated_turns != [str(side) for side in wanted][: len(repeated_turns)]:
+    wanted = [str(item.wording.direction) for item in told if item.wording.direction is not None]
+    if _turns(heard.words.plan) != wanted:
+        if told[0].act.move is DialogueMove.CLARIFY:
+            return False  # it was said twice
         state.feel(Happening.MISUNDERSTOOD, view.time)
         again = tuple(
             replace(repeated(item, Function.CORRECTION), joined=number > 0) for number, item in enumerate(told)

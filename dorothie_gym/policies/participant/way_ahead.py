@@ -5,6 +5,7 @@ Each step is checked on the map: the junction that a listener would find by the 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +18,11 @@ from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, PlanStep, StepAction, StepCondition
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology.slots import ObjectClass, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.hints import FAMOUS
 from dorothie_gym.policies.participant.orders import FUNCTIONS
+from dorothie_gym.policies.participant.state import StepKey
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.plan_contents import content_of
 from dorothie_gym.policies.road_ahead import Crossing, RoadAhead
@@ -30,11 +32,11 @@ from dorothie_gym.policies.turn_lanes import turn_lanes
 from dorothie_gym.support.portable_math import wrap_degrees
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Leg, Place
     from dorothie_gym.maps.town import Town
     from dorothie_gym.ontology.dialogue_acts import DialogueMove
-    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+    from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
-    from dorothie_gym.policies.route_progress import RouteProgress
 
 MOST_STEPS: Final = 4
 """Number of steps after which nobody remembers the first."""
@@ -94,14 +96,40 @@ def way_ahead(
         manner: manner of giving directions.
         rng: random generator of the decision.
     """
-    town, lanes = state.town, state.town.lanes
-    if lanes[view.lane].in_junction:
+    if state.town.lanes[view.lane].in_junction:
         return ()
+    return _along(state, view, view.place, state.route.to_goal.legs, min(count, MOST_STEPS), manner, rng)
+
+
+def way_behind_u_turn(
+    state: ParticipantState, view: ParticipantView, count: int, manner: Directions, rng: np.random.Generator
+) -> tuple[WayStep, ...]:
+    """Returns the steps of the route behind its U-turn, if that comes before any junction; arguments as `way_ahead`."""
+    legs = state.route.to_goal.legs
+    for place, leg in enumerate(legs):
+        if place and leg.entry is LaneEntry.U_TURN:
+            return _along(state, view, (leg.lane, leg.start), legs[place:], min(count, MOST_STEPS), manner, rng)
+        if state.town.lanes[leg.lane].in_junction:
+            break
+    return ()
+
+
+def _along(
+    state: ParticipantState,
+    view: ParticipantView,
+    here: Place,
+    legs: Sequence[Leg],
+    count: int,
+    manner: Directions,
+    rng: np.random.Generator,
+) -> tuple[WayStep, ...]:
+    """Returns the steps along some legs of the route."""
+    town = state.town
     found: list[WayStep] = []
-    road, crossed = RoadAhead.straight_on(town, view.place), list[tuple[Crossing, RouteJunction]]()
-    for junction in _turns_of(state.route.to_goal, town, view.station):
+    road, crossed = RoadAhead.straight_on(town, here), list[tuple[Crossing, RouteJunction]]()
+    for junction in _turns_of(legs, town, here[1]):
         crossing = next((one for one in road.crossings if one.junction == junction.exit.junction_id), None)
-        if len(found) == min(count, MOST_STEPS) or crossing is None:
+        if len(found) == count or crossing is None:
             break
         if junction.direction is Direction.STRAIGHT:
             crossed.append((crossing, junction))
@@ -116,8 +144,8 @@ def way_ahead(
         found.append(WayStep(keys=keys, step=said[0], wording=said[1]))
         road, crossed = RoadAhead.straight_on(town, (junction.exit.lane, 0.0)), []
     else:
-        if found and crossed and len(found) < min(count, MOST_STEPS):
-            found.append(_straight_on(road, crossed))
+        if crossed and len(found) < count:
+            found.append(_straight_on(state, view, road, crossed, manner))
     return tuple(found)
 
 
@@ -135,10 +163,10 @@ def way_remarks(steps: Sequence[WayStep], move: DialogueMove) -> tuple[Remark, .
     )
 
 
-def _turns_of(progress: RouteProgress, town: Town, station: float) -> Iterator[RouteJunction]:
-    """Yields the junctions of the route with a choice or with turn lanes, up to its next U-turn."""
-    legs, distance = progress.legs, 0.0
-    for place, (leg, following) in enumerate(zip(legs, legs[1:], strict=False)):
+def _turns_of(legs: Sequence[Leg], town: Town, station: float) -> Iterator[RouteJunction]:
+    """Yields the junctions on some legs with a choice or with turn lanes, up to the next U-turn."""
+    distance = 0.0
+    for place, (leg, following) in enumerate(itertools.pairwise(legs)):
         if following.entry is LaneEntry.U_TURN:
             return
         begin = leg.start if place else station
@@ -156,10 +184,29 @@ def _key_of(junction: RouteJunction) -> StepKey:
     return "turn", junction.lane, junction.exit.connector
 
 
-def _straight_on(road: RoadAhead, crossed: Sequence[tuple[Crossing, RouteJunction]]) -> WayStep:
+def _straight_on(
+    state: ParticipantState,
+    view: ParticipantView,
+    road: RoadAhead,
+    crossed: Sequence[tuple[Crossing, RouteJunction]],
+    manner: Directions,
+) -> WayStep:
     """Returns the last step of a way that turns nowhere any more."""
     number = len(crossed)
     last = crossed[-1][0]
+    marks = _landmarks_beside(state, view, road) if manner is Directions.LANDMARKS else []
+    behind = [
+        (distance, name)
+        for distance, name in marks
+        if last.distance - _AT_CORNER < distance < last.distance + _JUST_BEHIND
+    ]
+    if behind:
+        place = PlaceReference(landmark=min(behind)[1])
+        step = PlanStep(
+            action=StepAction.STRAIGHT, condition=StepCondition(relation=ConditionRelation.PAST, place=place)
+        )
+        keys = tuple(_key_of(junction) for _, junction in crossed)
+        return WayStep(keys=keys, step=step, wording=Wording(topic="way_past"))
     lights = [one for one in road.crossings if one.lights]
     keys = tuple(_key_of(junction) for _, junction in crossed)
     if last.lights and lights[0] is last:
@@ -205,19 +252,27 @@ def _plainly(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _De
 
 def _by_landmark(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _Described:
     """Describes a turn by a landmark on its corner, or behind which it is the first opportunity."""
-    goal, options = state.task.goal, []
-    for mark in view.landmarks:
-        if mark.name not in FAMOUS or not view.unique(mark) or (goal is not None and mark.name is goal.name):
-            continue
-        distance = turn.road.distance_to(mark.x, mark.y)
-        relation = None if distance is None else _relation(turn, distance)
-        if distance is not None and relation is not None:
-            options.append((relation is not ConditionRelation.AT, abs(distance - turn.crossing.distance), mark.name))
+    options = []
+    for distance, name in _landmarks_beside(state, view, turn.road):
+        relation = _relation(turn, distance)
+        if relation is not None:
+            options.append((relation is not ConditionRelation.AT, abs(distance - turn.crossing.distance), name))
     if not options:
         return None
     after, _, name = min(options, key=lambda row: row[:2])
     relation = ConditionRelation.AFTER if after else ConditionRelation.AT
     return _conditional(turn, relation, PlaceReference(landmark=name), f"way_{relation}")
+
+
+def _landmarks_beside(
+    state: ParticipantState, view: ParticipantView, road: RoadAhead
+) -> list[tuple[float, LandmarkName]]:
+    """Returns the well-known landmarks of a name of their own beside a road, with the distances to them [m]."""
+    goal = state.task.goal
+    known = [mark for mark in view.landmarks if mark.name in FAMOUS and view.unique(mark)]
+    others = [mark for mark in known if goal is None or mark.name is not goal.name]
+    found = ((road.distance_to(mark.x, mark.y), mark.name) for mark in others)
+    return [(distance, name) for distance, name in found if distance is not None]
 
 
 def _relation(turn: _Turn, distance: float) -> ConditionRelation | None:
@@ -303,4 +358,3 @@ _MANNERS: Final[Mapping[Directions, tuple[_Describe, ...]]] = MappingProxyType(
     }
 )
 """Ways of describing a turn, the preferred one first."""
-
