@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.evaluation.analysis.exception_attribution import kind_of, times_mentioned
+from dorothie_gym.evaluation.analysis.truth_checks.directions import directions_of
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
 from dorothie_gym.evaluation.analysis.truth_checks.perceivable import perceived_at
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
@@ -55,6 +56,8 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "relevance": "answers to what was asked",
         "story": "sessions that mention somebody or something of the story",
         "loops": "sessions without an order given three times at one place, unremarked",
+        "directions_ahead": "directions with two or more steps",
+        "directions_by_places": "directions that name a landmark or an object",
     }
 )
 """Titles of the figures except those of the exceptions."""
@@ -131,6 +134,9 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None) -> No
     _check_exceptions(checks, session, world)
     checks.add("story", mentions_story(session))
     checks.add("loops", not has_loop(session))
+    for direction in directions_of(session):
+        checks.add("directions_ahead", direction.steps > 1)
+        checks.add("directions_by_places", direction.names_place)
 
 
 def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:
