@@ -26,7 +26,7 @@ from dorothie_gym.policies.participant.state import StepKey
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.plan_contents import content_of
 from dorothie_gym.policies.road_ahead import Crossing, RoadAhead
-from dorothie_gym.policies.route_progress import RouteJunction
+from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, streets_named
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import turn_lanes
 from dorothie_gym.support.portable_math import wrap_degrees
@@ -137,12 +137,15 @@ def _along(
         fitting = tuple(one for one in road.crossings if one.leads(junction.direction))
         if crossing not in fitting:
             break
+        onto = _exit_meant(town, crossing, junction)
+        if onto is None:
+            break
         said = _described(state, view, _Turn(road, crossing, junction, fitting), manner, rng)
         if said is None:
             break
         keys = tuple(_key_of(one) for one in (*(passed for _, passed in crossed), junction))
         found.append(WayStep(keys=keys, step=said[0], wording=said[1]))
-        road, crossed = RoadAhead.straight_on(town, (junction.exit.lane, 0.0)), []
+        road, crossed = RoadAhead.straight_on(town, (onto, 0.0)), []
     else:
         if crossed and len(found) < count:
             found.append(_straight_on(state, view, road, crossed, manner))
@@ -161,6 +164,14 @@ def way_remarks(steps: Sequence[WayStep], move: DialogueMove) -> tuple[Remark, .
         intend(function, content_of(one.step), wording=one.wording, joined=number > 0)
         for number, one in enumerate(steps)
     )
+
+
+def _exit_meant(town: Town, crossing: Crossing, junction: RouteJunction) -> int | None:
+    """Returns the lane onto which a listener turns; None where the direction leads to another road than the route."""
+    choice = Choice(lane=crossing.lane, distance=0.0, exits=crossing.exits)
+    way, lanes = find_exit(town, choice, junction.direction), town.lanes
+    same = way is not None and lanes[way.lane].road_id == lanes[junction.exit.lane].road_id
+    return way.lane if way is not None and same else None
 
 
 def _turns_of(legs: Sequence[Leg], town: Town, station: float) -> Iterator[RouteJunction]:
@@ -312,15 +323,21 @@ def _lanes_of(town: Town, kinds: frozenset[SignalKind]) -> frozenset[int]:
 
 def _by_street(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _Described:
     """Describes a turn by the street onto which it leads, where that is the first way onto it."""
-    lanes, names = state.town.lanes, view.raw
+    names = view.raw
     onto = street_of(names, state.town, turn.junction.exit.lane)
     if onto is StreetName.UNKNOWN or street_of(names, state.town, turn.crossing.lane) is onto:
         return None
-    street = lanes[turn.junction.exit.lane].street
-    first = next((one for one in turn.road.crossings if street in {lanes[way.lane].street for way in one.exits}), None)
+    named = streets_named(names["street_names"], onto)
+    first = next((one for one in turn.road.crossings if _leads_onto(state.town, one, named)), None)
     if first != turn.crossing:
         return None
     return _conditional(turn, ConditionRelation.AT, PlaceReference(street=onto), "way_onto")
+
+
+def _leads_onto(town: Town, crossing: Crossing, named: frozenset[int]) -> bool:
+    """Returns whether a junction leads from another street onto one of a name."""
+    other = town.lanes[crossing.lane].street not in named
+    return other and any(town.lanes[way.lane].street in named for way in crossing.exits)
 
 
 def _by_compass(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _Described:
