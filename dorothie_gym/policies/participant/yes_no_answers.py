@@ -207,7 +207,7 @@ def go_first(name: LandmarkName) -> Remark:
 
 
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
-    """Accepts a detour over the participant's own street, or one that it has just named; otherwise insists on its own."""
+    """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     named = {street for item in state.speech.said for street in item.act.values(Slot.STREET)}
