@@ -50,7 +50,7 @@ CONTENT_FIELDS = frozenset(
 )
 """Gaps that are filled by the arguments of the content of the same names."""
 
-CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped", "plan"}) | CONTENT_FIELDS
+CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped", "compass", "plan"}) | CONTENT_FIELDS
 """Gaps that are filled by the wording; `side` is a direction, left or right."""
 
 SPOKEN_SLOTS = (Slot.ACTION, Slot.LANDMARK, Slot.STREET, Slot.OBJECT, Slot.STATUS)

@@ -231,7 +231,8 @@ class _Sentence:
         if closer is not None and template.covers and realizer.random() < closer.rate * style.chattiness:
             end = closer.phrase.say(realizer)
             body = body if _words(end)[0] in _words(body) else f"{body}{'' if end[0] == ',' else ' '}{end}"
-        if style.address and realizer.random() < style.addressing and style.address not in body.lower():
+        amid = (self._wording.topic or "").startswith("way_")  # the listener would look for "my friend" on the way
+        if style.address and not amid and realizer.random() < style.addressing and style.address not in body.lower():
             body = f"{body}, {style.address}"
         return body
 

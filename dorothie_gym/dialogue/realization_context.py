@@ -38,6 +38,7 @@ class Wording:
         past: landmark to drive past before the action.
         dropped: landmark abandoned in favour of another one in the act.
         topic: topic of the utterance ("fog", "wrong_way", ...); selects the templates marked with it, if any.
+        compass: point of the compass to which a street leads: "north".
         plan: driving plan in words, as `plan_words.spoken_plan` returns it.
         content: proposition that the act is about; its arguments fill gaps such as {time} and {cause}.
 
@@ -55,6 +56,7 @@ class Wording:
     past: LandmarkName | None = None
     dropped: LandmarkName | None = None
     topic: str | None = None
+    compass: str | None = None
     plan: str | None = None
     content: Proposition | None = None
 
@@ -81,6 +83,7 @@ class Wording:
             "past": self.past is not None,
             "dropped": self.dropped is not None,
             "here": self.here,
+            "compass": self.compass is not None,
             "plan": self.plan is not None,
         }
         told = {} if self.content is None else dict(self.content.arguments)

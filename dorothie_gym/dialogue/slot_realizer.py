@@ -250,6 +250,10 @@ class SlotRealizer:
         """Returns the words of a driving plan."""
         return self._wording.plan or ""
 
+    def compass(self) -> str:
+        """Returns the point of the compass to which a street leads."""
+        return self._wording.compass or ""
+
     def dropped(self) -> str:
         """Returns the name of the abandoned landmark."""
         return self.place(self._wording.dropped)
@@ -352,6 +356,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "distance": SlotRealizer.distance,
         "past": SlotRealizer.past,
         "dropped": SlotRealizer.dropped,
+        "compass": SlotRealizer.compass,
         "plan": SlotRealizer.plan,
         "seconds": SlotRealizer.duration,
         "metres": SlotRealizer.metres,

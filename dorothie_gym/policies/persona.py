@@ -24,7 +24,11 @@ class Directions(enum.StrEnum):
     TURNS = "turns"
     """By turns, with ordinals and the names of streets."""
     LANDMARKS = "landmarks"
-    """By visible objects along the route and at the goal."""
+    """By landmarks, traffic lights and signs along the route, and by the look of the goal."""
+    STREETS = "streets"
+    """By the names of the streets to turn onto."""
+    COMPASS = "compass"
+    """By streets and points of the compass."""
     VAGUE = "vague"
     """Gives directions late and without details, so that the car must ask."""
 
@@ -113,7 +117,7 @@ class Persona:
             given: values or ranges of the traits that are given.
         """
         drawn = {name: float(rng.random()) for name in SHARES}
-        directions = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})
+        directions = _pick(rng, _MANNERS)
         driving = _pick(rng, {Driving.GENTLE: 0.3, Driving.USUAL: 0.45, Driving.BRISK: 0.25})
         for name, (median, spread, low, high) in _TIMES.items():
             drawn[name] = min(max(median * pm.exp(spread * float(rng.standard_normal())), low), high)
@@ -132,6 +136,17 @@ class Persona:
 
 Trait = str | tuple[float, float]
 """Value of a named trait, or range of a numeric one."""
+
+_MANNERS: Final = MappingProxyType(
+    {
+        Directions.TURNS: 0.3,
+        Directions.LANDMARKS: 0.3,
+        Directions.STREETS: 0.15,
+        Directions.COMPASS: 0.05,
+        Directions.VAGUE: 0.2,
+    }
+)
+"""Shares of the manners of giving directions; set by hand: people mostly go by turns and by what they see."""
 
 REACTION_SPREAD: Final = 0.25
 """Standard deviation of the logarithm of one speaker's reaction times; set by hand."""

@@ -22,7 +22,7 @@ ABOUT_PLACES = (P.LOCATED, P.NEAR, P.LOOKS)
 def worlds(tmp_path_factory):
     folder = tmp_path_factory.mktemp("played")
     town = find_town("brookside", None)
-    return [SessionWorld(play(folder / str(seed), seed=seed, seconds=300.0), town) for seed in (2, 3, 4, 5, 6)]
+    return [SessionWorld(play(folder / str(seed), seed=seed, seconds=300.0), town) for seed in (2, 3, 5, 7, 8, 9)]
 
 
 def stated(world):

@@ -56,7 +56,7 @@ def test_given_traits_hold_and_leave_the_others_alone():
         ("tallness=1", "no trait 'tallness'"),
         ("patience=2", "0..1"),
         ("patience=0.9..0.1", "0..1"),
-        ("directions=east", "turns, landmarks, vague"),
+        ("directions=east", "turns, landmarks, streets, compass, vague"),
         ("patience", "0..1"),
     ],
 )

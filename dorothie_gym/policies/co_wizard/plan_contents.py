@@ -1,32 +1,18 @@
-"""Content of a driving plan as propositions, and the remark that states it."""
+"""Remark that states the steps of a driving plan."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.plan_words import spoken_plan
-from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.dialogue.routes import PlanStep, StepAction
-from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.plan_contents import content_of
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.intentions import CommunicativeFunction
-
-_WILL: Final = {
-    StepAction.TURN: ActionValue.J_TURN,
-    StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
-    StepAction.LANE: ActionValue.LANE_SWITCH,
-    StepAction.U_TURN: ActionValue.U_TURN,
-    StepAction.STOP: ActionValue.STOP,
-    StepAction.WAIT: ActionValue.STOP,
-    StepAction.GO: ActionValue.START,
-    StepAction.SPEED: ActionValue.SPEED_CHANGE,
-    StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
-}
+    from dorothie_gym.dialogue.routes import PlanStep
 
 
 def told_plan(steps: Sequence[PlanStep], function: CommunicativeFunction, *, joined: bool = False) -> Remark:
@@ -39,22 +25,3 @@ def told_plan(steps: Sequence[PlanStep], function: CommunicativeFunction, *, joi
     """
     wording = Wording(topic="steps", plan=spoken_plan(steps))
     return intend(function, *map(content_of, steps), wording=wording, joined=joined)
-
-
-def content_of(step: PlanStep) -> Proposition:
-    """Returns what the car is going to do by a step."""
-    place = next(iter(step.places), None)
-    landmark, street, kind = (None, None, None) if place is None else (place.landmark, place.street, place.object)
-    if step.action is StepAction.VISIT:
-        return act_builders.destination(landmark, street)
-    if step.action is StepAction.AVOID:
-        return Proposition.of(Predicate.WILL, street=street, place=landmark, negated=True)
-    return Proposition.of(
-        Predicate.WILL,
-        action=_WILL.get(step.action),
-        direction=step.direction,
-        street=street,
-        place=landmark,
-        object=kind,
-        speed=step.speed,
-    )

@@ -17,10 +17,11 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, StreetName
 from dorothie_gym.policies.co_wizard.goals import aim, known_landmark, seek_street, set_goal
 from dorothie_gym.policies.co_wizard.instructed_actions import limit_remark
-from dorothie_gym.policies.co_wizard.plan_contents import content_of, told_plan
+from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING
 from dorothie_gym.policies.co_wizard.plan_objections import object_to
 from dorothie_gym.policies.co_wizard.plan_points import first_objection
+from dorothie_gym.policies.plan_contents import content_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 

@@ -38,7 +38,6 @@ class ParticipantConfig(GuidanceConfig):
         tells_message: probability that the sender and the reason of a message are mentioned with the change.
         leaves_route: probability that the choice of the route is left to the car in words.
         unanswered_after: silence after which the participant asks whether the car has understood [s].
-        guides_at_once: probability that guidance to an unknown place begins right after its description.
         describes_looks: probability that a place is also described by an object there.
         near_landmark: distance between a landmark and the goal within which it helps to describe the goal [m].
         turn_late_distance: distance at which a turn is announced even if the car has not asked [m].
@@ -98,7 +97,6 @@ class ParticipantConfig(GuidanceConfig):
     tells_message: float = 0.8
     leaves_route: float = 0.06
     unanswered_after: float = 8.0
-    guides_at_once: float = 0.12
     describes_looks: float = 0.5
     near_landmark: float = 90.0
     turn_late_distance: float = 60.0
@@ -167,6 +165,9 @@ class ParticipantStyle:
         points_out: probability that a car is stopped by the statement that this is the place.
         thanks: probability that an answer of the car is acknowledged.
         verifies: probability of asking whether the car knows a destination after naming it.
+        leads: probability that guidance to an unknown place begins right after its description.
+        foresight: largest number of steps of the way that are described at once.
+        manner: manner of giving directions.
     """
 
     guides: float
@@ -186,21 +187,25 @@ class ParticipantStyle:
     points_out: float = 0.0
     thanks: float = 0.0
     verifies: float = 0.0
+    leads: float = 0.12
+    foresight: float = 1.0
+    manner: Directions = Directions.TURNS
 
     @classmethod
     def of(cls, persona: Persona, rng: np.random.Generator) -> ParticipantStyle:
         """Returns the style of a persona; the random generator adds individual variation."""
         precise, vague = persona.directions is Directions.TURNS, persona.directions is Directions.VAGUE
         landmarks = persona.directions is Directions.LANDMARKS
+        plans = persona.directions is not Directions.VAGUE
         by_turns = persona.knowledge * persona.talkativeness > BACKSEAT
         return cls(
-            guides=0.15 if by_turns else 0.02,
+            guides=0.35 if by_turns else 0.06,
             names_goal=within(0.85, 1.0, persona.certainty, rng),
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
             chat=within(205.0, 100.0, (persona.talkativeness + persona.humour) / 2.0, rng),
-            waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
+            waits=within(0.15, 0.5, persona.patience, rng) + 0.4 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.15, 0.4, persona.talkativeness, rng) + 0.15 * landmarks,
             aligns=within(0.15, 0.0, persona.certainty, rng),
@@ -210,6 +215,9 @@ class ParticipantStyle:
             points_out=within(0.5, 0.85, persona.politeness, rng) + 0.15 * landmarks,
             thanks=within(0.4, 0.9, persona.politeness, rng),
             verifies=within(0.3, 0.05, persona.certainty, rng),
+            leads=within(0.3, 0.8, persona.knowledge, rng) if plans else 0.1,
+            foresight=within(2.0, 4.9, persona.knowledge, rng) if plans else within(1.0, 2.5, persona.knowledge, rng),
+            manner=persona.directions,
             notices=0.0 if persona.ignores else within(0.7, 1.0, persona.attention, rng),
         )
 

@@ -440,7 +440,7 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     """Describes the place of the target by street, a landmark nearby and an object; guidance follows now or later."""
     goal = state.task.destination
     no_street = goal.street is StreetName.UNKNOWN
-    state.set_guiding(bool(no_street or state.task.described or rng.random() < state.config.guides_at_once))
+    state.set_guiding(bool(no_street or state.task.described or rng.random() < state.style.leads))
     state.task = state.task.after_describing()
     looks = looks_remark(state, goal, rng) if rng.random() < state.config.describes_looks else ()
     corner = corner_fact(state, view, goal)

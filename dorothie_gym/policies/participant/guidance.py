@@ -30,6 +30,13 @@ from dorothie_gym.policies.participant.retrying import (
     why_standing,
 )
 from dorothie_gym.policies.participant.route_steps import route_step
+from dorothie_gym.policies.participant.telling_way import (
+    answer_with_way,
+    is_described,
+    needs_no_reminder,
+    tell_way,
+    way_back,
+)
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
@@ -74,7 +81,7 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
             state.guidance = state.guidance.after_miss()
             state.route = state.route.after_miss(state.town, view.place, former)
             remark_on_miss(state, view, passed=drove_past)
-        state.guidance = state.guidance.for_another_approach()
+        state.guidance = state.guidance.for_another_approach().without_way()
         if not drove_past:
             _point_out_wrong_turn(state, view, before)
         if drove_past and not state.guidance.guiding:
@@ -143,6 +150,8 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if _slow_down_early(state, view, rng) or (key[0] == "round" and _takes_run_up(state, view)):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
+    if _has_told_way(state, view, key, distance, rng):
+        return
     if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
         return
     progress = state.route.to_goal
@@ -165,10 +174,41 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         return
     again = state.guidance.step == key
     if near and (not again or overdue):
-        if key[0] in ("turn", "lane") and not again and rng.random() < state.style.hints:
-            words = replace(words, wording=replace(words.wording, topic="indirect"))
-        note_step(state, view, key)
-        state.say(*_with_addition(state, view, words, again, rng))
+        _announce(state, view, step=(key, distance, words), again=again, rng=rng)
+
+
+def _has_told_way(
+    state: ParticipantState, view: ParticipantView, key: StepKey, distance: float, rng: np.random.Generator
+) -> bool:
+    """Returns whether the next step needs no words of its own: it was described before, or is described now."""
+    if key[0] != "turn":
+        return False
+    if is_described(state, view, key, distance) or needs_no_reminder(state, view, key, rng):
+        return True
+    way = tell_way(state, view, key, distance, rng)
+    state.say(*way)
+    return bool(way)
+
+
+def _announce(
+    state: ParticipantState,
+    view: ParticipantView,
+    *,
+    step: tuple[StepKey, float, Remark],
+    again: bool,
+    rng: np.random.Generator,
+) -> None:
+    """Announces a step that is near, if possible with those behind it."""
+    key, distance, words = step
+    way = () if again else answer_with_way(state, view, key, distance, DialogueMove.INSTRUCT, rng)
+    if way:
+        state.say(*way)
+        return
+    if key[0] in ("turn", "lane") and not again and rng.random() < state.style.hints:
+        words = replace(words, wording=replace(words.wording, topic="indirect"))
+    note_step(state, view, key)
+    back = way_back(state, view, rng) if key[0] == "round" and not again else ()
+    state.say(*((words, *back) if back else _with_addition(state, view, words, again, rng)))
 
 
 def _is_astray(state: ParticipantState, view: ParticipantView) -> bool:

@@ -11,6 +11,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.maps.model import SignalKind
+from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
@@ -19,10 +20,10 @@ from dorothie_gym.policies.view_range import DENSE, sight
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
-    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
     from dorothie_gym.policies.participant.view import ParticipantView
 
-_FAMOUS = frozenset(LandmarkName) - {
+FAMOUS = frozenset(LandmarkName) - {
     LandmarkName.HOUSE,
     LandmarkName.PERSON,
     LandmarkName.UNKNOWN,
@@ -90,12 +91,29 @@ def looks_remark(state: ParticipantState, goal: SeenLandmark, rng: np.random.Gen
     return (_said(state, features[int(rng.integers(len(features)))]),) if features else ()
 
 
+def side_remark(state: ParticipantState, view: ParticipantView, last: StepKey) -> tuple[Remark, ...]:
+    """Returns the remark on which side of the street the target is behind a turn, if that is the last of the route."""
+    goal, progress = state.task.goal, state.route.progress
+    turns = [] if progress is None else list(progress.crossings(state.town, view.station))
+    if (
+        goal is None
+        or goal.name is LandmarkName.PERSON
+        or not turns
+        or (turns[-1].lane, turns[-1].exit.connector) != last[1:]
+    ):
+        return ()
+    if progress is None or any(leg.entry is LaneEntry.U_TURN for leg in progress.legs[1:]):
+        return ()
+    side = Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
+    return (_said(state, side),) if side not in state.task.told else ()
+
+
 def famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> SeenLandmark | None:
     """Returns the well-known landmark closest to the target, if one is near [m]."""
     found = [
         (abs(other.x - goal.x) + abs(other.y - goal.y), other.row, other)
         for other in view.landmarks
-        if other.name in _FAMOUS and other.name is not goal.name
+        if other.name in FAMOUS and other.name is not goal.name
     ]
     return min(found)[2] if found and min(found)[0] < within else None
 

@@ -14,7 +14,7 @@ from dorothie_gym.policies.speech import Remark, intend
 if TYPE_CHECKING:
     from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
 
-_FUNCTIONS: Final = MappingProxyType(
+FUNCTIONS: Final = MappingProxyType(
     {
         DialogueMove.INSTRUCT: CommunicativeFunction.REQUEST,
         DialogueMove.REPLY_W: CommunicativeFunction.ANSWER,
@@ -54,4 +54,4 @@ def order(
         place=place,
         speed=None if particulars.speed is None else round(particulars.speed),
     )
-    return intend(_FUNCTIONS[move], wanted, wording=particulars, urgent=urgent)
+    return intend(FUNCTIONS[move], wanted, wording=particulars, urgent=urgent)

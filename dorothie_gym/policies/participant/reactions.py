@@ -315,6 +315,8 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found.append((intend(asks_open, arrival, elided=("place",)),))
         found.append((intend(asks_open, act_builders.action(ActionValue.QUERIED)),))
         found.append((intend(Function.CHECK_QUESTION, act_builders.destination(goal.name)),))
+        found.append((intend(asks_open, Proposition.of(Predicate.DRIVES_AT, speed=ASKED)),))
+        found.append((intend(asks, Proposition.of(Predicate.CROWDED, object=ObjectClass.VEHICLES)),))
         found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:

@@ -31,6 +31,7 @@ from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
+from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
 from dorothie_gym.policies.participant.yes_no_answers import (
     addition,
     answer_yes_no,
@@ -99,6 +100,8 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     if heard.words.told is not None and heard.words.told.predicate in _POOR_VIEW:
         state.conversation = state.conversation.after_talking_about_view()
         state.speech = state.speech.without_statements(_POOR_VIEW)
+    if take_up_confirmation(state, view, heard, rng):
+        return
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
     before = state.speech
     for act in heard.acts:
@@ -186,6 +189,10 @@ def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMov
     answers = move is DialogueMove.REPLY_W
     if answers and state.guidance.step == key and view.time - state.guidance.step_at < state.config.just_said:
         return  # the question was asked during the answer
+    way = answer_with_way(state, view, key, distance, move, rng)
+    if way:
+        state.say_only(*way)
+        return
     note_step(state, view, key)
     state.say_only(words, *(addition(state, view, rng) if answers else ()))
 

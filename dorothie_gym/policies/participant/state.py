@@ -233,6 +233,10 @@ class GuidanceState:
         nudged_at: time of the last instruction to drive on a little [s].
         nudges: number of such instructions, and of remarks about them, while the car has hardly moved.
         nudged_from: distance to the place at the first of them [m].
+        way: steps of the way ahead that have been described and are still to come.
+        way_at: time of that description [s].
+        way_taken_up: whether the car has repeated it.
+        looked_ahead: last step for which it was decided whether to describe the way, and whether it was near.
         considered: last step for which it was decided whether to wait for a question of the car.
         left_to_ask: result of that decision.
     """
@@ -256,6 +260,10 @@ class GuidanceState:
     nudged_at: float = -math.inf
     nudges: int = 0
     nudged_from: float = math.inf
+    way: tuple[StepKey, ...] = ()
+    way_at: float = -math.inf
+    way_taken_up: bool = False
+    looked_ahead: tuple[StepKey, bool] | None = None
     considered: StepKey | None = None
     left_to_ask: bool = False
 
@@ -274,7 +282,7 @@ class GuidanceState:
 
     def for_new_route(self, left: float) -> GuidanceState:
         """Restarts step and minimum distance on a route around a roadblock."""
-        return replace(self, best=left, step=None)
+        return replace(self, best=left, step=None, way=())
 
     def after_step(self, step: StepKey, now: float, return_time: float) -> GuidanceState:
         """Records a step announced at `now` [s].
@@ -291,10 +299,23 @@ class GuidanceState:
             self,
             step=step,
             step_at=now,
+            way=self.way[self.way.index(step) + 1 :] if step in self.way else self.way,
             repeats=self.repeats + 1 if self.step == step else 0,
             u_turns=self.u_turns + (step[0] == "round" and (self.step != step or now - self.step_at > UNSAID)),
             lane_changes=changes,
         )
+
+    def after_describing(self, steps: tuple[StepKey, ...], now: float) -> GuidanceState:
+        """Records a description at `now` [s] of the steps of the way ahead behind the present one."""
+        return replace(self, way=steps, way_at=now, way_taken_up=False)
+
+    def after_taking_up(self) -> GuidanceState:
+        """Records that the car has repeated the way ahead."""
+        return self if self.way_taken_up else replace(self, way_taken_up=True)
+
+    def without_way(self) -> GuidanceState:
+        """Forgets the description of a way that is not the present route."""
+        return self if not self.way else replace(self, way=())
 
     def after_reminding(self) -> GuidanceState:
         """Counts a repetition."""

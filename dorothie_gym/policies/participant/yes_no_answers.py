@@ -208,10 +208,11 @@ def go_first(name: LandmarkName) -> Remark:
 
 
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
-    """Accepts a detour that is the participant's own; otherwise insists on the participant's."""
+    """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
-    if own is None or own in act.values(Slot.STREET):
+    named = {street for item in state.speech.said for street in item.act.values(Slot.STREET)}
+    if own is None or not {own, *named}.isdisjoint(act.values(Slot.STREET)):
         state.say_first(_short(Function.AFFIRMATIVE_ANSWER, proposed))
         return
     over = act_builders.action(None, street=own)

@@ -18,6 +18,7 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     repair_runs,
     reply_checks,
 )
+from dorothie_gym.evaluation.analysis.truth_checks.directions import directions_of
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
 from dorothie_gym.evaluation.analysis.truth_checks.perceivable import perceived_at
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
@@ -77,6 +78,8 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "stale_remarks": "remarks on a repetition that has happened so often",
         "references": "houses and people named so that it is clear which is meant",
         "pronouns": "descriptions of people that do not call them it",
+        "directions_ahead": "directions with two or more steps",
+        "directions_by_places": "directions that name a landmark or an object",
     }
 )
 """Titles of the figures except those of the exceptions."""
@@ -194,6 +197,9 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None, name:
             checks.judge(figure, case, name)
     for case in mention_checks.arrival_claims(world) if world is not None else ():
         checks.judge("arrival_claims", case, name)
+    for direction in directions_of(session):
+        checks.add("directions_ahead", direction.steps > 1)
+        checks.add("directions_by_places", direction.names_place)
 
 
 def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:

@@ -1,0 +1,44 @@
+"""Content of the steps of a driving plan as propositions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.routes import StepAction
+from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies import act_builders
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.routes import PlanStep
+
+_WILL: Final = {
+    StepAction.TURN: ActionValue.J_TURN,
+    StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
+    StepAction.LANE: ActionValue.LANE_SWITCH,
+    StepAction.U_TURN: ActionValue.U_TURN,
+    StepAction.STOP: ActionValue.STOP,
+    StepAction.WAIT: ActionValue.STOP,
+    StepAction.GO: ActionValue.START,
+    StepAction.SPEED: ActionValue.SPEED_CHANGE,
+    StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
+}
+
+
+def content_of(step: PlanStep) -> Proposition:
+    """Returns what the car is going to do by a step."""
+    place = next(iter(step.places), None)
+    landmark, street, kind = (None, None, None) if place is None else (place.landmark, place.street, place.object)
+    if step.action is StepAction.VISIT:
+        return act_builders.destination(landmark, street)
+    if step.action is StepAction.AVOID:
+        return Proposition.of(Predicate.WILL, street=street, place=landmark, negated=True)
+    return Proposition.of(
+        Predicate.WILL,
+        action=_WILL.get(step.action),
+        direction=step.direction,
+        street=street,
+        place=landmark,
+        object=kind,
+        speed=step.speed,
+    )

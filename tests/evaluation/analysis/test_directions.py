@@ -1,0 +1,27 @@
+from dorothie_gym.dialogue import Predicate, Proposition
+from dorothie_gym.evaluation.analysis.truth_checks.directions import GivenDirection, directions_of
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName
+from tests.evaluation.analysis.builders import drive, human
+
+M, A = DialogueMove, ActionValue
+
+
+def will(action: ActionValue, place: LandmarkName | None = None) -> dict[str, object]:
+    return Proposition.of(Predicate.WILL, action=action, place=place).to_json()
+
+
+def directions(*events):
+    return list(directions_of(drive(*events)))
+
+
+def test_steps_and_places_of_a_direction_are_counted():
+    rows = [will(A.J_TURN, LandmarkName.KFC), will(A.LANE_FOLLOW)]
+    assert directions(human(5.0, "left at the KFC, then straight on", M.INSTRUCT, A.J_TURN, meaning=rows)) == [
+        GivenDirection(steps=2, names_place=True)
+    ]
+
+
+def test_other_orders_and_remarks_are_no_directions():
+    slower = human(5.0, "slow down", M.INSTRUCT, A.SPEED_CHANGE, meaning=[will(A.SPEED_CHANGE)])
+    remark = human(9.0, "we turned left", M.EXPLAIN, A.J_TURN, meaning=[will(A.J_TURN)])
+    assert directions(slower, remark) == []
