@@ -46,19 +46,18 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
     state.guidance = replace(state.guidance, passes=state.guidance.passes + passed)
     passes, goal = state.guidance.passes, state.task.goal
     if state.route.misses < IN_VAIN or goal is None:
-        if passed:
-            state.say_only(*_more_slowly(state, view))
+        slower = _more_slowly(state, view) if passed else ()
+        if slower:
+            state.say_only(*slower)
         return
     if passed and passes >= IN_VAIN:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
         elided, wording = ("place", "times"), Wording(topic="passed_again")
-        reason: Remark | None = intend(
-            CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view)
-        )
+        reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
     else:
         here = section(state.town, view.lane)
         been_here = state.route.driven.count(here) >= IN_VAIN
-        reason = _in_vain(view, None, "tried") if been_here else None
+        reason = _in_vain(view, None, "been_here" if been_here else "tried")
     _try_another_way(state, view, reason)
     state.say(*(replace(slower, joined=True) for slower in _more_slowly(state, view)))
 
@@ -123,8 +122,8 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
     return intend(CommunicativeFunction.INFORM, tried, elided=("action", "times"), wording=wording, expires=_soon(view))
 
 
-def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark | None) -> None:
-    """Plans a route that avoids manoeuvres, each time at a larger detour, and says why if there is a reason to say."""
+def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
+    """Plans a route that avoids manoeuvres, each time at a larger detour, and says why."""
     progress = state.route.to_goal
     cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, IN_VAIN))
     state.guidance = replace(state.guidance, retries=state.guidance.retries + 1)
@@ -135,8 +134,8 @@ def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Rem
     turns_round = progress.turns_round_first(state.town, view.station)
     another = Proposition.of(Predicate.WILL, action=ActionValue.U_TURN if turns_round else None)
     wording = Wording(topic="once_more" if turns_round else "another_way")
-    way = intend(CommunicativeFunction.REQUEST, another, elided=("action",), wording=wording, joined=reason is not None)
-    state.say_only(*(() if reason is None else (reason,)), way)
+    way = intend(CommunicativeFunction.REQUEST, another, elided=("action",), wording=wording, joined=True)
+    state.say_only(reason, way)
 
 
 def _soon(view: ParticipantView) -> float:

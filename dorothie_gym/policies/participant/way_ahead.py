@@ -22,7 +22,6 @@ from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.hints import FAMOUS
 from dorothie_gym.policies.participant.orders import FUNCTIONS
-from dorothie_gym.policies.participant.state import StepKey
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.plan_contents import content_of
 from dorothie_gym.policies.road_ahead import Crossing, RoadAhead
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Leg, Place
     from dorothie_gym.maps.town import Town
     from dorothie_gym.ontology.dialogue_acts import DialogueMove
-    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
     from dorothie_gym.policies.participant.view import ParticipantView
 
 MOST_STEPS: Final = 4
@@ -62,7 +61,7 @@ class WayStep:
         wording: topic and particulars of its words.
     """
 
-    keys: tuple[StepKey, ...]
+    keys: tuple[tuple[str, int, int], ...]
     step: PlanStep
     wording: Wording
 
