@@ -109,9 +109,11 @@ _REPAIRING: Final = frozenset(
     }
 )
 """Words of which a correction has one; others need not be tried."""
-_FORBIDDING: Final = frozenset({"never", "don't", "dont"})
+_FORBIDDING: Final = frozenset({"never", "don't", "dont", "please"})
 _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
+_SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
+_NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
 _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
@@ -176,6 +178,7 @@ def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: Dia
     words = parsed.masked.split()
     if after in _ANSWERED and words[:1] in (["not"], ["ain't"]) and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N
+    words = words[2:] if words[1:2] == [","] and words[0] in _SIGHS else words
     if words[:1] == ["i"] and words[1:2] in _FEELING and not parsed.values and words[2:3] != ["to"]:
         return DialogueMove.IRRELEVANT if move is DialogueMove.EXPLAIN else move
     stated = set(parse.moods) == {ClauseMood.STATEMENT} and not any(
@@ -230,13 +233,13 @@ def _runs_on(parsed: ParsedText) -> bool:
 
 def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     """Returns whether what looks like a "no" or a question forbids or corrects: "never stop on a bridge"."""
-    if parsed.question or parsed.parse is None or move not in (DialogueMove.REPLY_N, DialogueMove.QUERY_YN):
+    if parsed.question or parsed.parse is None or move not in _NO_ORDERS:
         return False
     words = parsed.masked.split()
     corrected = bool(parsed.plan.steps) and words[:3] == ["no", ",", "not"]
     repaired = corrected or (parsed.parse.repaired and bool(parsed.plan.steps))
     denied = bool(parsed.parse.denied) and (words[0] in _FORBIDDING or words[1:2] == ["#acting"])
-    return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith("no turning")
+    return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(("no turning", "no more"))
 
 
 def _first_answer(parsed: ParsedText) -> DialogueMove | None:

@@ -241,12 +241,14 @@ def understand(text: str) -> ParsedText:
 
 def _meant(named: list[SlotValue], actions: Sequence[ActionValue], parse: PlanParse, joined: str) -> list[SlotValue]:
     """Returns the values that the words name, with somebody who is to be fetched, and without withdrawn orders."""
-    found = [value for value in named if value is not ObjectClass.UNLABELED or not _VAGUE.search(joined)]
+    found: list[SlotValue] = [
+        value for value in named if value is not ObjectClass.UNLABELED or not _VAGUE.search(joined)
+    ]
     if parse.person:
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)
     if parse.cancelled and _TICKED.search(joined):
-        found = [value for value in found if value is not GoalStatus.ABANDONED] + [GoalStatus.COMPLETE]
+        found = [GoalStatus.COMPLETE, *(value for value in found if value is not GoalStatus.ABANDONED)]
     if parse.cancelled and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
         found.append(GoalStatus.ABANDONED)  # "drop the KFC"
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)

@@ -177,6 +177,9 @@ class _Reader(QuantityReader):
         place += hand
         if self.word_at(place) == "most":
             place += 1
+        if self.word_at(place) in ("a", "one") and self.word_at(place + 1) == "lane":
+            self.items.append(LaneItem(direction))  # "move left a lane"
+            return place + 2
         changed = preposition == "to" and self.word_at(begin - 1) in ("change", "changing", "switch", "switching")
         if changed or self.word_at(place) in ("lane", "lanes", "file") or self.word_at(begin - 1) in ("lane", "lanes"):
             self.items.append(LaneItem(direction))

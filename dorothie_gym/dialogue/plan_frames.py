@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -20,7 +21,7 @@ from dorothie_gym.dialogue.routes import (
 from dorothie_gym.errors import OntologyError
 
 if TYPE_CHECKING:
-    from dorothie_gym.ontology.slots import LandmarkName
+    from dorothie_gym.ontology.slots import LandmarkName, StreetName
 
 NEEDING_PLACE: Final = frozenset({StepAction.FOLLOW, StepAction.VISIT, StepAction.AVOID})
 """Actions that need a place."""
@@ -129,6 +130,7 @@ class PlanState:
         self.forbidding = False
         self.contingent = False  # whether the rest of the sentence depends on a condition of the world
         self.conditional = False  # whether there has been such a condition
+        self.counting = False  # whether the last item is an opportunity to turn
         self.preceded = False  # whether other errands come before the next one: "before we go to the KFC"
 
     def close(self) -> None:
@@ -249,8 +251,11 @@ class PlanState:
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
+        first = _errand_before(frame)
+        if first is not None:
+            frame.relation = frame.at = None
         step = frame.step()
-        return [] if step is None else [step]
+        return [other for other in (first, step) if other is not None]
 
     def _negate_step(self, frame: Frame) -> bool:
         """Negates a step, such as a forbidden street to one to avoid; returns whether a step is left."""
@@ -273,6 +278,14 @@ class PlanState:
         if frame.action is StepAction.LIGHTS:
             frame.change = StepChange.OFF if frame.change is StepChange.ON else StepChange.ON
         return frame.action in (StepAction.SPEED, StepAction.LIGHTS)
+
+
+def _errand_before(frame: Frame) -> PlanStep | None:
+    """Returns the errand that comes before another one, and takes it out of it: "after the KFC we do the Shell"."""
+    waits = frame.action is StepAction.VISIT and frame.borrowed and frame.relation is ConditionRelation.AFTER
+    if not waits or frame.at is None or frame.at.landmark is None or frame.place is None:
+        return None
+    return PlanStep(action=StepAction.VISIT, place=frame.at)
 
 
 def append_step(steps: list[PlanStep], step: PlanStep) -> None:
@@ -303,3 +316,10 @@ def _is_side_of_lane(first: PlanStep, second: PlanStep) -> bool:
         return False
     turn = first if first.action is StepAction.TURN else second
     return first.direction is second.direction and turn.to_json().keys() == {"action", "direction"}
+
+
+def with_details(
+    place: PlaceReference, *, side: Direction | None = None, street: StreetName | None = None
+) -> PlaceReference:
+    """Returns the place with a side of the street, or with its street."""
+    return dataclasses.replace(place, side=side or place.side, street=street or place.street)

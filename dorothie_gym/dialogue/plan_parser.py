@@ -27,7 +27,7 @@ from dorothie_gym.dialogue.plan_items import (
     VerbItem,
     WordItem,
 )
-from dorothie_gym.dialogue.plan_places import FETCHING
+from dorothie_gym.dialogue.plan_places import FETCHING, PlaceReader
 from dorothie_gym.dialogue.plan_turns import TurnReader
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import (
@@ -125,7 +125,7 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(TurnReader):
+class _Builder(TurnReader, PlaceReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, PlanState
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, PlanState, with_details
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
-from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import ConditionItem, NounPhrase
-    from dorothie_gym.dialogue.realization_context import Direction
 
 _INITIAL: Final = frozenset(
     {"take", "makes", "make", "turn", "hang", "swing", "go", "want", "need", "have", "get", "be", "do"}
@@ -37,7 +35,6 @@ class PlaceReader(PlanState):
         super().__init__()
         self.last_place: PlaceReference | None = None
         self.person = False  # whether somebody is to be fetched
-        self.counting = False  # whether the last item is an opportunity to turn
 
     def read_condition(self, item: ConditionItem) -> None:
         """Reads a condition, for the current step or for the next one."""
@@ -273,10 +270,3 @@ class PlaceReader(PlanState):
 
 def _names_only_street(place: PlaceReference) -> bool:
     return place.to_json().keys() == {"street"}
-
-
-def with_details(
-    place: PlaceReference, *, side: Direction | None = None, street: StreetName | None = None
-) -> PlaceReference:
-    """Returns the place with a side of the street, or with its street."""
-    return dataclasses.replace(place, side=side or place.side, street=street or place.street)

@@ -89,7 +89,8 @@ def _sentence(text: str) -> Sentence | None:
     if not said:
         return None
     mentions, masked = find_names(said, statuses=False)
-    words = [_PERSON if word in _strangers(text) else word for word in mask_directions(masked, lists)]
+    strangers = _strangers(text)
+    words = [_PERSON if word in strangers else word for word in mask_directions(masked, lists)]
     names = {mention.start: mention.value for mention in mentions}
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING
-from dorothie_gym.dialogue.plan_places import PlaceReader, with_details
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, PlanState, with_details
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, StepAction
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import LaneItem, SideItem, TurnItem
 
 
-class TurnReader(PlaceReader):
+class TurnReader(PlanState):
     """Reads the turns, lanes and sides of a plan."""
 
     def __init__(self) -> None:
