@@ -5,14 +5,8 @@ from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps import LinkType, load_town
 from dorothie_gym.maps.town import LightColour
 from dorothie_gym.policies.participant.state import TaskProgress
-from dorothie_gym.policies.route_progress import (
-    RouteProgress,
-    RouteState,
-    find_exit,
-    light_ahead,
-    next_choice,
-    stopping_distance,
-)
+from dorothie_gym.policies.route_progress import RouteProgress, find_exit, light_ahead, next_choice, stopping_distance
+from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.route_tables import is_choice
 
 TOWN = load_town("brookside")
