@@ -239,7 +239,9 @@ def understand(text: str) -> ParsedText:
     )
 
 
-def _meant(named: Sequence[SlotValue], actions: Sequence[ActionValue], parse: PlanParse, joined: str) -> list[SlotValue]:
+def _meant(
+    named: Sequence[SlotValue], actions: Sequence[ActionValue], parse: PlanParse, joined: str
+) -> list[SlotValue]:
     """Returns the values that the words name, with somebody who is to be fetched, and without withdrawn orders."""
     found: list[SlotValue] = [
         value for value in named if value is not ObjectClass.UNLABELED or not _VAGUE.search(joined)
