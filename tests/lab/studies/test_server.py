@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import time
@@ -21,8 +22,10 @@ from tests.lab.studies.serving import Client, ServedStudy, at_once, seat
 
 
 def remains(folder: Path, text: str) -> list[str]:
-    """Names the files of a folder that hold a text."""
-    return [path.name for path in folder.rglob("*") if path.is_file() and text.encode() in path.read_bytes()]
+    """Names the files of a folder that hold a text; looks again where a server removes one meanwhile."""
+    while True:
+        with contextlib.suppress(FileNotFoundError):
+            return [path.name for path in folder.rglob("*") if path.is_file() and text.encode() in path.read_bytes()]
 
 
 def exported(data: Path, out: Path, table: str) -> list[dict[str, str]]:
