@@ -288,6 +288,9 @@ def test_misheard_orders_have_plans():
         ("before we drive to the KFC, take us to the Shell", [step("visit", place=SHELL), step("visit", place=KFC)]),
         ("skip the first left and take the second", [step("turn", direction="left", ordinal=2)]),
         ("instead of the KFC take me to the Shell", [step("visit", place=SHELL)]),
+        ("the second we spot the Shell go left", [step("turn", "seen", SHELL, direction="left")]),
+        ("I had hoped you'd take Fuller", [step("follow", place={"street": "Fuller"})]),
+        ("we're hoping you'll turn right at the bridge", [step("turn", AT, BRIDGE, direction="right")]),
     ],
 )
 def test_politeness_and_order_do_not_change_what_is_asked(text, steps):
@@ -305,6 +308,12 @@ def test_politeness_and_order_do_not_change_what_is_asked(text, steps):
 def test_what_is_told_of_other_days_orders_nothing(text):
     assert planned(text).steps == ()
     assert guess_spans(text)[0].act.move is not DialogueMove.INSTRUCT
+
+
+def test_a_farewell_to_the_car_names_no_car():
+    for text in ("bye bye car", "good night car", "hiya car"):
+        assert not understand(text).objects
+        assert guess_spans(text)[0].act.move is not DialogueMove.EXPLAIN
 
 
 def test_times_of_day_are_no_speeds():
