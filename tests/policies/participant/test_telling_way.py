@@ -1,9 +1,11 @@
 import dataclasses
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.heard_utterance import heard_utterance
@@ -82,18 +84,34 @@ def test_steps_of_a_former_way_are_announced():
     assert not needs_no_reminder(drive.state, drive.view, KEY, np.random.default_rng(0))
 
 
+def several_steps_of(manner, seeds):
+    """Counts the directions with several turns that a participant gives in sessions."""
+    count, traits = 0, {"directions": manner, "knowledge": (1.0, 1.0), "talkativeness": (1.0, 1.0)}
+    for seed in seeds:
+        played = play(seed, decisions=500, policies={"participant": ScriptedParticipant(traits=traits)})
+        acts = Counter(
+            event.data["end"]
+            for event in played.events
+            if event.type == "DialogueMove" and event.source is Role.PARTICIPANT and event.data["move"] == "Instruct"
+            if any(row["predicate"] == "will" and row.get("action") == "JTurn" for row in event.data.get("meaning", []))
+        )
+        count += sum(turns > 1 for turns in acts.values())
+    return count
+
+
 @pytest.mark.long
-def test_personas_who_plan_describe_several_steps():
-    steps = {"turns": [], "vague": []}
-    for manner, found in steps.items():
-        traits = {"directions": manner, "knowledge": (1.0, 1.0), "talkativeness": (1.0, 1.0)}
-        for seed in (2, 3, 5, 8):
-            played = play(seed, decisions=500, policies={"participant": ScriptedParticipant(traits=traits)})
-            acts: dict[float, int] = {}
-            for event in played.events:
-                meaning = event.data.get("meaning", []) if event.source is Role.PARTICIPANT else []
-                turns = [row for row in meaning if row["predicate"] == "will" and row.get("action") == "JTurn"]
-                if event.type == "DialogueMove" and event.data["move"] == "Instruct" and turns:
-                    acts[event.data["end"]] = acts.get(event.data["end"], 0) + 1
-            found += acts.values()
-    assert sum(count > 1 for count in steps["turns"]) > sum(count > 1 for count in steps["vague"])
+@pytest.mark.parametrize("manner", ["turns", "streets"])
+def test_personas_who_plan_describe_several_steps(manner):
+    assert several_steps_of(manner, seeds=(2, 3, 4, 10, 11)) >= 3
+
+
+def test_personas_who_plan_lead_more_often_than_vague_ones():
+    town = load_town("brookside")
+    leads = {
+        manner: [
+            ScriptedParticipant(traits={"directions": manner}).initial_state(seed, town).style.leads
+            for seed in range(20)
+        ]
+        for manner in ("turns", "landmarks", "vague")
+    }
+    assert min(leads["turns"] + leads["landmarks"]) > max(leads["vague"])
