@@ -8,23 +8,12 @@ from typing import TYPE_CHECKING, Final, Literal
 from dorothie_gym.dialogue.clause_moods import ORDERED
 from dorothie_gym.dialogue.directions import RouteTurn
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.dialogue.routes import ConditionRelation, PlanStep, StepAction, StepChange
+from dorothie_gym.dialogue.routes import ACTION_VALUES, ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology.slots import ActionValue
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
 
-_VALUES: Final = {
-    StepAction.TURN: ActionValue.J_TURN,
-    StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
-    StepAction.LANE: ActionValue.LANE_SWITCH,
-    StepAction.U_TURN: ActionValue.U_TURN,
-    StepAction.STOP: ActionValue.STOP,
-    StepAction.WAIT: ActionValue.STOP,
-    StepAction.GO: ActionValue.START,
-    StepAction.SPEED: ActionValue.SPEED_CHANGE,
-    StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
-}
 _WEAK: Final = frozenset({ActionValue.LANE_FOLLOW, ActionValue.START})
 """Actions that are read only where the words name no other."""
 
@@ -41,7 +30,8 @@ def named_actions(actions: Sequence[ActionValue], parse: PlanParse) -> tuple[Act
         parse: steps of the text.
     """
     steps = [step.action for step in parse.plan]
-    read = {_VALUES[action] for action in (*steps, *parse.denied) if action in _VALUES and action not in parse.implied}
+    asked = {*steps, *parse.denied} - set(parse.implied)
+    read = {ACTION_VALUES[action] for action in asked if action in ACTION_VALUES}
     if ActionValue.U_TURN in read and ActionValue.J_TURN in actions and ActionValue.U_TURN not in actions:
         read = (read - {ActionValue.U_TURN}) | {ActionValue.J_TURN}  # "turn back at the junction"
     if any(step.change in _OPPOSITES for step in parse.plan):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dorothie_gym.ontology.slots import SlotValue
 
 _BEHIND_SPEED: Final = frozenset(
-    [
+    {
         "",
         ",",
         "?",
@@ -30,7 +30,7 @@ _BEHIND_SPEED: Final = frozenset(
         "once",
         "max",
         "tops",
-    ]
+    }
 )
 """Words behind a number that is a speed."""
 _LEAST_SPEED: Final = 5
@@ -85,23 +85,7 @@ class QuantityReader:
             return True
         last = self.items[-1] if self.items else None
         changing = isinstance(last, ActionItem) and last.kind in ("slower", "faster", "speed")
-        ends = word in (
-            "",
-            ",",
-            "?",
-            "when",
-            "at",
-            "until",
-            "till",
-            "by",
-            "before",
-            "after",
-            "and",
-            "then",
-            "please",
-            "once",
-        )
-        return changing and ends and following != "the"
+        return changing and word in _BEHIND_SPEED and following != "the"
 
     def _speed(self, speed: float, *, unit: bool) -> None:
         self.items.append(SpeedItem(max(1, round(speed)), unit))

@@ -91,6 +91,11 @@ def named_streets(act: DialogueAct) -> tuple[StreetName, ...]:
     return tuple(name for name in values if isinstance(name, StreetName) and name not in unnamed)
 
 
+def named_landmarks(act: DialogueAct) -> tuple[LandmarkName, ...]:
+    """Returns the landmarks that an act names, "unknown" and "queried" among them."""
+    return tuple(name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName))
+
+
 def arguments_of(content: Proposition, *kept: str) -> tuple[str, ...]:
     """Returns the names of the arguments of a content, except some: those that a short answer omits."""
     return tuple(name for name, _ in content.arguments if name not in kept)

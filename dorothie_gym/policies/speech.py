@@ -39,6 +39,9 @@ MEMORY = 6
 IN_A_ROW = 15.0
 """Silence after which a repair is over [s]."""
 
+IN_REPLY = 6.0
+"""Time within which an utterance is a reaction to the last remark [s]."""
+
 REWORDINGS = 4
 """Number of draws of other words for a remark whose words have just been said."""
 
@@ -209,6 +212,10 @@ class SpeechState:
     def turns_of_repair(self, now: float) -> int:
         """Returns the number of turns that the speaker has spent on the present repair at a time [s]."""
         return self.repairs if self.has_just_spoken(now, IN_A_ROW) else 0
+
+    def may_be_asked_for(self, now: float) -> bool:
+        """Returns whether the last remark was just made and not repeated yet, so that the other may not know it [s]."""
+        return self.has_just_spoken(now, IN_REPLY) and not self.turns_of_repair(now)
 
     @property
     def last_content(self) -> Remark | None:

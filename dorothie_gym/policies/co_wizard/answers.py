@@ -324,3 +324,45 @@ def _name_street(state: CoWizardState, view: CoWizardView) -> None:
         state.say(intend(Function.UNCERTAIN_ANSWER))
     else:
         state.say(intend(Function.ANSWER, Proposition.of(Predicate.ON_STREET, street=street)))
+
+
+def answer_check(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Confirms or denies what the participant checks.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        act: the check.
+        words: what was heard.
+        rng: random generator of the decision.
+    """
+    checked = _checked(state, act, words)
+    held = believes(state.knowledge, view, checked)
+    elided = act_builders.arguments_of(checked)
+    if held is None:
+        state.say(intend(Function.UNCERTAIN_ANSWER, checked, elided=elided))
+        return
+    said = intend(
+        Function.CONFIRM if held else Function.NEGATIVE_ANSWER, checked if held else checked.opposite, elided=elided
+    )
+    state.say(said, *plan_remark(state, view, rng, joined=True))
+
+
+def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
+    """Returns the subject of a check by the participant: a street, an action, or a named or current destination."""
+    places, streets, actions = (
+        act_builders.named_landmarks(act),
+        act_builders.named_streets(act),
+        act.values(Slot.ACTION),
+    )
+    if places:
+        return act_builders.destination(places[0])
+    if streets:
+        return Proposition.of(Predicate.ON_STREET, street=streets[0])
+    if words.asked is not None:
+        return words.asked
+    if actions:
+        return Proposition.of(Predicate.DOES, action=actions[0])
+    return act_builders.destination(state.beliefs.goal)

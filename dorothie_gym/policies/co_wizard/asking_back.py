@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 TWICE = 2
 """Number of failures after which the car stops rather than asks."""
 
-IN_REPLY = 6.0
-"""Time within which an utterance is a reaction to the last remark [s]."""
-
 
 def ask_back(state: CoWizardState, view: CoWizardView, words: ParsedText, *, question: bool = False) -> None:
     """Reacts to an utterance that was not understood.
@@ -81,8 +78,7 @@ def explain_differently(state: CoWizardState, view: CoWizardView, words: ParsedT
 
 def _may_be_asked_back(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
     """Returns whether the participant has probably not understood the last remark, which was not repeated yet."""
-    just_spoken = state.speech.has_just_spoken(view.time, IN_REPLY) and not state.speech.turns_of_repair(view.time)
-    return just_spoken and resembles_request_to_repeat(words.text)
+    return state.speech.may_be_asked_for(view.time) and resembles_request_to_repeat(words.text)
 
 
 def _has_just_asked(state: CoWizardState) -> bool:

@@ -16,8 +16,14 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
-from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no, asks_to_act, switch_lights_on
+from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, sign_of_hearing
+from dorothie_gym.policies.co_wizard.answers import (
+    answer_check,
+    answer_open,
+    answer_yes_no,
+    asks_to_act,
+    switch_lights_on,
+)
 from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
 from dorothie_gym.policies.co_wizard.goals import (
@@ -37,7 +43,6 @@ from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, is_plain_sign, still_due
 from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts, settle_with_order, take_plan
-from dorothie_gym.policies.co_wizard.proposition_truth import believes
 from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,
     check_goal,
@@ -198,7 +203,7 @@ def _obey(
 def _instructed_place(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    landmarks = _landmarks(act)
+    landmarks = act_builders.named_landmarks(act)
     statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
     known = state.beliefs.exact or state.beliefs.described
     if GoalStatus.ABANDONED in statuses:
@@ -219,7 +224,7 @@ def _abandoned_place(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Abandons a place, possibly in favour of another one, now or later."""
-    landmarks = _landmarks(act)
+    landmarks = act_builders.named_landmarks(act)
     dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
     others = [name for name in landmarks if name is not dropped]
     if others and GoalStatus.PENDING in act.values(Slot.STATUS):
@@ -243,10 +248,6 @@ def _accept_change(state: CoWizardState, change: Proposition, rng: np.random.Gen
         state.say(intend(Function.POSITIVE_FEEDBACK, change, elided=act_builders.arguments_of(change)))
 
 
-def _landmarks(act: DialogueAct) -> list[LandmarkName]:
-    return [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
-
-
 def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetName) -> None:
     if state.dialogue.detour_asked_at is not None:
         state.dialogue = state.dialogue.with_detour_question(None)
@@ -267,7 +268,7 @@ def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetN
 def _explanation(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
+    landmarks, statuses = act_builders.named_landmarks(act), act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
     if _COMMANDS & set(act.values(Slot.ACTION)):
         _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
@@ -327,7 +328,7 @@ def _statement(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Reacts to a statement that changes no destination."""
-    landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
+    landmarks, statuses = act_builders.named_landmarks(act), act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
     if "wrong" in words.text.lower():
         state.feel(Happening.WRONG_WAY, view.time)
@@ -377,7 +378,7 @@ def _reply(
 
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
-    landmarks, streets, goal = _landmarks(act), act_builders.named_streets(act), state.beliefs.goal
+    landmarks, streets, goal = act_builders.named_landmarks(act), act_builders.named_streets(act), state.beliefs.goal
     if act.move is DialogueMove.CLARIFY and landmarks and goal is not landmarks[0]:
         set_goal(state, view, landmarks[0], streets, rng, corrected=True)
     elif (goal is None or state.intentions.arrived) and landmarks:
@@ -438,35 +439,6 @@ def _alignment(
         ask_back(state, view, words)
 
 
-def _check(
-    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
-) -> None:
-    checked = _checked(state, act, words)
-    held = believes(state.knowledge, view, checked)
-    elided = act_builders.arguments_of(checked)
-    if held is None:
-        state.say(intend(Function.UNCERTAIN_ANSWER, checked, elided=elided))
-        return
-    said = intend(
-        Function.CONFIRM if held else Function.NEGATIVE_ANSWER, checked if held else checked.opposite, elided=elided
-    )
-    state.say(said, *plan_remark(state, view, rng, joined=True))
-
-
-def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
-    """Returns the subject of a check by the participant: a street, an action, or a named or current destination."""
-    places, streets, actions = _landmarks(act), act_builders.named_streets(act), act.values(Slot.ACTION)
-    if places:
-        return act_builders.destination(places[0])
-    if streets:
-        return Proposition.of(Predicate.ON_STREET, street=streets[0])
-    if words.asked is not None:
-        return words.asked
-    if actions:
-        return Proposition.of(Predicate.DOES, action=actions[0])
-    return act_builders.destination(state.beliefs.goal)
-
-
 def _confusion(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
@@ -501,7 +473,7 @@ _REACTIONS: dict[
     DialogueMove.CONFIRM: _yes,
     DialogueMove.REPLY_N: _no,
     DialogueMove.ALIGN: _alignment,
-    DialogueMove.CHECK: _check,
+    DialogueMove.CHECK: answer_check,
     DialogueMove.CONFUSE: _confusion,
     DialogueMove.IRRELEVANT: _small_talk,
     DialogueMove.QUERY_YN: _yes_no_question,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.plan_words import spoken_plan
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.policies.plan_contents import content_of
+from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:

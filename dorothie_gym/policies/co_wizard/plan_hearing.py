@@ -21,7 +21,7 @@ from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING
 from dorothie_gym.policies.co_wizard.plan_objections import object_to
 from dorothie_gym.policies.co_wizard.plan_points import first_objection
-from dorothie_gym.policies.plan_contents import content_of
+from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 

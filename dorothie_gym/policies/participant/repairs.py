@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
-IN_REPLY = 6.0
-"""Time within which an utterance of the car is a reaction to the last remark [s]."""
-
 _WORTH_REPEATING = act_builders.QUESTIONS | {DialogueMove.EXPLAIN}
 """Moves whose repetition the participant requests."""
 
@@ -71,16 +68,15 @@ def ask_back(state: ParticipantState, view: ParticipantView, words: ParsedText, 
         words: what was heard.
         rng: random generator of the decision.
     """
-    just_spoken = state.speech.has_just_spoken(view.time, IN_REPLY) and not state.speech.turns_of_repair(view.time)
-    if just_spoken and resembles_request_to_repeat(words.text):
+    if state.speech.may_be_asked_for(view.time) and resembles_request_to_repeat(words.text):
         explain_again(state, view, rng)
     elif state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
-    elif not tell_way(state, view, rng):
+    elif not name_step_or_place(state, view, rng):
         state.say_first(intend(CommunicativeFunction.UNCERTAIN_ANSWER))
 
 
-def tell_way(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
+def name_step_or_place(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Names the next step to a guided car, otherwise the place and its street; returns whether it names either.
 
     Nothing is named that was named just before.
@@ -149,7 +145,7 @@ def _explain_differently(state: ParticipantState, view: ParticipantView, rng: np
     if turned and goal is not None and state.task.announced:
         state.task = state.task.after_reminding(view.time)
         state.say_only(intend(CommunicativeFunction.REQUEST, act_builders.destination(goal.name, goal.street)))
-    elif not tell_way(state, view, rng):
+    elif not name_step_or_place(state, view, rng):
         state.say_first(intend(CommunicativeFunction.INFORM, wording=Wording(topic="unimportant")))
 
 

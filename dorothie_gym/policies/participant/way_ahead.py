@@ -23,7 +23,7 @@ from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.hints import FAMOUS
 from dorothie_gym.policies.participant.orders import FUNCTIONS
 from dorothie_gym.policies.persona import Directions
-from dorothie_gym.policies.plan_contents import content_of
+from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.road_ahead import Crossing, RoadAhead
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, streets_named
 from dorothie_gym.policies.speech import Remark, intend

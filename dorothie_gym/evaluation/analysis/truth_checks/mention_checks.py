@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case
@@ -71,26 +72,27 @@ def _times(session: Session, said: Proposition, move: MoveRecord) -> float:
 
 def _visits(session: Session, since: float, until: float) -> int:
     """Returns how often the car has been where it is at the second time, since the first [s]."""
-    rows = session.trajectory
-    part = rows[(rows["frame"] >= since * FRAME_RATE) & (rows["frame"] <= until * FRAME_RATE)]
-    if not len(part):
-        return 0
-    close = np.hypot(part["x"] - part["x"][-1], part["y"] - part["y"][-1]) <= PASSING
-    return int((np.diff(close.astype(int)) == 1).sum()) + int(bool(close[0]))
+    part = _driven(session, since, until)
+    return _approaches(part, float(part["x"][-1]), float(part["y"][-1])) if len(part) else 0
 
 
 def _passes(session: Session, place: LandmarkName, since: float, until: float) -> float:
     """Returns how often the car came close to a place and left it again; infinity if its place is unknown."""
+    part = _driven(session, since, until)
+    counts = (_approaches(part, row["x"], row["y"]) for row in session.header.landmarks if row["name"] == place.label)
+    return max(counts, default=math.inf) if len(session.trajectory) else math.inf
+
+
+def _driven(session: Session, since: float, until: float) -> NDArray[np.void]:
+    """Returns the rows of the trajectory between two times [s]."""
     rows = session.trajectory
-    marks = [row for row in session.header.landmarks if row["name"] == place.label]
-    if not len(rows) or not marks:
-        return math.inf
-    part = rows[(rows["frame"] >= since * FRAME_RATE) & (rows["frame"] <= until * FRAME_RATE)]
-    counts = []
-    for mark in marks:
-        close = np.hypot(part["x"] - mark["x"], part["y"] - mark["y"]) <= PASSING
-        counts.append(int((np.diff(close.astype(int)) == 1).sum()) + int(bool(len(close)) and bool(close[0])))
-    return max(counts)
+    return rows[(rows["frame"] >= since * FRAME_RATE) & (rows["frame"] <= until * FRAME_RATE)]
+
+
+def _approaches(rows: NDArray[np.void], x: float, y: float) -> int:
+    """Returns how often the car came as close as `PASSING` to a point [m]."""
+    close = np.hypot(rows["x"] - x, rows["y"] - y) <= PASSING
+    return int(np.count_nonzero(close[1:] & ~close[:-1])) + int(close[:1].any())
 
 
 def arrival_claims(world: SessionWorld) -> Iterator[Case]:

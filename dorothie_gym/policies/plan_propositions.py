@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.routes import StepAction
-from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.dialogue.routes import ACTION_VALUES, StepAction
 from dorothie_gym.policies import act_builders
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.routes import PlanStep
-
-_WILL: Final = {
-    StepAction.TURN: ActionValue.J_TURN,
-    StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
-    StepAction.LANE: ActionValue.LANE_SWITCH,
-    StepAction.U_TURN: ActionValue.U_TURN,
-    StepAction.STOP: ActionValue.STOP,
-    StepAction.WAIT: ActionValue.STOP,
-    StepAction.GO: ActionValue.START,
-    StepAction.SPEED: ActionValue.SPEED_CHANGE,
-    StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
-}
 
 
 def content_of(step: PlanStep) -> Proposition:
@@ -35,7 +22,7 @@ def content_of(step: PlanStep) -> Proposition:
         return Proposition.of(Predicate.WILL, street=street, place=landmark, negated=True)
     return Proposition.of(
         Predicate.WILL,
-        action=_WILL.get(step.action),
+        action=ACTION_VALUES.get(step.action),
         direction=step.direction,
         street=street,
         place=landmark,
