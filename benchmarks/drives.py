@@ -133,8 +133,16 @@ def measure(
         only: beginning of the ids of the tests to play; None for all.
         towns: towns in which a start is looked for; each test begins with another one.
         progress: called with a name and the share that is done.
+
+    Raises:
+        SettingsError: the file is malformed, or has no such test.
     """
     tests = [test for test in read_tests(records, split) if only is None or test.id.startswith(only)]
+    if not tests:
+        named = "" if only is None else f" whose id begins with {only!r}"
+        raise SettingsError(
+            f"{records}: has no driving test of the split {split!r}{named}; the splits are dev and test"
+        )
     results, unplaced = [], []
     for number, test in enumerate(tests):
         progress(test.id, number / len(tests))

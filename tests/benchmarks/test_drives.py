@@ -86,3 +86,9 @@ def test_malformed_line_is_named(tmp_path: Path, line: str) -> None:
 def test_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="cannot be read"):
         read_tests(tmp_path / "none.jsonl", "dev")
+
+
+@pytest.mark.parametrize("asked", [{"split": "train"}, {"only": "nothing"}])
+def test_no_test_at_all_is_an_error(asked: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match=f"no driving test .*{next(iter(asked.values()))}"):
+        measure(progress=lambda name, share: None, **asked)
