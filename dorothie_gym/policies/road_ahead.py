@@ -90,6 +90,11 @@ class RoadAhead:
         """Returns the road along the lanes of a route, which begins with the lane of the car."""
         return cls._along(town, here, lanes)
 
+    def leads_onto(self, crossing: Crossing, streets: frozenset[int]) -> bool:
+        """Returns whether a junction leads from another street onto one of some streets, given by their indices."""
+        here = self.town.lanes[crossing.lane].street
+        return here not in streets and any(self.town.lanes[way.lane].street in streets for way in crossing.exits)
+
     @classmethod
     def _along(cls, town: Town, here: Place, lanes: tuple[int, ...]) -> RoadAhead:
         stretches: list[Stretch] = []

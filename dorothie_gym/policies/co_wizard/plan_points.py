@@ -191,7 +191,7 @@ _SIGNS: Final = frozenset({SignalKind.STOP, SignalKind.YIELD})
 
 def _locate_street(view: CoWizardView, road: RoadAhead, street: StreetName, ordinal: int) -> _Spot | Objection:
     named = streets_named(view.raw["street_names"], street)
-    found = [crossing for crossing in road.crossings if _leads_onto(road, crossing, named)]
+    found = [crossing for crossing in road.crossings if road.leads_onto(crossing, named)]
     crossing = _nth(found, ordinal)
     if crossing is not None:
         return _Spot(crossing.distance, crossing)
@@ -199,12 +199,6 @@ def _locate_street(view: CoWizardView, road: RoadAhead, street: StreetName, ordi
         return _Spot(0.0)
     crosses = Proposition.of(Predicate.ON_STREET, street=street, negated=True)
     return Objection(reason=crosses, street=street if named else None)
-
-
-def _leads_onto(road: RoadAhead, crossing: Crossing, named: frozenset[int]) -> bool:
-    """Returns whether a junction leads from another street onto a street of a name."""
-    here = road.town.lanes[crossing.lane].street
-    return here not in named and any(road.town.lanes[way.lane].street in named for way in crossing.exits)
 
 
 def _locate_reference(state: CoWizardState, road: RoadAhead, place: PlaceReference) -> _Spot | Objection:

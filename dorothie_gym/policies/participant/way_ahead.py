@@ -327,16 +327,10 @@ def _by_street(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _
     if onto is StreetName.UNKNOWN or street_of(names, state.town, turn.crossing.lane) is onto:
         return None
     named = streets_named(names["street_names"], onto)
-    first = next((one for one in turn.road.crossings if _leads_onto(state.town, one, named)), None)
+    first = next((one for one in turn.road.crossings if turn.road.leads_onto(one, named)), None)
     if first != turn.crossing:
         return None
     return _conditional(turn, ConditionRelation.AT, PlaceReference(street=onto), "way_onto")
-
-
-def _leads_onto(town: Town, crossing: Crossing, named: frozenset[int]) -> bool:
-    """Returns whether a junction leads from another street onto one of a name."""
-    other = town.lanes[crossing.lane].street not in named
-    return other and any(town.lanes[way.lane].street in named for way in crossing.exits)
 
 
 def _by_compass(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _Described:
