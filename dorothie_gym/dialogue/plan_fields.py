@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal
 
 from dorothie_gym.dialogue.clause_moods import ORDERED
 from dorothie_gym.dialogue.directions import RouteTurn
 from dorothie_gym.dialogue.realization_context import Direction
-from dorothie_gym.dialogue.routes import ACTION_VALUES, ConditionRelation, PlanStep, StepAction, StepChange
+from dorothie_gym.dialogue.routes import ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology.slots import ActionValue
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
+
+ACTION_VALUES: Final[Mapping[StepAction, ActionValue]] = MappingProxyType(
+    {
+        StepAction.TURN: ActionValue.J_TURN,
+        StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
+        StepAction.LANE: ActionValue.LANE_SWITCH,
+        StepAction.U_TURN: ActionValue.U_TURN,
+        StepAction.STOP: ActionValue.STOP,
+        StepAction.WAIT: ActionValue.STOP,
+        StepAction.GO: ActionValue.START,
+        StepAction.SPEED: ActionValue.SPEED_CHANGE,
+        StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
+    }
+)
+"""Value of the slot `Action` of each step that is an action of the car; errands and streets have none."""
 
 _WEAK: Final = frozenset({ActionValue.LANE_FOLLOW, ActionValue.START})
 """Actions that are read only where the words name no other."""

@@ -29,7 +29,7 @@ from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import ordinal as ordinal_word
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import OntologyError, did_you_mean, short_repr
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, SlotEnum, SlotValue, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotEnum, SlotValue, StreetName
 from dorothie_gym.support.copying import shared
 
 MAX_STEPS: Final = 24
@@ -65,22 +65,6 @@ class StepAction(enum.StrEnum):
     """An errand: a drive to a place, by any way."""
     WAIT = "wait"
     """A pause until a condition holds, or until the next order."""
-
-
-ACTION_VALUES: Final[Mapping[StepAction, ActionValue]] = MappingProxyType(
-    {
-        StepAction.TURN: ActionValue.J_TURN,
-        StepAction.STRAIGHT: ActionValue.LANE_FOLLOW,
-        StepAction.LANE: ActionValue.LANE_SWITCH,
-        StepAction.U_TURN: ActionValue.U_TURN,
-        StepAction.STOP: ActionValue.STOP,
-        StepAction.WAIT: ActionValue.STOP,
-        StepAction.GO: ActionValue.START,
-        StepAction.SPEED: ActionValue.SPEED_CHANGE,
-        StepAction.LIGHTS: ActionValue.LIGHT_CHANGE,
-    }
-)
-"""Value of the slot `Action` of each step that is an action of the car; errands and streets have none."""
 
 
 class ConditionRelation(enum.StrEnum):

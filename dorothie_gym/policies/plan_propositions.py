@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dorothie_gym.dialogue.plan_fields import ACTION_VALUES
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.routes import ACTION_VALUES, StepAction
+from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.policies import act_builders
 
 if TYPE_CHECKING:
