@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.maps.routing import LaneEntry
@@ -49,6 +50,26 @@ def test_second_u_turn_is_given_without_a_remark():
     human.state.guidance = replace(human.state.guidance, u_turns=1)
     guide(human.state, human.view, human.rng)
     assert Predicate.TRIED not in predicates(human)
+
+
+def test_car_that_has_not_moved_since_the_last_order_does_not_circle():
+    human = Guide(1.0)
+    before_u_turn(human)
+    human.state.guidance = replace(human.state.guidance, u_turns=2, step_at=45.0)
+    human.state.motion = replace(human.state.motion, moved_at=40.0, standing_since=40.0)
+    guide(human.state, human.view, human.rng)
+    assert Predicate.TRIED not in predicates(human)
+
+
+@pytest.mark.parametrize(("excused_until", "waits"), [(80.0, True), (0.0, False)])
+def test_car_that_has_said_what_keeps_it_is_not_told_to_turn_round_again(excused_until, waits):
+    human = Guide(1.0)
+    before_u_turn(human)
+    human.observation["speed"] = np.array([0.0])
+    human.state.motion = replace(human.state.motion, moved_at=30.0, standing_since=30.0, excused_until=excused_until)
+    human.state.guidance = replace(human.state.guidance, step_at=35.0)
+    guide(human.state, human.view, human.rng)
+    assert (human.moves() == []) is waits
 
 
 def test_place_that_was_passed_twice_is_remarked_on():

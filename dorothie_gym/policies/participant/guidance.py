@@ -147,7 +147,8 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if step is None:
         return
     key, distance, words = step
-    if _slow_down_early(state, view, rng) or (key[0] == "round" and _takes_run_up(state, view)):
+    turns_round = key[0] == "round"
+    if _slow_down_early(state, view, rng) or (turns_round and (_is_kept(state, view) or _takes_run_up(state, view))):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
     if _has_told_way(state, view, key, distance, rng):
@@ -319,6 +320,11 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
         state.route = state.route.replanned(state.town, view.place)
     _send_on(state, view)
     return True
+
+
+def _is_kept(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has not moved since the last order and has said what keeps it, so that it waits."""
+    return state.motion.moved_at <= state.guidance.step_at and view.time < state.motion.excused_until
 
 
 def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:

@@ -92,6 +92,8 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     manoeuvre = progress.next_manoeuvre(view.station)
     if manoeuvre is None or (guidance.step is None and not guidance.u_turns):
         return
+    if state.motion.moved_at <= guidance.step_at:
+        return  # a car that has not moved since the last order does not circle
     turns_again = manoeuvre[0] is LaneEntry.U_TURN and guidance.u_turns >= IN_VAIN
     asked = sum(lane == view.lane for lane, _ in guidance.lane_changes)
     if guidance.step is not None and guidance.step[:2] == ("lane", view.lane):
