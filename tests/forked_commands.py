@@ -1,7 +1,8 @@
 """Commands of the command line in processes of their own that share the time of the imports.
 
 A server process imports the package once; a command is a fork of it (`multiprocessing`'s method `forkserver`). It
-behaves as one that was started by a shell, but for signals that arrive during the imports: see `test_cli_signals`.
+behaves as one that was started by a shell, but for signals that arrive during the imports
+(see `tests/cli/test_signals.py`).
 """
 
 from __future__ import annotations

@@ -3,19 +3,28 @@
 Both signals raise `KeyboardInterrupt` in the main thread of a command. During imports before the first worker process,
 the program exits at once instead: nothing needs to be saved then, and an exception inside an import may be swallowed by
 the imported library or end in its traceback. `_startup` handles signals before the command.
+
+Python drops an exception that is raised while it runs a callback of a weak reference, a `__del__` or a callback of
+ctypes: it is given to `sys.unraisablehook` and the program goes on. A signal that arrives there is delivered again.
 """
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym._startup import exit_at_once
 
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
+_AGAIN_SECONDS: Final = 0.01  # the callback has usually ended by then; if not, the signal is delivered once more
 _SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -44,11 +53,15 @@ def raising_interrupts() -> Iterator[None]:
     handled = [number for number in _SIGNALS if signal.getsignal(number) is exit_at_once]
     for number in handled:
         signal.signal(number, _interrupt)
+    dropped = sys.unraisablehook
+    if handled:
+        sys.unraisablehook = _deliver_again
     try:
         yield
     finally:
         for number in handled:
             signal.signal(number, signal.SIG_DFL)
+        sys.unraisablehook = dropped
 
 
 def exit_code() -> int:
@@ -66,6 +79,19 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     if not _State.processes and _in_import(frame):
         exit_at_once(number, frame)
     raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
+
+def _deliver_again(dropped: UnraisableHookArgs) -> None:
+    """Delivers a signal again whose exception Python has dropped; other dropped exceptions are reported as usual.
+
+    A signal that this thread raised would be handled inside this function, where its exception is dropped again.
+    """
+    if issubclass(dropped.exc_type, KeyboardInterrupt):
+        again = threading.Timer(_AGAIN_SECONDS, _thread.interrupt_main, (_State.received,))
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 def _in_import(frame: FrameType | None) -> bool:
