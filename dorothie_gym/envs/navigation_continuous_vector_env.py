@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
-from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
+from dorothie_gym.envs.navigation.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
 from dorothie_gym.session.config import CameraConfig, RenderView
 from dorothie_gym.session.rewards import NavigationWeights, weights_of

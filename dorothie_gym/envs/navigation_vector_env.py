@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
-from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
+from dorothie_gym.envs.navigation.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance

@@ -12,8 +12,8 @@ grows:
 - Recordings have a column for each weather parameter; those without the new one are refused.
 - New members go to the end, with a number that no recording, model or layout of SDN uses.
 
-A table with an entry for each member is made with `vocabulary.complete`. Importing its module then fails with an error
-that names the missing member and the file. "What a change costs" in CONTRIBUTING.md lists the files of each change.
+A table with an entry for each member is made with `labelled_enums.complete`. Importing its module then fails with an
+error that names the missing member and the file. docs/changes.md lists the files of each change.
 """
 
 from dorothie_gym.errors import OntologyError

@@ -17,9 +17,9 @@ from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
-from dorothie_gym.policies.guidance_config import USUAL_SPEED
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
+from dorothie_gym.policies.scripted_agent_limits import USUAL_SPEED
 
 TOLD_TO_STOP: Final = Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
 """The usual reason for stopping on an instruction."""

@@ -16,9 +16,9 @@ from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
-from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import DENSE, FAR_SIGHT, Limit
 from dorothie_gym.support.portable_math import wrap_degrees

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
-from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
+from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.session.spaces.observations import (
     LandmarkColumn,
     ObjectColumn,

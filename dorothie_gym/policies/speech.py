@@ -194,6 +194,11 @@ class SpeechState:
         return not self.queue
 
     @property
+    def first(self) -> Remark | None:
+        """Returns the remark to be said next; None if no remark is queued."""
+        return self.queue[0] if self.queue else None
+
+    @property
     def has_just_asked_back(self) -> bool:
         """Returns whether the last remark said that the other speaker was not understood."""
         return self.last is not None and self.last.act.move is DialogueMove.CONFUSE

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
 from dorothie_gym.maps.town import LightColour, Town
-from dorothie_gym.policies.guidance_config import STANDING_SPEED
+from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.route_progress import RouteProgress

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.routing import crowds, cuts_off
+from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
@@ -65,23 +66,10 @@ class ExceptionExecutor:
 
     def __init__(self, world: World, task: TaskState, max_props: int) -> None:
         self._world, self._task, self._max_props = world, task, max_props
-        self._handlers: dict[ExceptionKind, Callable[[AdWizardAction], Outcome]] = {
-            ExceptionKind.WEATHER: self._weather,
-            ExceptionKind.SPAWN_VEHICLES: self._spawn,
-            ExceptionKind.SPAWN_PEDESTRIANS: self._spawn,
-            ExceptionKind.PLACE_PROP: self._place_prop,
-            ExceptionKind.MOVE_PROP: self._move_prop,
-            ExceptionKind.DELETE_PROP: self._delete_prop,
-            ExceptionKind.SENSOR_FAULT: self._fault,
-            ExceptionKind.TASK_TRIGGER: self._change_task,
-            ExceptionKind.TASK_DELETE: self._change_task,
-            ExceptionKind.TASK_CHANGE: self._change_task,
-            ExceptionKind.MESSAGE: self._message,
-        }
 
     def execute(self, action: AdWizardAction) -> Outcome:
         """Executes an exception other than NONE; returns its event data, or the reason of a refusal."""
-        return self._handlers[action.exception](action)
+        return HANDLERS[action.exception](self, action)
 
     # --- environment ------------------------------------------------------------------------------------------------
 
@@ -240,6 +228,29 @@ class ExceptionExecutor:
         if cuts_off(town, (world.planner.lane, world.planner.station), standing, (lane.id, station)):
             return "it would cut every way to a place where a landmark may be"
         return None
+
+
+Handler: TypeAlias = Callable[[ExceptionExecutor, "AdWizardAction"], "Outcome"]
+
+HANDLERS: Final[Mapping[ExceptionKind, Handler]] = complete(
+    {
+        ExceptionKind.WEATHER: ExceptionExecutor._weather,
+        ExceptionKind.SPAWN_VEHICLES: ExceptionExecutor._spawn,
+        ExceptionKind.SPAWN_PEDESTRIANS: ExceptionExecutor._spawn,
+        ExceptionKind.PLACE_PROP: ExceptionExecutor._place_prop,
+        ExceptionKind.MOVE_PROP: ExceptionExecutor._move_prop,
+        ExceptionKind.DELETE_PROP: ExceptionExecutor._delete_prop,
+        ExceptionKind.SENSOR_FAULT: ExceptionExecutor._fault,
+        ExceptionKind.TASK_TRIGGER: ExceptionExecutor._change_task,
+        ExceptionKind.TASK_DELETE: ExceptionExecutor._change_task,
+        ExceptionKind.TASK_CHANGE: ExceptionExecutor._change_task,
+        ExceptionKind.MESSAGE: ExceptionExecutor._message,
+    },
+    [kind for kind in ExceptionKind if kind is not ExceptionKind.NONE],
+    "HANDLERS",
+    __name__,
+)
+"""Method that executes an exception, by kind."""
 
 
 def _xy(prop: Prop) -> dict[str, float]:

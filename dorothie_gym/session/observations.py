@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology.dialogue_acts import encode_slots
+from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor
@@ -47,15 +48,40 @@ if TYPE_CHECKING:
 RoleMask: TypeAlias = dict[str, Mask | tuple[Mask, ...] | None]
 """Mask of a role's action space, by field; None for fields without a mask."""
 
-ALWAYS_FEASIBLE = (
-    ExceptionKind.NONE,
-    ExceptionKind.WEATHER,
-    ExceptionKind.SPAWN_VEHICLES,
-    ExceptionKind.SPAWN_PEDESTRIANS,
-    ExceptionKind.SENSOR_FAULT,
-    ExceptionKind.MESSAGE,
+
+@dataclass(frozen=True, kw_only=True)
+class PropCount:
+    """Number of props in a session.
+
+    Attributes:
+        placed: number of props in the town.
+        most: number of props that may be there.
+    """
+
+    placed: int
+    most: int
+
+
+FEASIBLE: Final[Mapping[ExceptionKind, Callable[[TaskState, PropCount], bool]]] = complete(
+    {
+        ExceptionKind.NONE: lambda task, props: True,
+        ExceptionKind.WEATHER: lambda task, props: True,
+        ExceptionKind.SPAWN_VEHICLES: lambda task, props: True,
+        ExceptionKind.SPAWN_PEDESTRIANS: lambda task, props: True,
+        ExceptionKind.PLACE_PROP: lambda task, props: props.placed < props.most,
+        ExceptionKind.MOVE_PROP: lambda task, props: props.placed > 0,
+        ExceptionKind.DELETE_PROP: lambda task, props: props.placed > 0,
+        ExceptionKind.SENSOR_FAULT: lambda task, props: True,
+        ExceptionKind.TASK_TRIGGER: lambda task, props: bool(task.possible_triggers()),
+        ExceptionKind.TASK_DELETE: lambda task, props: bool(task.possible_deletions()),
+        ExceptionKind.TASK_CHANGE: lambda task, props: bool(task.possible_changes()),
+        ExceptionKind.MESSAGE: lambda task, props: True,
+    },
+    ExceptionKind,
+    "FEASIBLE",
+    __name__,
 )
-"""Exceptions that are feasible at any time for some arguments."""
+"""Whether an exception of a kind is feasible now for some arguments."""
 
 
 class ActionMasks(CachedViews):
@@ -87,8 +113,6 @@ class ActionMasks(CachedViews):
                 masks["metres"][int(longest) + 1 :] = 0
             if "plan" in masks:
                 masks["plan"][:, len(town.junctions) + 1 :] = 0
-        self._exceptions[:] = 0
-        self._exceptions[[int(kind) for kind in ALWAYS_FEASIBLE]] = 1
         self._task_state = (-1, -1)
 
     @cached_property
@@ -115,12 +139,9 @@ class ActionMasks(CachedViews):
         if (task.version, props) == self._task_state:
             return
         self._task_state = task.version, props
-        mask = self._exceptions
-        mask[ExceptionKind.PLACE_PROP] = props < self._views.most_props
-        mask[ExceptionKind.MOVE_PROP] = mask[ExceptionKind.DELETE_PROP] = props > 0
-        mask[ExceptionKind.TASK_TRIGGER] = bool(task.possible_triggers())
-        mask[ExceptionKind.TASK_DELETE] = bool(task.possible_deletions())
-        mask[ExceptionKind.TASK_CHANGE] = bool(task.possible_changes())
+        counted = PropCount(placed=props, most=self._views.most_props)
+        for kind, feasible in FEASIBLE.items():
+            self._exceptions[kind] = feasible(task, counted)
 
 
 # --- Observations -----------------------------------------------------------------------------------------------------
@@ -159,7 +180,7 @@ class ObservationBuilder(CachedViews):
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_tables",)
 
     def __init__(self, views: SessionViews, scenario: Scenario, task: TaskState, beliefs: BeliefTracker) -> None:
-        """Writes the constant masks of the session.
+        """Writes the constant observations of the session.
 
         Args:
             views: the row of the session.

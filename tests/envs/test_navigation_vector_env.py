@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
+from dorothie_gym.envs.navigation.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv

@@ -7,12 +7,12 @@ import pytest
 
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
-from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE
 from dorothie_gym.policies.participant.config import ParticipantConfig
 from dorothie_gym.policies.participant.guidance import guide
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.retrying import why_standing
 from dorothie_gym.policies.route_progress import RouteProgress
+from dorothie_gym.policies.scripted_agent_limits import NUDGE_DISTANCE
 from tests.policies.said import with_words
 from tests.policies.test_repairs import Human
 

@@ -10,8 +10,8 @@ from .leaderboard import labels_of as labels_of
 from .leaderboard import leaderboard_page as leaderboard_page
 from .leaderboard import read_entries as read_entries
 from .leaderboard_chart import draw_leaderboard as draw_leaderboard
-from .leaderboard_rows import LeaderboardPlan as LeaderboardPlan
-from .leaderboard_rows import usual_rows as usual_rows
+from .leaderboard_plan import LeaderboardPlan as LeaderboardPlan
+from .leaderboard_plan import usual_rows as usual_rows
 from .many_rollouts import roll_out_all as roll_out_all
 from .metrics import METRICS as METRICS
 from .metrics import PENALTIES as PENALTIES

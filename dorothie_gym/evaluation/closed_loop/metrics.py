@@ -145,7 +145,7 @@ class Infractions(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the number of exceptions) and the denominator (1) of the metric."""
+        """Returns the numerator (the number of infractions) and the denominator (1) of the metric."""
         return float(sum(count for name, count in record.infractions.items() if name in PENALTIES)), 1.0
 
 

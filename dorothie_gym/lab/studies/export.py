@@ -17,6 +17,7 @@ from dorothie_gym.archive.sound import audio_files
 from dorothie_gym.lab.studies.folder import check_folder
 from dorothie_gym.lab.studies.record_types import SESSIONS_FOLDER, STUDY_FILE
 from dorothie_gym.lab.studies.records import StudyRecords
+from dorothie_gym.lab.studies.stages import QUESTIONNAIRES
 from dorothie_gym.lab.studies.study_file import read_study
 from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import Session, session_state
@@ -121,7 +122,7 @@ def _stages(records: StudyRecords, name: str | None = None) -> Iterator[Row]:
 def _answers(study: Study, records: StudyRecords) -> Iterator[Row]:
     kinds = {
         (name, item.id): str(type(item).__struct_config__.tag)
-        for name in ("before", "after_session", "after")
+        for name in QUESTIONNAIRES.values()
         for item in study.questionnaire(name)
     }
     query = "SELECT * FROM answers ORDER BY participant, questionnaire, position, rowid"

@@ -15,6 +15,7 @@ from dorothie_gym.errors import DorothieGymError, InputFileError, PolicyLoadErro
 from dorothie_gym.lab.console.seating import Occupancy, plan_seat
 from dorothie_gym.lab.studies.expectations import explain
 from dorothie_gym.lab.studies.items import Choice, Number
+from dorothie_gym.lab.studies.stages import QUESTIONNAIRES
 from dorothie_gym.lab.studies.study import HUMAN, Method, Scenario, Study
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.support.input_files import read_text
@@ -165,7 +166,7 @@ def _faults(study: Study) -> Iterator[tuple[str, str]]:
             yield ".texts.instructions", f"the text for {role.value!r} is missing, which people play"
     if study.session.speech and study.consent.voice is None:
         yield ".consent", "field 'voice' is missing: where people can speak, they must agree that it is recorded"
-    for name in ("before", "after_session", "after"):
+    for name in QUESTIONNAIRES.values():
         items = study.questionnaire(name)
         yield from _repeated(f"questionnaires.{name}", [item.id for item in items], "id")
         for k, item in enumerate(items):

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
 from dorothie_gym.policies.persona import Driving, Persona, within
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.scripted_agent_limits import NUDGE_DISTANCE, USUAL_SPEED
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.mood import Mood

@@ -17,7 +17,7 @@ from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, sea
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.intentions import Intentions
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
-from dorothie_gym.policies.co_wizard.plan_keeping import keep_plan
+from dorothie_gym.policies.co_wizard.plan_execution import keep_plan
 from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView

@@ -11,11 +11,11 @@ import numpy as np
 
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, next_choice
 from dorothie_gym.policies.route_tables import is_choice
+from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
 

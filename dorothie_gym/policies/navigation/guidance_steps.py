@@ -12,7 +12,6 @@ from dorothie_gym.maps.model import closest_on_segment
 from dorothie_gym.maps.route_search import find_route
 from dorothie_gym.maps.routing_graph import CHANGE_LEFT, NONE, U_TURN, RoutingGraph
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.guidance_config import GuidanceConfig
 from dorothie_gym.policies.navigation.instructor_arrays import LEGS_LEFT, InstructorArrays, StepKind
 from dorothie_gym.policies.navigation.junction_exits import nearest_sector
 from dorothie_gym.policies.route_legs import (
@@ -24,6 +23,7 @@ from dorothie_gym.policies.route_legs import (
     needs_switch,
 )
 from dorothie_gym.policies.route_progress import ASTRAY, CELL_BEHIND, SAME_ROADBLOCK
+from dorothie_gym.policies.scripted_agent_limits import GuidanceConfig
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.limits import EGO_STANDING, U_TURN_SPEED, u_turn_braking
 from dorothie_gym.sim.sensing.perception import see

@@ -20,7 +20,6 @@ from dorothie_gym.policies.co_wizard.driving import CRUISE_TOLERANCE, distance_a
 from dorothie_gym.policies.co_wizard.intentions import Wish
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, GuidanceConfig
 from dorothie_gym.policies.navigation.actions import EstimatedActionMask, NavigationAction, physical_of
 from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.instructor import GuidanceStep, NavigationInstruction
@@ -29,6 +28,7 @@ from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUEN
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import stopping_distance
+from dorothie_gym.policies.scripted_agent_limits import NUDGE_DISTANCE, GuidanceConfig
 from dorothie_gym.session.spaces.actions import ActionDict, Physical
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion

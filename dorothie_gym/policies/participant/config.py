@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.policies.guidance_config import USUAL_SPEED, GuidanceConfig
 from dorothie_gym.policies.persona import Directions, Persona, within
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.scripted_agent_limits import USUAL_SPEED, GuidanceConfig
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.mood import Mood

@@ -13,7 +13,6 @@ from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.notable_conditions import PARAMETER, notice, view_remark
 from dorothie_gym.policies.observation_parser import (
@@ -27,6 +26,7 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
 

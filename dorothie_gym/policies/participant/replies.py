@@ -286,10 +286,10 @@ def _nod(
     alone: bool,
 ) -> None:
     """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
-    waiting = state.speech.queue
-    if waiting and not waiting[0].urgent and not waiting[0].text:
-        done = GoalStatus.COMPLETE in waiting[0].act.slots
-        if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
+    waiting = state.speech.first
+    if waiting is not None and not waiting.urgent and not waiting.text:
+        done = GoalStatus.COMPLETE in waiting.act.slots
+        if waiting.act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
             state.speech = state.speech.led_by(nod)
     elif (
         not alone

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology.slots import LandmarkName
-from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import (
     SeenLandmark,
     SeenObject,
@@ -16,6 +15,7 @@ from dorothie_gym.policies.observation_parser import (
     read_subgoals,
     scalar,
 )
+from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED
 from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.support import portable_math as pm
 

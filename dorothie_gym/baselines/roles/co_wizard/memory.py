@@ -21,12 +21,12 @@ from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig
 from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
-from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
 from dorothie_gym.policies.knowledge import CoWizardKnowledge, Standstill
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import Navigator
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
+from dorothie_gym.policies.scripted_agent_limits import NUDGE_DISTANCE, USUAL_SPEED
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import LanePosition, Mental

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
 from dorothie_gym.evaluation.closed_loop.leaderboard import ENOUGH
-from dorothie_gym.evaluation.closed_loop.leaderboard_rows import LeaderboardPlan, usual_rows
+from dorothie_gym.evaluation.closed_loop.leaderboard_plan import LeaderboardPlan, usual_rows
 from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol
 from dorothie_gym.maps import SEEN_TOWNS
 from dorothie_gym.ontology import Role
