@@ -28,7 +28,7 @@ from dorothie_gym.sim.batch.worlds import alone
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.decision_setup import note_props
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.pedestrians.footways import closest_walk
+from dorothie_gym.sim.pedestrians.walkway_position import closest_walk
 from dorothie_gym.sim.sensing.perception import look_around
 from dorothie_gym.sim.state.codes import Footway
 from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town

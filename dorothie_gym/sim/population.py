@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import rightmost
-from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
+from dorothie_gym.sim.pedestrians.walkway_position import closest_walk, place_beside
 from dorothie_gym.sim.randomness import POOL, seed_of
 from dorothie_gym.sim.state.codes import NOBODY, Footway, Kind, Walk
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord

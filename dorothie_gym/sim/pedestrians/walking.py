@@ -11,15 +11,6 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.network.lane_lookup import project
-from dorothie_gym.sim.pedestrians.footways import (
-    KEEP_RIGHT,
-    closest_walk,
-    enter_next,
-    find_segment,
-    locate,
-    place_beside,
-    side_kept,
-)
 from dorothie_gym.sim.pedestrians.pacing import (
     CROSSING_RATE,
     OBSTACLE_PATIENCE,
@@ -28,6 +19,15 @@ from dorothie_gym.sim.pedestrians.pacing import (
     WALK_AHEAD,
     note_progress,
     walk_towards,
+)
+from dorothie_gym.sim.pedestrians.walkway_position import (
+    KEEP_RIGHT,
+    closest_walk,
+    enter_next,
+    find_segment,
+    locate,
+    place_beside,
+    side_kept,
 )
 from dorothie_gym.sim.randomness import draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk

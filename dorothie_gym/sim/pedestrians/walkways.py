@@ -1,4 +1,4 @@
-"""Arrays of the footways of a town: pavements, footways round corners, crosswalks, footways beside streets."""
+"""Walkways of a town as arrays: pavements, ways round corners, crosswalks, strips beside streets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.lane_neighbours import LaneEdges
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Crosswalk, Lane, Sidewalk
-from dorothie_gym.sim.pedestrians.footways import street_walks
+from dorothie_gym.sim.pedestrians.walkway_position import street_walks
 from dorothie_gym.sim.state.codes import NOBODY, Footway
 from dorothie_gym.sim.state.town_records import CrossingRecord, LaneRecord, MouthRecord, PassageRecord, WalkwayRecord
 from dorothie_gym.support import portable_arrays as pn

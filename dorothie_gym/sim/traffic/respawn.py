@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.network.lane_lookup import value_near
-from dorothie_gym.sim.pedestrians.footways import place_beside
 from dorothie_gym.sim.pedestrians.walking import place_walker
+from dorothie_gym.sim.pedestrians.walkway_position import place_beside
 from dorothie_gym.sim.randomness import choose, draw
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
 from dorothie_gym.sim.traffic.junctions import light

@@ -1,4 +1,4 @@
-"""Utterances of the participant as inputs of the learned Co-Wizard: numbers and words."""
+"""Utterances of the other speaker as inputs of a learned role: numbers and words."""
 
 from __future__ import annotations
 

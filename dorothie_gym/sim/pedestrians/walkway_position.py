@@ -1,4 +1,4 @@
-"""Footways: the place of a pedestrian on one, and the footways beside streets without a pavement."""
+"""The place of a pedestrian on its walkway, and the walkways beside streets without a pavement."""
 
 from __future__ import annotations
 
