@@ -9,6 +9,7 @@ from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE
 from dorothie_gym.policies.participant.config import ParticipantConfig
+from dorothie_gym.policies.participant.given_orders import note_said
 from dorothie_gym.policies.participant.guidance import guide
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.retrying import why_standing
@@ -118,6 +119,7 @@ def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time(
     for _ in range(6):
         human.says()
         told.append(human.state.speech.queue[0].act)
+        note_said(human.state, human.view, human.state.speech.queue[0])
         human.state.speech = replace(human.state.speech.cleared(), last_end=-100.0)
         human.observation["time"] = human.observation["time"] + 10.0
     further, why, start = (

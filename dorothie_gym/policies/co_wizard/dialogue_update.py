@@ -16,7 +16,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, sign_of_hearing
+from dorothie_gym.policies.co_wizard.acknowledgement import STEERING_AWAY, acknowledge, sign_of_hearing, what_keeps
 from dorothie_gym.policies.co_wizard.answers import (
     answer_check,
     answer_open,
@@ -47,6 +47,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,
     check_goal,
     expects_stop,
+    hear_wrong_way,
     is_garbled,
     is_unclear,
     is_unclear_reply,
@@ -192,7 +193,11 @@ def _obey(
     for action in actions:
         OBEYED[action](state, view, act, words)
     answers = act.move is not DialogueMove.INSTRUCT and actions[0] in _WAYS
-    acknowledge(state, view, actions[0], words, rng, answers=answers)
+    keeps = what_keeps(state, view, actions[0])
+    if keeps is None or actions[0] in STEERING_AWAY:
+        acknowledge(state, view, actions[0], words, rng, answers=answers)
+    if keeps is not None:
+        state.say(replace(keeps, joined=not state.speech.idle))
     if ActionValue.SPEED_CHANGE in actions and words.speed is not None:
         state.say(*limit_remark(state, view, words.speed))
     note_order(state, view, actions[0])
@@ -332,11 +337,7 @@ def _statement(
     name = landmarks[0] if landmarks else None
     if "wrong" in words.text.lower():
         state.feel(Happening.WRONG_WAY, view.time)
-        if not state.beliefs.exact:
-            state.route = state.route.with_progress(None)
-        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
-        if state.beliefs.exact and state.beliefs.goal is not None:
-            state.say(intend(Function.CHECK_QUESTION, act_builders.destination(state.beliefs.goal), joined=True))
+        hear_wrong_way(state, view)
     elif _is_called_dark(words) and not view.lights:
         switch_lights_on(state)
     elif GoalStatus.PENDING in statuses and name is not None:

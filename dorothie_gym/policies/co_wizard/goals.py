@@ -17,7 +17,7 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.errand_memory import kept_for_later
-from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
+from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
@@ -202,6 +202,14 @@ def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
     state.say(intend(Function.ACCEPT, act_builders.destination(mark.name), wording=Wording(topic="taken")))
 
 
+def believed_destination(state: CoWizardState, view: CoWizardView) -> Proposition:
+    """Returns the destination for a check; where the town has several of its kind, with the street of the place."""
+    goal, place = state.beliefs.goal, state.beliefs.stop_place
+    if goal not in _COMMON or place is None:
+        return act_builders.destination(goal)
+    return act_builders.destination(goal, street_of(view.raw, state.town, place[0]))
+
+
 def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
     """Prepares a stop at a distance ahead, possibly at a named place, which the car approaches slowly.
 
@@ -296,10 +304,17 @@ def accept_street(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def search_on(state: CoWizardState, view: CoWizardView) -> None:
-    """Drops the guess of a place when the car has arrived there; from then on the car needs guidance."""
+    """Ends the way to a street, or to the guess of a place, when the car has arrived there.
+
+    From then on the car needs guidance, unless it knows its destination.
+    """
     progress = state.route.progress
-    if progress is not None and not state.beliefs.exact and progress.left(view.station) < state.config.search_radius:
+    if progress is None or progress.left(view.station) >= state.config.search_radius:
+        return
+    if not state.beliefs.exact:
         state.route = state.route.with_progress(None)
+    elif progress.goal != state.beliefs.place:
+        plan_route(state, view)
 
 
 def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:

@@ -107,10 +107,17 @@ class DialogueState:
         """Records an instruction to turn round at `now` [s]."""
         return replace(self, u_turn_instructed_at=now)
 
-    def after_order(self, action: ActionValue, now: float, since: float) -> DialogueState:
-        """Records an order at `now`, and forgets those before `since` [s]."""
-        recent = tuple(pair for pair in self.orders if pair[1] >= since)
-        return replace(self, orders=(*recent, (action, now)))
+    def after_order(self, action: ActionValue, now: float, since: float, *, done_at: float) -> DialogueState:
+        """Records an order, in place of an equal one that was not carried out.
+
+        Args:
+            action: the action.
+            now: time of the order [s].
+            since: time before which orders are forgotten [s].
+            done_at: time at which a manoeuvre was last carried out [s].
+        """
+        kept = (pair for pair in self.orders if pair[1] >= since and (pair[0] is not action or pair[1] <= done_at))
+        return replace(self, orders=(*kept, (action, now)))
 
     def with_orders_settled(self) -> DialogueState:
         """Forgets the latest orders, for a new goal or another route."""

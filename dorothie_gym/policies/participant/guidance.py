@@ -42,6 +42,7 @@ from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
+from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState, StepKey
@@ -65,6 +66,10 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
     config = state.config
     before = former.left(view.station)
     state.route = state.route.entering(state.town, view.lane)
+    if state.task.goal is not None:
+        x, y = view.position
+        away = pm.hypot(state.task.goal.x - x, state.task.goal.y - y)
+        state.guidance = state.guidance.near_place(away)
     former = former.followed(state.town, view.lane, view.station)
     if former.astray and _is_changing_for_turn(state, view):
         former = replace(former, astray=0)
@@ -104,6 +109,9 @@ def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before
     farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
     if not guidance.guiding or guidance.step is None or guidance.step[0] != "turn" or not farther:
         return
+    if state.motion.moved_at <= guidance.wrong_way_at:
+        return  # it was pointed out, and the car has not moved since
+    state.guidance = guidance.after_pointing_out(view.time)
     state.feel(Happening.WRONG_WAY, view.time)
     if not remark_on_wrong_turn(state, view, guidance.step):
         expires = view.time + WRONG_WAY_EXPIRES
