@@ -96,6 +96,8 @@ def test_travel_time_grows_with_the_way_and_includes_red_lights():
     halfway = progress.legs[len(progress.legs) // 2]
     later = progress.replanned(town, (halfway.lane, halfway.start))
     assert travel_time(town, later, halfway.start, 0.0, 8.0) < max(times)
+    slow, usual, fast = (travel_time(town, progress, 0.0, 0.0, 5.0, cruise) for cruise in (20.0, 40.0, 55.0))
+    assert 1.3 * usual < slow < 2.2 * usual and fast == usual, "lights and junctions cost the same at any speed"
     nowhere = changed(progress, route=None)
     assert travel_time(town, nowhere, 0.0, 0.0, 8.0) == float("inf")
     assert router(town).route(view_of(talk).here, progress.goal) is not None

@@ -1,0 +1,109 @@
+"""What the Co-Wizard says of orders: that they were carried out before, or that something holds it up."""
+
+from dataclasses import replace
+
+import pytest
+
+from dorothie_gym.dialogue import Predicate
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass
+from dorothie_gym.policies.co_wizard.acknowledgement import what_keeps
+from dorothie_gym.policies.co_wizard.goals import aim, believed_destination, search_on, seek_street
+from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
+from dorothie_gym.policies.co_wizard.repetition import note_order
+from dorothie_gym.policies.knowledge import Standstill
+from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.sim.state.codes import Motion
+from tests.policies.test_co_wizard import Talk
+from tests.policies.test_reasons import DRIVING, on_the_way, view_of
+
+A, M = ActionValue, DialogueMove
+
+
+def remarks(talk: Talk) -> list[Predicate]:
+    return [said.predicate for item in talk.state.speech.queue for said in item.meaning]
+
+
+def order_u_turns(talk: Talk, *, carried_out: bool, standing: bool = False) -> list[Predicate]:
+    """Orders three U-turns in a minute; the car carries them out at once, or not at all."""
+    for time in (100.0, 120.0, 140.0):
+        talk.state.standstill = Standstill(since=90.0 if standing else None)
+        note_order(talk.state, replace(view_of(talk, **DRIVING), time=time), A.U_TURN)
+        if carried_out:
+            talk.state.commands = talk.state.commands.after_manoeuvre(time + 1.0)
+    return remarks(talk)
+
+
+def test_third_order_is_remarked_on_if_the_others_were_carried_out():
+    talk = on_the_way()
+    talk.state.speech = talk.state.speech.cleared()
+    assert order_u_turns(talk, carried_out=True)[:1] == [Predicate.TRIED]
+
+
+@pytest.mark.parametrize(("carried_out", "standing"), [(False, False), (True, True)])
+def test_orders_that_the_car_could_not_carry_out_are_not_said_to_have_been(carried_out, standing):
+    talk = on_the_way()
+    talk.state.speech = talk.state.speech.cleared()
+    assert Predicate.TRIED not in order_u_turns(talk, carried_out=carried_out, standing=standing)
+
+
+@pytest.mark.parametrize(
+    ("hazard", "action", "says"),
+    [
+        (ObjectClass.VEHICLES, A.LANE_FOLLOW, True),
+        (ObjectClass.STATIC, A.U_TURN, True),
+        (ObjectClass.VEHICLES, A.STOP, False),
+        (ObjectClass.TRAFFIC_LIGHT, A.J_TURN, False),
+    ],
+)
+def test_car_that_is_held_up_says_by_what_when_it_is_told_to_drive_on(hazard, action, says):
+    talk = on_the_way()
+    view = replace(view_of(talk, **DRIVING), speed=0.0, motion=Motion.HAZARD, hazard=hazard)
+    reason = what_keeps(talk.state, view, action)
+    assert (reason is not None) is says
+    if reason is not None:
+        assert reason.meaning[0].predicate is Predicate.BECAUSE and hazard in reason.act.slots
+        assert what_keeps(talk.state, view, action) is None, "it was just said"
+    moving = replace(view, speed=5.0)
+    assert what_keeps(talk.state, moving, action) is None
+
+
+def test_wrong_way_is_checked_once_and_then_the_place_is_given_up():
+    talk = on_the_way()
+    asked = []
+    for _ in range(2 * talk.state.config.contradictions):
+        talk.state.speech = talk.state.speech.cleared()
+        hear_wrong_way(talk.state, view_of(talk, **DRIVING))
+        asked.append(M.CHECK in [item.act.move for item in talk.state.speech.queue])
+    assert asked == [True, False, False, False]
+    assert not talk.state.beliefs.exact, "the place of that name may be another one"
+
+
+def test_house_is_checked_with_its_street():
+    talk = on_the_way()
+    view = view_of(talk, **DRIVING)
+    house = next(mark for mark in view.landmarks if mark.name in (LandmarkName.HOUSE, LandmarkName.PERSON))
+    aim(talk.state, view, house)
+    assert believed_destination(talk.state, view).get("street") is house.street
+    shop = next(mark for mark in view.landmarks if mark.name not in (LandmarkName.HOUSE, LandmarkName.PERSON))
+    aim(talk.state, view, shop)
+    assert believed_destination(talk.state, view).get("street") is None
+
+
+def test_car_drives_to_its_destination_from_the_street_that_it_was_sent_to():
+    talk = on_the_way()
+    view, town = view_of(talk, **DRIVING), talk.env.town
+    goal = talk.state.beliefs.stop_place
+    streets = {street_of(view.raw, town, lane.id) for lane in town.lanes if not lane.in_junction}
+    own = {street_of(view.raw, town, view.lane), street_of(view.raw, town, goal[0])}
+    sought = next(
+        street for street in sorted(streets - own, key=lambda name: name.value) if seek_street(talk.state, view, street)
+    )
+    way = talk.state.route.to_goal
+    assert way.goal != goal and street_of(view.raw, town, way.goal[0]) is sought
+    search_on(talk.state, view)
+    assert talk.state.route.to_goal.goal == way.goal, "not there yet"
+    lane, station = way.goal
+    there = replace(view, lane=lane, station=station)
+    talk.state.route = talk.state.route.with_progress(way.replanned(town, there.here))
+    search_on(talk.state, there)
+    assert talk.state.route.to_goal.goal == goal

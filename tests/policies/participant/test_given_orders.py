@@ -1,0 +1,153 @@
+"""Orders that the participant has said: a third one at one place is admitted, and what was not said does not count."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.dialogue import Direction, Predicate, Wording
+from dorothie_gym.ontology import ActionValue, DialogueMove
+from dorothie_gym.policies.participant.arriving import creep_instruction, prepare_stop
+from dorothie_gym.policies.participant.given_orders import note_said, times_given, times_told
+from dorothie_gym.policies.participant.guidance import follow_route
+from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.reconsidering import admit_repetition, own_up
+from dorothie_gym.policies.participant.retrying import remark_on_wrong_turn
+from dorothie_gym.policies.speech import Remark
+from tests.policies.test_arriving import Guide
+
+M, A = DialogueMove, ActionValue
+
+
+def turn(side: Direction = Direction.LEFT) -> Remark:
+    return order(M.INSTRUCT, A.J_TURN, Wording(direction=side))
+
+
+def said(human: Guide, remark: Remark, times: int = 1) -> None:
+    for _ in range(times):
+        note_said(human.state, human.view, remark)
+        human.observation["time"] = human.observation["time"] + 20.0
+
+
+def queued(human: Guide, *remarks: Remark) -> list[Predicate]:
+    """Returns the predicates of what the participant is about to say, after it has looked at its orders."""
+    human.state.speech = replace(human.state.speech, queue=remarks)
+    admit_repetition(human.state, human.view)
+    return [meant.predicate for item in human.state.speech.queue for meant in item.meaning]
+
+
+def test_third_equal_order_at_one_place_is_admitted_and_the_second_is_not():
+    human = Guide(60.0, speed=6.0)
+    said(human, turn())
+    assert queued(human, turn()) == [Predicate.WILL]
+    said(human, turn())
+    assert queued(human, turn()) == [Predicate.TRIED, Predicate.WILL]
+    assert human.state.speech.queue[0].wording.topic == "said_before" and human.state.speech.queue[1].joined
+    assert queued(human, turn(Direction.RIGHT)) == [Predicate.WILL]
+
+
+def test_admission_begins_a_new_count():
+    human = Guide(60.0, speed=6.0)
+    said(human, turn(), 2)
+    queued(human, turn())
+    for remark in human.state.speech.queue:
+        said(human, remark)
+    assert times_given(human.state, human.view, turn()) == 1
+
+
+def test_order_after_a_remark_on_the_failure_needs_no_other_one():
+    human = Guide(60.0, speed=6.0)
+    said(human, turn(), 2)
+    assert remark_on_wrong_turn(human.state, human.view, ("turn", 0, 1)) is False
+    assert remark_on_wrong_turn(human.state, human.view, ("turn", 0, 1))
+    tried = human.state.speech.queue[0]
+    assert queued(human, tried, replace(turn(), joined=True)).count(Predicate.TRIED) == 1
+
+
+def test_turns_of_one_description_are_different_orders():
+    human = Guide(60.0, speed=6.0)
+    for joined in (False, True, True):
+        note_said(human.state, human.view, replace(turn(), joined=joined))
+    assert times_given(human.state, human.view, turn()) == 1
+
+
+def test_order_elsewhere_does_not_count_and_a_u_turn_counts_along_the_street():
+    human = Guide(60.0, speed=6.0)
+    round_ = order(M.INSTRUCT, A.U_TURN)
+    for remark in (turn(), round_):
+        said(human, remark, 2)
+    human.observation["pose"] = human.observation["pose"] + np.array([200.0, 0.0, 0.0])
+    assert queued(human, turn()) == [Predicate.WILL]
+    assert queued(human, round_) == [Predicate.TRIED, Predicate.WILL]
+    assert times_told(human.state, A.U_TURN) == 2 and times_told(human.state, A.LANE_SWITCH) == 0
+
+
+@pytest.mark.parametrize(("stops", "states"), [(1, False), (2, True)])
+@pytest.mark.parametrize("before", [60.0, 1.0])
+def test_third_stop_states_that_this_is_the_place(stops, states, before):
+    human = Guide(before, speed=8.0)
+    said(human, order(M.INSTRUCT, A.STOP), stops)
+    human.state.guidance = replace(human.state.guidance, stopped_at=0.0)
+    prepare_stop(human.state, human.view, before, human.rng)
+    assert human.state.guidance.points_out is states and human.state.guidance.stop_text
+
+
+def test_instruction_to_drive_on_a_little_counts_when_it_is_said():
+    human = Guide(4.0)
+    unsaid = creep_instruction(human.state, human.view)
+    assert unsaid.wording.topic == "further" and human.state.guidance.nudges == 0
+    for number in (1, 2):
+        note_said(human.state, human.view, creep_instruction(human.state, human.view))
+        assert human.state.guidance.nudges == number
+    assert creep_instruction(human.state, human.view).act.move is M.QUERY_W
+
+
+def test_car_that_follows_but_stays_short_is_told_how_far():
+    human = Guide(8.0)
+    for before in (8.0, 5.0):
+        human.put(human.state.task.destination.lane, human.state.task.destination.station - before, 0.0)
+        note_said(human.state, human.view, creep_instruction(human.state, human.view))
+    human.put(human.state.task.destination.lane, human.state.task.destination.station - 2.4, 0.0)
+    third = creep_instruction(human.state, human.view)
+    assert third.act.move is M.INSTRUCT and third.wording.distance == pytest.approx(3.0)
+
+
+def test_wrong_way_is_not_pointed_out_again_to_a_car_that_has_not_moved():
+    human = Guide(40.0, speed=6.0)
+    step = ("turn", human.view.lane, 0)
+    lanes = human.env.town.lanes
+    far = next(lane.id for lane in lanes if not lane.in_junction and lane.id != human.view.lane)
+    remarks = []
+    for moved_at in (50.0, 50.0, 90.0):
+        human.put(human.state.task.destination.lane, human.state.task.destination.station - 40.0, 6.0)
+        human.state.guidance = replace(human.state.guidance, step=step, wrong_turns=())
+        human.state.motion = replace(human.state.motion, moved_at=moved_at)
+        human.state.route = replace(human.state.route, misses=0, avoided=())
+        progress = human.state.route.to_goal
+        human.state.route = human.state.route.with_progress(replace(progress, astray=human.state.config.off_route))
+        there = lanes[far]
+        human.observation |= {
+            "time": np.array([moved_at + 1.0]), "lane": np.int64(far), "station": np.array([1.0]),
+            "pose": np.array([*there.position(1.0), there.heading_at(1.0)]),
+        }  # fmt: skip
+        human.state.speech = human.state.speech.cleared()
+        follow_route(human.state, human.view)
+        said_now = {meant.predicate for item in human.state.speech.queue for meant in item.meaning}
+        remarks.append(Predicate.RIGHT_WAY in said_now)
+    assert remarks == [True, False, True]
+
+
+def test_u_turn_just_after_straight_on_is_given_with_a_word_of_why():
+    human = Guide(60.0, speed=6.0)
+    straight = order(M.INSTRUCT, A.LANE_FOLLOW, Wording(direction=Direction.STRAIGHT))
+    round_ = order(M.INSTRUCT, A.U_TURN)
+    for former, moves in ((straight, [M.EXPLAIN, M.INSTRUCT]), (round_, [M.INSTRUCT])):
+        human.state.speech = replace(
+            human.state.speech, said=(former,), last_end=human.view.time - 2.0, queue=(round_,)
+        )
+        own_up(human.state, human.view)
+        assert human.moves() == moves
+    further = order(M.INSTRUCT, A.LANE_FOLLOW, Wording(topic="further"))
+    human.state.speech = replace(human.state.speech, said=(further,), queue=(round_,))
+    own_up(human.state, human.view)
+    assert human.moves() == [M.INSTRUCT], "first a little way, then another one"
