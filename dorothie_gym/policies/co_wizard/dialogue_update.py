@@ -34,6 +34,7 @@ from dorothie_gym.policies.co_wizard.goals import (
     complete,
     doubt,
     hear_description,
+    is_on_another_street,
     plan_route,
     postpone,
     set_goal,
@@ -189,7 +190,7 @@ def _obey(
         if not state.beliefs.exact:  # the car is guided and need not search for the place
             state.route = state.route.with_progress(None)
     settle_with_order(state, actions, words)
-    contradicts = note_contradiction(state, view, actions[0], words)
+    contradicts = note_contradiction(state, view, actions[0], words.direction, words.ordinal)
     for action in actions:
         OBEYED[action](state, view, act, words)
     answers = act.move is not DialogueMove.INSTRUCT and actions[0] in _WAYS
@@ -380,7 +381,8 @@ def _reply(
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
     landmarks, streets, goal = act_builders.named_landmarks(act), act_builders.named_streets(act), state.beliefs.goal
-    if act.move is DialogueMove.CLARIFY and landmarks and goal is not landmarks[0]:
+    other = bool(landmarks) and (goal is not landmarks[0] or is_on_another_street(state, view, streets))
+    if act.move is DialogueMove.CLARIFY and other:
         set_goal(state, view, landmarks[0], streets, rng, corrected=True)
     elif (goal is None or state.intentions.arrived) and landmarks:
         set_goal(state, view, landmarks[0], streets, rng)

@@ -210,6 +210,12 @@ def believed_destination(state: CoWizardState, view: CoWizardView) -> Propositio
     return act_builders.destination(goal, street_of(view.raw, state.town, place[0]))
 
 
+def is_on_another_street(state: CoWizardState, view: CoWizardView, streets: Sequence[StreetName]) -> bool:
+    """Returns whether the place of the destination, of which the town has several, is on none of the streets named."""
+    believed = believed_destination(state, view).get("street")
+    return believed is not None and bool(streets) and believed not in streets
+
+
 def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
     """Prepares a stop at a distance ahead, possibly at a named place, which the car approaches slowly.
 

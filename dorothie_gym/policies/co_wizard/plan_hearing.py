@@ -21,6 +21,7 @@ from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING
 from dorothie_gym.policies.co_wizard.plan_objections import object_to
 from dorothie_gym.policies.co_wizard.plan_points import first_objection
+from dorothie_gym.policies.co_wizard.repairs import check_goal, note_contradiction
 from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
@@ -61,6 +62,9 @@ _SIGNS: Final = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, Dialo
 
 _DESCRIBING: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 """Moves by which a place may be described."""
+
+_STEERED: Final = {StepAction.TURN: ActionValue.J_TURN, StepAction.U_TURN: ActionValue.U_TURN}
+"""Actions by steps that may lead away from the route of the car."""
 
 _ONLY_HERE: Final = frozenset({Anaphor.HERE, Anaphor.THERE})
 
@@ -176,6 +180,15 @@ def take_plan(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, r
         heard: the utterance that states the plan.
         rng: random generator of the decision.
     """
+    steps = heard.words.plan.steps
+    action = _STEERED.get(steps[0].action)
+    leads_away = action is not None and note_contradiction(state, view, action, steps[0].direction, steps[0].ordinal)
+    _take_over(state, view, heard, rng)
+    if leads_away:
+        check_goal(state, view)
+
+
+def _take_over(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, rng: np.random.Generator) -> None:
     steps, text = heard.words.plan.steps, heard.words.text
     state.dialogue = state.dialogue.with_proposal(None).after_steering(view.time)
     corrected = corrected_step(state, heard)

@@ -114,9 +114,23 @@ def repeat_last(state: CoWizardState) -> None:
     state.say(repeated(last, Function.CORRECTION) if again else replace(last, text="", joined=False))
 
 
-def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
-    """Counts an instruction that leads away from the route to a destination on the map; returns whether it does."""
-    if not _contradicts(state, view, action, words):
+def note_contradiction(
+    state: CoWizardState,
+    view: CoWizardView,
+    action: ActionValue,
+    direction: Direction | None,
+    ordinal: int | None = None,
+) -> bool:
+    """Counts an instruction that leads away from the route to a destination on the map; returns whether it does.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        action: requested action.
+        direction: side of a turn.
+        ordinal: number of the opportunity to turn, from 1.
+    """
+    if not _contradicts(state, view, action, direction, ordinal):
         return False
     _count_contradiction(state)
     return True
@@ -161,14 +175,16 @@ def check_goal(state: CoWizardState, view: CoWizardView) -> None:
         state.say(intend(Function.INFORM, unknown, elided=("place",)))
 
 
-def _contradicts(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
+def _contradicts(
+    state: CoWizardState, view: CoWizardView, action: ActionValue, direction: Direction | None, ordinal: int | None
+) -> bool:
     progress = state.route.progress
     if progress is None or not state.beliefs.exact:
         return False
     if action is ActionValue.U_TURN:
         return not progress.turns_round_first(state.town, view.station)
     crossing = progress.next_crossing(state.town, view.station)
-    if action is not ActionValue.J_TURN or crossing is None or words.direction is None or (words.ordinal or 1) > 1:
+    if action is not ActionValue.J_TURN or crossing is None or (ordinal or 1) > 1:
         return False
     sides = (Direction.LEFT, Direction.RIGHT)
-    return words.direction in sides and crossing.direction in sides and words.direction is not crossing.direction
+    return direction in sides and crossing.direction in sides and direction is not crossing.direction

@@ -16,7 +16,7 @@ from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.participant.given_orders import times_given
+from dorothie_gym.policies.participant.given_orders import times_told
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.policy import replace
@@ -53,6 +53,9 @@ HARDLY = 1.0
 
 FEWEST = 3.0
 """Smallest distance that is said in metres [m]; the car stops a little earlier."""
+
+ROLLING = 3.5
+"""Speed up to which a car that was sent on a little may still stop by itself [m/s]; it may have misheard how far."""
 
 SHOUTS = 3
 """Number of short wordings that are compared when there is only time for a shout."""
@@ -104,9 +107,11 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 
 
 def _is_sent_a_little(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car was just told to drive on a little, rather than straight on."""
+    """Returns whether the car was just told to drive on a little, rather than straight on, and does so."""
     lately = view.time - state.guidance.nudged_at < state.config.nudge_time
-    return lately and not (state.guidance.nudges > IN_VAIN and state.guidance.sent_straight_on)
+    straight_on = state.guidance.nudges > IN_VAIN and state.guidance.sent_straight_on
+    runs_past = view.speed > ROLLING and state.route.to_goal.left(view.station) < stopping_distance(view.speed)
+    return lately and not (straight_on or runs_past)
 
 
 def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
@@ -121,10 +126,10 @@ def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
 def prepare_stop(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
     """Chooses the words of a stop instruction in advance, because their duration determines when to say them."""
     if not state.guidance.stop_text:
-        _choose_stop_words(state, view, rng)
+        _choose_stop_words(state, rng)
     if room_to_stop(state, view, left)[0] < -state.config.late_stop:
         # there is only time for a shout
-        points_out = _has_stopped_twice(state, view)
+        points_out = _has_stopped_twice(state)
         act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording())
         shouts = [word_act(act, Role.PARTICIPANT, rng, wording, style=_SHOUTING) for _ in range(SHOUTS)]
         options = [text for text in (*shouts, state.guidance.stop_text) if text != state.guidance.stop_said] or shouts
@@ -132,18 +137,18 @@ def prepare_stop(state: ParticipantState, view: ParticipantView, left: float, rn
         state.guidance = state.guidance.with_stop_text(shortest, points_out=points_out)
 
 
-def _has_stopped_twice(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car was told to stop twice here, so that a third time is said in another way."""
-    return times_given(state, view, order(DialogueMove.INSTRUCT, ActionValue.STOP)) >= IN_VAIN
+def _has_stopped_twice(state: ParticipantState) -> bool:
+    """Returns whether the car was told to stop for the place twice, so that a third time is said in another way."""
+    return times_told(state, ActionValue.STOP) >= IN_VAIN
 
 
-def _choose_stop_words(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> None:
     """Chooses the words to stop the car with: an instruction, or the statement that this is the place.
 
     The statement is made the first time at most, and from the third time on.
     """
     first = not state.route.misses and state.guidance.stopped_at == -math.inf
-    points_out = (first and rng.random() < state.style.points_out) or _has_stopped_twice(state, view)
+    points_out = (first and rng.random() < state.style.points_out) or _has_stopped_twice(state)
     act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording(here=True))
     text = said = state.guidance.stop_said
     for _ in range(REWORDINGS):

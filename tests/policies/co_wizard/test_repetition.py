@@ -2,14 +2,23 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Predicate
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass
+from dorothie_gym.dialogue import Predicate, understand
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.co_wizard.acknowledgement import what_keeps
-from dorothie_gym.policies.co_wizard.goals import aim, believed_destination, search_on, seek_street
+from dorothie_gym.policies.co_wizard.goals import (
+    aim,
+    believed_destination,
+    is_on_another_street,
+    search_on,
+    seek_street,
+)
+from dorothie_gym.policies.co_wizard.plan_hearing import take_plan
 from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
 from dorothie_gym.policies.co_wizard.repetition import note_order
+from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.knowledge import Standstill
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.sim.state.codes import Motion
@@ -107,3 +116,28 @@ def test_car_drives_to_its_destination_from_the_street_that_it_was_sent_to():
     talk.state.route = talk.state.route.with_progress(way.replanned(town, there.here))
     search_on(talk.state, there)
     assert talk.state.route.to_goal.goal == goal
+
+
+def test_plan_that_leads_away_from_the_route_makes_the_car_check_its_destination():
+    talk = on_the_way()
+    view = view_of(talk, **DRIVING)
+    assert not talk.state.route.to_goal.turns_round_first(talk.env.town, view.station)
+    route, checks = talk.state.route, []
+    for _ in range(talk.state.config.contradictions):
+        talk.state.speech, talk.state.route = talk.state.speech.cleared(), route
+        acts = (DialogueAct.of(M.INSTRUCT, A.U_TURN), DialogueAct.of(M.INSTRUCT, A.J_TURN))
+        said = HeardUtterance(acts=acts, words=understand("turn around, and then take the second left"))
+        take_plan(talk.state, view, said, np.random.default_rng(0))
+        checks.append(M.CHECK in [item.act.move for item in talk.state.speech.queue])
+    assert checks == [False, True]
+
+
+def test_correction_of_the_street_of_a_house_is_taken_over():
+    talk = on_the_way()
+    view = view_of(talk, **DRIVING)
+    house = next(mark for mark in view.landmarks if mark.name is LandmarkName.HOUSE)
+    aim(talk.state, view, house)
+    other = next(name for name in StreetName if name not in (house.street, StreetName.UNKNOWN, StreetName.QUERIED))
+    assert is_on_another_street(talk.state, view, (other,))
+    assert not is_on_another_street(talk.state, view, (house.street, other))
+    assert not is_on_another_street(talk.state, view, ())

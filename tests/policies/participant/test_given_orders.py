@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import Direction, Predicate, Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.participant.arriving import creep_instruction, prepare_stop
 from dorothie_gym.policies.participant.given_orders import note_said, times_given, times_told
-from dorothie_gym.policies.participant.guidance import follow_route
+from dorothie_gym.policies.participant.guidance import follow_route, guide
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.reconsidering import admit_repetition, own_up
+from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.retrying import remark_on_wrong_turn
 from dorothie_gym.policies.speech import Remark
+from tests.policies.said import with_words
 from tests.policies.test_arriving import Guide
 
 M, A = DialogueMove, ActionValue
@@ -151,3 +153,28 @@ def test_u_turn_just_after_straight_on_is_given_with_a_word_of_why():
     human.state.speech = replace(human.state.speech, said=(further,), queue=(round_,))
     own_up(human.state, human.view)
     assert human.moves() == [M.INSTRUCT], "first a little way, then another one"
+
+
+@pytest.mark.parametrize(
+    ("words", "described", "corrects"),
+    [
+        ("I've got the way on my map", True, True),
+        ("about a minute to go", True, True),
+        ("I know the way", False, False),
+        ("I don't know the way", True, False),
+    ],
+)
+def test_car_that_knows_the_way_to_a_place_off_its_map_has_another_goal(words, described, corrects):
+    human = Guide(200.0, speed=6.0)
+    human.state.task = replace(human.state.task, described=described)
+    human.observation |= with_words(human.observation, Role.CO_WIZARD, words, DialogueAct.of(M.EXPLAIN))
+    listen(human.state, human.view, human.rng)
+    assert (M.CLARIFY in human.moves()) is corrects
+
+
+def test_car_that_was_sent_on_a_little_is_stopped_if_it_runs_on():
+    for speed, left, stops in ((8.0, 5.0, True), (2.0, 5.0, False)):
+        human = Guide(left, speed=speed)
+        human.state.guidance = replace(human.state.guidance, nudged_at=48.0, nudges=1)
+        guide(human.state, human.view, human.rng)
+        assert bool(human.state.speech.queue) is stops
