@@ -95,6 +95,10 @@ def hazard(time: float) -> list[Event]:
     return [_event(time, EventType.HAZARD_STOP, Role.AGENT, {"reason": "TrafficLight", "distance": 6.0})]
 
 
+def hazard_over(time: float, reason: str) -> list[Event]:
+    return [_event(time, EventType.HAZARD_END, Role.AGENT, {"reason": reason, "seconds": 5.0})]
+
+
 def drive(*parts: Sequence[Event], seconds: float = 60.0, **header: Any) -> Session:
     """A session of a car that drives east at 6 m/s, in which the parts happen."""
     return session([event for part in parts for event in part], frames=round(seconds * FRAME_RATE), **header)

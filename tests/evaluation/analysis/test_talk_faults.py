@@ -16,6 +16,8 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     reply_checks,
 )
 from dorothie_gym.evaluation.analysis.truth_checks.checks import SHARES, TalkChecks, check_session
+from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.session.recording import Session
 from tests.evaluation.analysis.builders import (
@@ -31,6 +33,8 @@ from tests.evaluation.analysis.builders import (
     car,
     did,
     drive,
+    hazard,
+    hazard_over,
     human,
     said,
 )
@@ -229,3 +233,11 @@ def test_done_errands_begin_new_groups_of_orders():
     done = human(20.0, "that's done", M.EXPLAIN, S.COMPLETE)
     moved = human(30.0, "stop", M.INSTRUCT, A.STOP)
     assert not wrong(order_checks.unchanged(drive(*orders, done, moved)))
+
+
+def test_obstacle_that_took_the_place_of_a_red_light_is_a_reason_too():
+    recorded = drive(hazard(10.0), hazard_over(20.0, "Vehicles"), hazard(40.0), hazard_over(45.0, "TrafficLight"))
+    world = SessionWorld(recorded, load_town("brookside"))
+    assert world.hazards(15.0, 0.0) == {"TrafficLight", "Vehicles"}
+    assert world.hazards(30.0, 0.0) == set(), "the first one is over"
+    assert world.hazards(42.0, 0.0) == {"TrafficLight"}
