@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
 from dorothie_gym.maps.town import LightColour, Town
@@ -26,8 +26,32 @@ _LONGEST_RED: Final = 120.0  # [s]
 _SLOWEST: Final = 10.0  # cruise speed below which cars are not set [km/h]
 
 
+class CruiseSpeed(NamedTuple):
+    """Cruise speed that a car is set to.
+
+    Attributes:
+        now: present speed [km/h].
+        later: speed from a time on [km/h].
+        until: that time [s].
+    """
+
+    now: float = USUAL_SPEED
+    later: float = USUAL_SPEED
+    until: float = math.inf
+
+    def pace(self, time: float) -> float:
+        """Returns the speed between junctions at a time [m/s, s]."""
+        speed = self.now if time < self.until else self.later
+        return _PACE * min(max(speed, _SLOWEST) / USUAL_SPEED, 1.0)
+
+
 def travel_time(
-    town: Town, progress: RouteProgress, station: float, now: float, speed: float, cruise: float = USUAL_SPEED
+    town: Town,
+    progress: RouteProgress,
+    station: float,
+    now: float,
+    speed: float,
+    cruise: CruiseSpeed | None = None,
 ) -> float:
     """Returns the expected time until the car stops at the goal of a route [s]; infinity without a route.
 
@@ -40,20 +64,22 @@ def travel_time(
         station: distance of the car along its lane [m].
         now: time [s].
         speed: current speed [m/s].
-        cruise: cruise speed that the car is set to [km/h]; a faster one than usual saves no time in a town.
+        cruise: cruise speed of the car; None for the usual one. A faster one saves no time in a town.
     """
     if not progress.legs:
         return math.inf
     begun = now + (_SETTING_OFF if speed < STANDING_SPEED else 0.0)
-    pace = _PACE * min(max(cruise, _SLOWEST) / USUAL_SPEED, 1.0)
-    return statistics.fmean(_arrival(town, progress, station, begun, pace, delay) for delay in _DELAYS) - now
+    driven = CruiseSpeed() if cruise is None else cruise
+    return statistics.fmean(_arrival(town, progress, station, begun, driven, delay) for delay in _DELAYS) - now
 
 
-def _arrival(town: Town, progress: RouteProgress, station: float, begun: float, pace: float, delay: float) -> float:
+def _arrival(
+    town: Town, progress: RouteProgress, station: float, begun: float, cruise: CruiseSpeed, delay: float
+) -> float:
     """Returns the time at which a car that sets off at a time stops at the goal, with a factor on driving."""
     time, start = begun, station
     for leg, following in zip(progress.legs, (*progress.legs[1:], None), strict=True):
-        time += delay * _seconds_on(town, leg, start, pace)
+        time += delay * _seconds_on(town, leg, start, cruise.pace(time))
         start = -math.inf
         if following is not None:
             if town.lanes[following.lane].in_junction:

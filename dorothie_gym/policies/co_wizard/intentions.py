@@ -10,6 +10,7 @@ from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.travel_time import CruiseSpeed
 
 
 class Wish(enum.Enum):
@@ -162,9 +163,15 @@ class Intentions:
         """Sets whether to stop before the junction ahead."""
         return replace(self, pausing=pausing)
 
+    @property
+    def cruise(self) -> CruiseSpeed:
+        """Cruise speed that is meant now, and after a temporary one."""
+        until = self.slow_until if self.speed < self.usual else math.inf
+        return CruiseSpeed(self.speed, self.usual, until)
+
     def with_speed(self, speed: int) -> Intentions:
-        """Sets the target cruise speed [km/h]; the usual speed stays unchanged."""
-        return replace(self, speed=speed)
+        """Sets the target cruise speed [km/h] until further notice; the usual speed stays unchanged."""
+        return replace(self, speed=speed, slow_until=math.inf)
 
     def slow_longer(self, seconds: float) -> Intentions:
         """Extends a temporary speed, by the time that the car stands [s]."""

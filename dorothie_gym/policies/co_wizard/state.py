@@ -288,4 +288,5 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
             rests_for=self.commands.rest_for,
             rests_until=self.commands.rest_until,
             usual_speed=intentions.usual,
+            cruise=intentions.cruise,
         )
