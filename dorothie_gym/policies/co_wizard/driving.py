@@ -137,8 +137,14 @@ def _carry_out_wish(state: CoWizardState, view: CoWizardView) -> Physical | None
             state.intentions = state.intentions.without_wish()
             return None
         return _turn_round(state, view)
+    if view.manoeuvre is PhysicalAction.LANE_SWITCH and state.intentions.wish_sent:
+        state.intentions = state.intentions.without_wish()
+        return None
     side = LinkType.LANE_CHANGE_LEFT if wish is Wish.SWITCH_LEFT else LinkType.LANE_CHANGE_RIGHT
-    return _switch(state, view, side)
+    command = _switch(state, view, side)
+    if command is not None:
+        state.intentions = state.intentions.with_wish_sent()
+    return command
 
 
 def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
@@ -161,8 +167,6 @@ def _switch(state: CoWizardState, view: CoWizardView, side: LinkType) -> Physica
     ready = not view.manoeuvring and waited >= state.clock.interval and not state.town.lanes[view.lane].in_junction
     if not ready or not can_switch_lane(state.town, view.lane, view.station, side):
         return None
-    if state.intentions.wish is not Wish.U_TURN:
-        state.intentions = state.intentions.without_wish()
     _note_manoeuvre(state, view)
     angle = LANE_SWITCH_LEFT if side is LinkType.LANE_CHANGE_LEFT else LANE_SWITCH_RIGHT
     return Physical(action=PhysicalAction.LANE_SWITCH, angle=int(angle))

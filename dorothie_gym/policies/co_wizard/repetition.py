@@ -27,7 +27,7 @@ _COUNTED: Final = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) -> None:
     """Records an order; remarks on one that was carried out twice before, and asks for another route.
 
-    Orders that the car could not carry out yet, because it was standing, do not count.
+    Orders that the car could not carry out yet do not count.
 
     Args:
         state: working copy of the state.
@@ -36,10 +36,7 @@ def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) ->
     """
     if action not in _COUNTED:
         return
-    stands_since = state.standstill.since
-    done_at = state.commands.manoeuvre_sent_at
-    if stands_since is not None:
-        done_at = min(done_at, stands_since)
+    done_at = state.commands.manoeuvred_at
     state.dialogue = state.dialogue.after_order(action, view.time, view.time - MEMORY, done_at=done_at)
     if sum(known is action for known, _ in state.dialogue.orders) < REPEATED:
         return

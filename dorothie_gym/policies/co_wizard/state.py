@@ -188,6 +188,7 @@ class CommandState:
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
         manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
+        manoeuvred_at: time at which the car was last seen to carry out one [s].
         stop_sent_at: time of the last Stop command [s].
         rest_until: end of a stop for an obstruction [s].
         rest_for: object that the car stops for.
@@ -198,6 +199,7 @@ class CommandState:
     turn_sent: tuple[int, int] = (-1, 0)
     turn_sent_at: float = -math.inf
     manoeuvre_sent_at: float = -math.inf
+    manoeuvred_at: float = -math.inf
     stop_sent_at: float = -math.inf
     rest_until: float = -math.inf
     rest_for: ObjectClass = ObjectClass.UNLABELED
@@ -215,6 +217,10 @@ class CommandState:
     def after_manoeuvre(self, now: float) -> CommandState:
         """Records a lane switch or U-turn command."""
         return replace(self, manoeuvre_sent_at=now)
+
+    def manoeuvring(self, now: float) -> CommandState:
+        """Records that the car switches lanes or turns round."""
+        return replace(self, manoeuvred_at=now)
 
     def after_turn(self, turn: tuple[int, int], now: float) -> CommandState:
         """Records a turn command: lane and angle [degrees]."""

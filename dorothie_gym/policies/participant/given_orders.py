@@ -28,6 +28,9 @@ BACK_AND_FORTH: Final = 420.0
 SAME_HEADING: Final = 50.0
 """Largest difference between the headings of the car at one place [degrees]."""
 
+TURNED: Final = 40.0
+"""Change of the heading of a car that turns [degrees]."""
+
 ONE_BREATH: Final = 15.0
 """Time within which equal orders that are joined belong to one description of the way [s]."""
 
@@ -84,6 +87,16 @@ def times_given(state: ParticipantState, view: ParticipantView, order: Remark) -
     """Returns how often an order was given before, at the place where the car is."""
     now = _given_now(view, order)
     return sum(_is_equal(now, former) and _is_here(now, former) for former in state.guidance.given)
+
+
+def last_given(state: ParticipantState) -> GivenOrder | None:
+    """Returns the last order; None if there is none, or if something was said about it since."""
+    return state.guidance.given[-1] if state.guidance.given else None
+
+
+def has_turned_since(view: ParticipantView, order: GivenOrder) -> bool:
+    """Returns whether the car has turned since an order was given."""
+    return abs(pm.wrap_degrees(view.heading - order.heading)) > TURNED
 
 
 def times_told(state: ParticipantState, action: ActionValue, lane: int | None = None) -> int:

@@ -9,7 +9,7 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.participant.given_orders import times_given
+from dorothie_gym.policies.participant.given_orders import has_turned_since, last_given, times_given
 from dorothie_gym.policies.participant.retrying import IN_VAIN
 from dorothie_gym.policies.speech import LONGEST_BREATH, intend
 
@@ -54,6 +54,9 @@ def own_up(state: ParticipantState, view: ParticipantView) -> None:
 
     An order that is already preceded by a word of why, or that follows a turn of the car, needs none.
     """
+    last = last_given(state)
+    if last is not None and has_turned_since(view, last):
+        return
     queue = state.speech.queue
     if not queue or queue[0].joined or view.speaking > 0.0 or view.turning:
         return

@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import Predicate, understand
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.maps.model import LinkType
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    LandmarkName,
+    ObjectClass,
+    PhysicalAction,
+    StreetName,
+)
 from dorothie_gym.policies.co_wizard.acknowledgement import what_keeps
+from dorothie_gym.policies.co_wizard.driving import drive
 from dorothie_gym.policies.co_wizard.goals import (
     aim,
     believed_destination,
@@ -15,13 +25,16 @@ from dorothie_gym.policies.co_wizard.goals import (
     search_on,
     seek_street,
 )
+from dorothie_gym.policies.co_wizard.intentions import Wish
 from dorothie_gym.policies.co_wizard.plan_hearing import take_plan
 from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
 from dorothie_gym.policies.co_wizard.repetition import note_order
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.feasibility import can_switch_lane
 from dorothie_gym.policies.heard_utterance import HeardUtterance
-from dorothie_gym.policies.knowledge import Standstill
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.sim.state.codes import Motion
+from tests.policies.co_wizard.rides import Ride
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_reasons import DRIVING, on_the_way, view_of
 
@@ -32,13 +45,13 @@ def remarks(talk: Talk) -> list[Predicate]:
     return [said.predicate for item in talk.state.speech.queue for said in item.meaning]
 
 
-def order_u_turns(talk: Talk, *, carried_out: bool, standing: bool = False) -> list[Predicate]:
-    """Orders three U-turns in a minute; the car carries them out at once, or not at all."""
+def order_u_turns(talk: Talk, *, carried_out: bool) -> list[Predicate]:
+    """Orders three U-turns in a minute, to which the car commands one; it carries them out, or has no room."""
     for time in (100.0, 120.0, 140.0):
-        talk.state.standstill = Standstill(since=90.0 if standing else None)
         note_order(talk.state, replace(view_of(talk, **DRIVING), time=time), A.U_TURN)
+        talk.state.commands = talk.state.commands.after_manoeuvre(time + 1.0)
         if carried_out:
-            talk.state.commands = talk.state.commands.after_manoeuvre(time + 1.0)
+            talk.state.commands = talk.state.commands.manoeuvring(time + 2.0)
     return remarks(talk)
 
 
@@ -48,11 +61,25 @@ def test_third_order_is_remarked_on_if_the_others_were_carried_out():
     assert order_u_turns(talk, carried_out=True)[:1] == [Predicate.TRIED]
 
 
-@pytest.mark.parametrize(("carried_out", "standing"), [(False, False), (True, True)])
-def test_orders_that_the_car_could_not_carry_out_are_not_said_to_have_been(carried_out, standing):
+def test_orders_that_the_car_could_not_carry_out_are_not_said_to_have_been():
     talk = on_the_way()
     talk.state.speech = talk.state.speech.cleared()
-    assert Predicate.TRIED not in order_u_turns(talk, carried_out=carried_out, standing=standing)
+    assert Predicate.TRIED not in order_u_turns(talk, carried_out=False)
+
+
+def test_lane_change_that_found_no_room_is_wanted_until_it_begins():
+    ride = Ride(3, town="midtown")
+    ride.run(3.0)
+    state, town = ride.state, ride.env.town
+    lane = next(lane.id for lane in town.lanes if can_switch_lane(town, lane.id, 5.0, LinkType.LANE_CHANGE_RIGHT))
+    view = CoWizardView.read({**ride.observations["co_wizard"], **DRIVING}, town)
+    view = replace(view, lane=lane, station=5.0, manoeuvre=None, choice=None)
+    state.intentions = state.intentions.switching(Wish.SWITCH_RIGHT, 1e3)
+    for number in range(3):
+        command = drive(state, replace(view, time=50.0 + number))
+        assert command is not None and command.action is PhysicalAction.LANE_SWITCH
+    drive(state, replace(view, time=54.0, manoeuvre=PhysicalAction.LANE_SWITCH))
+    assert state.intentions.wish is None
 
 
 @pytest.mark.parametrize(

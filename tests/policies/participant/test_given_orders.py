@@ -178,3 +178,30 @@ def test_car_that_was_sent_on_a_little_is_stopped_if_it_runs_on():
         human.state.guidance = replace(human.state.guidance, nudged_at=48.0, nudges=1)
         guide(human.state, human.view, human.rng)
         assert bool(human.state.speech.queue) is stops
+
+
+@pytest.mark.parametrize(("turned", "waits"), [(0.0, True), (3.0, False)])
+def test_car_that_was_told_to_turn_round_is_guided_in_another_way_only_when_it_has(turned, waits):
+    human = Guide(200.0, speed=6.0)
+    note_said(human.state, human.view, order(M.INSTRUCT, A.U_TURN))
+    human.observation["time"] = human.observation["time"] + 3.0
+    human.observation["pose"] = human.observation["pose"] + np.array([0.0, 0.0, turned])
+    before = human.state.route.to_goal
+    human.state.route = human.state.route.with_progress(replace(before, goal=(before.goal[0], 5.0), astray=9))
+    astray = human.state.route.to_goal
+    follow_route(human.state, replace(human.view, turning=False))
+    assert (human.state.route.to_goal is astray) is waits
+
+
+def test_order_after_the_car_has_turned_is_no_change_of_mind():
+    human = Guide(60.0, speed=6.0)
+    for heading, moves in ((0.0, [M.EXPLAIN, M.INSTRUCT]), (1.5, [M.INSTRUCT])):
+        human.state.guidance = replace(human.state.guidance, given=())
+        note_said(human.state, human.view, turn())
+        human.observation["pose"] = human.observation["pose"] + np.array([0.0, 0.0, heading])
+        following = turn(Direction.RIGHT)
+        human.state.speech = replace(
+            human.state.speech, said=(turn(),), last_end=human.view.time - 2.0, queue=(following,)
+        )
+        own_up(human.state, human.view)
+        assert human.moves() == moves
