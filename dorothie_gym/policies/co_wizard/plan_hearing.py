@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 _GOES_ON: Final = re.compile(r"^(?:(?:okay|ok|yes|yeah|and|so|um|uh)[, ]+)*(?:then|after that|afterwards|next)\b", re.I)
 """Beginning of an utterance that goes on with the plan before."""
 
+_GO_AHEAD: Final = re.compile(r"^\W*(?:\w+\W+){0,4}?go ahead and\b", re.I)
+"""Opening of an order that asks for nothing by itself."""
+
 _REPAIRS: Final = re.compile(r"\b(not|no|nope|wrong|instead|sorry|meant?|rather|belay)\b", re.I)
 """Words of an utterance that corrects the one before."""
 
@@ -180,16 +183,31 @@ def take_plan(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, r
         heard: the utterance that states the plan.
         rng: random generator of the decision.
     """
-    steps = heard.words.plan.steps
+    steps = _without_opening(heard)
     action = _STEERED.get(steps[0].action)
     leads_away = action is not None and note_contradiction(state, view, action, steps[0].direction, steps[0].ordinal)
-    _take_over(state, view, heard, rng)
+    _take_over(state, view, heard, steps, rng)
     if leads_away:
         check_goal(state, view)
 
 
-def _take_over(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, rng: np.random.Generator) -> None:
-    steps, text = heard.words.plan.steps, heard.words.text
+def _without_opening(heard: HeardUtterance) -> tuple[PlanStep, ...]:
+    """Returns the steps of an utterance, where "go ahead and turn left" does not ask to go straight on first."""
+    steps = heard.words.plan.steps
+    first = steps[0]
+    plain = first.condition is first.ordinal is first.distance is first.place is None
+    opens = first.action in (StepAction.STRAIGHT, StepAction.GO) and plain
+    return steps[1:] if opens and steps[1:] and _GO_AHEAD.match(heard.words.text) else steps
+
+
+def _take_over(
+    state: CoWizardState,
+    view: CoWizardView,
+    heard: HeardUtterance,
+    steps: tuple[PlanStep, ...],
+    rng: np.random.Generator,
+) -> None:
+    text = heard.words.text
     state.dialogue = state.dialogue.with_proposal(None).after_steering(view.time)
     corrected = corrected_step(state, heard)
     if corrected is not None:

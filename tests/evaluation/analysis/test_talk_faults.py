@@ -131,6 +131,8 @@ def test_reversal_with_a_word_of_why_is_accepted(why):
 
 def test_next_turn_is_no_reversal():
     assert not wrong(order_checks.reversals(drive(LEFT, did(7.5, PhysicalAction.J_TURN, angle=80.0), RIGHT)))
+    at_once = did(5.5, PhysicalAction.J_TURN, angle=80.0)  # while the order is being said
+    assert not wrong(order_checks.reversals(drive(LEFT, at_once, RIGHT)))
     late = human(20.0, "turn right", M.INSTRUCT, A.J_TURN)
     assert not wrong(order_checks.reversals(drive(LEFT, late)))
     blocked = car(7.0, "the road is blocked", M.QUERY_YN)
