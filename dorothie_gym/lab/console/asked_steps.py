@@ -1,4 +1,4 @@
-"""Steps of the way that the participant has asked for, and that wait for their place: a note at the Co-Wizard's seat."""
+"""Steps of the way that the participant has asked for, and that wait for their place: a note for the Co-Wizard."""
 
 from __future__ import annotations
 
