@@ -5,6 +5,7 @@ Orders that are only planned do not count: they may be replaced before they are 
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.dialogue.propositions import Predicate
@@ -81,6 +82,32 @@ def note_said(state: ParticipantState, view: ParticipantView, said: Remark) -> N
         again = said.joined and any(_is_equal(order, former) for former in _latest(state, view))
         if not again:  # the second of two left turns in one description is another turn
             state.guidance = replace(state.guidance, given=(*state.guidance.given, order))
+
+
+def drop_repetition(state: ParticipantState, said: Remark) -> None:
+    """Drops a queued utterance that gives the order which is being said: an answer may have come before it.
+
+    Args:
+        state: working copy of the state.
+        said: the remark; steps that follow in the same breath are kept.
+    """
+    if said.act.move not in _GIVING or not said.act.values(Slot.ACTION):
+        return
+    begun = len(list(itertools.takewhile(lambda item: item.joined, state.speech.queue)))
+    kept, breath = [*state.speech.queue[:begun]], [*state.speech.queue[:0]]
+    for item in (*state.speech.queue[begun:], None):
+        if item is None or not item.joined:
+            kept += [] if any(_orders_alike(said, other) for other in breath) else breath
+            breath = []
+        if item is not None:
+            breath.append(item)
+    if len(kept) < len(state.speech.queue):
+        state.speech = state.speech.cleared().plan(*kept)
+
+
+def _orders_alike(said: Remark, other: Remark) -> bool:
+    alike = said.act.slots == other.act.slots and said.wording.direction is other.wording.direction
+    return alike and other.act.move in _GIVING
 
 
 def times_given(state: ParticipantState, view: ParticipantView, order: Remark) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
-from dorothie_gym.policies.participant.given_orders import note_said
+from dorothie_gym.policies.participant.given_orders import drop_repetition, note_said
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
 from dorothie_gym.policies.participant.reactions import react, scene_of
@@ -108,5 +108,6 @@ class ScriptedParticipant(Policy[ParticipantState]):
         )
         if speech is not None and updated.speech.last is not None:
             note_said(updated, view, updated.speech.last)
+            drop_repetition(updated, updated.speech.last)
         updated.motion = updated.motion.with_speed(view.speed)
         return ParticipantAction(speech=speech).encode(self.limits), updated

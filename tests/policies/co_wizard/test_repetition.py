@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Predicate, understand
+from dorothie_gym.dialogue import Predicate, guess_spans, understand
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import (
     ActionValue,
@@ -17,6 +17,7 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies.co_wizard.acknowledgement import what_keeps
+from dorothie_gym.policies.co_wizard.answers import answer_yes_no, asks_to_act
 from dorothie_gym.policies.co_wizard.driving import drive
 from dorothie_gym.policies.co_wizard.goals import (
     aim,
@@ -25,6 +26,7 @@ from dorothie_gym.policies.co_wizard.goals import (
     search_on,
     seek_street,
 )
+from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED
 from dorothie_gym.policies.co_wizard.intentions import Wish
 from dorothie_gym.policies.co_wizard.plan_hearing import take_plan
 from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
@@ -168,3 +170,42 @@ def test_correction_of_the_street_of_a_house_is_taken_over():
     assert is_on_another_street(talk.state, view, (other,))
     assert not is_on_another_street(talk.state, view, (house.street, other))
     assert not is_on_another_street(talk.state, view, ())
+
+
+@pytest.mark.parametrize(
+    ("words", "move"),
+    [
+        ("could aw please stop here?", "obeys"),
+        ("cone you diego the next road to the right?", "asks back"),
+        ("are you turning left?", "answers"),
+        ("will it stop raining?", "answers"),
+    ],
+)
+def test_misheard_request_is_not_answered_by_a_bare_no(words, move):
+    talk = on_the_way()
+    talk.state.speech = talk.state.speech.cleared()
+    view, act = view_of(talk, **DRIVING), guess_spans(words)[0].act
+    assert act.move is M.QUERY_YN
+    assert asks_to_act(act, understand(words)) is (move == "obeys")
+    answer_yes_no(talk.state, view, act, understand(words), np.random.default_rng(0))
+    refuses = [item.act.move for item in talk.state.speech.queue] == [M.REPLY_N]
+    assert not refuses or move == "answers"
+
+
+@pytest.mark.parametrize(("known", "nudges"), [(True, False), (False, True)])
+def test_a_bit_further_is_no_order_to_a_car_that_waits_in_the_traffic_of_its_own_way(known, nudges):
+    talk = on_the_way()
+    view = replace(view_of(talk, **DRIVING), speed=0.0, choice=None)
+    if not known:
+        talk.state.beliefs = talk.state.beliefs.without_place()
+    OBEYED[A.LANE_FOLLOW](talk.state, view, DialogueAct.of(M.INSTRUCT, A.LANE_FOLLOW), understand("a bit further"))
+    assert (talk.state.intentions.nudge is not None) is nudges
+
+
+def test_end_of_a_small_distance_far_from_the_destination_is_no_arrival():
+    talk = on_the_way()
+    view = view_of(talk, **DRIVING)
+    talk.state.intentions = talk.state.intentions.nudged((view.lane, view.station + 0.2))
+    stop = drive(talk.state, replace(view, speed=0.5))
+    assert stop is not None and stop.action is PhysicalAction.STOP
+    assert not talk.state.intentions.arrived and talk.state.intentions.halted

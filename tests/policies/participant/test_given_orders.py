@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Direction, Predicate, Wording
+from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Wording
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.participant.arriving import creep_instruction, prepare_stop
-from dorothie_gym.policies.participant.given_orders import note_said, times_given, times_told
+from dorothie_gym.policies.participant.given_orders import drop_repetition, note_said, times_given, times_told
 from dorothie_gym.policies.participant.guidance import follow_route, guide
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.reconsidering import admit_repetition, own_up
+from dorothie_gym.policies.participant.repairs import explain_again
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.retrying import remark_on_wrong_turn
-from dorothie_gym.policies.speech import Remark
+from dorothie_gym.policies.speech import Remark, intend
 from tests.policies.said import with_words
 from tests.policies.test_arriving import Guide
 
@@ -205,3 +206,27 @@ def test_order_after_the_car_has_turned_is_no_change_of_mind():
         )
         own_up(human.state, human.view)
         assert human.moves() == moves
+
+
+def test_order_that_was_given_with_an_answer_is_not_given_again_from_the_queue():
+    human = Guide(60.0, speed=6.0)
+    excuse = intend(CommunicativeFunction.INFORM, wording=Wording(topic="changed_mind"))
+    round_ = order(M.INSTRUCT, A.U_TURN)
+    human.state.say(excuse, replace(round_, joined=True), turn())
+    drop_repetition(human.state, round_)
+    assert [item.act for item in human.state.speech.queue] == [turn().act]
+    human.state.speech = replace(human.state.speech, queue=(replace(turn(), joined=True),))
+    drop_repetition(human.state, turn())
+    assert human.moves() == [M.INSTRUCT], "the second turn of one description"
+
+
+def test_stop_that_was_not_understood_twice_is_not_ordered_a_third_time():
+    human = Guide(10.0, speed=6.0)
+    stop = order(M.INSTRUCT, A.STOP)
+    for times, move in ((1, M.INSTRUCT), (2, M.CLARIFY)):
+        human.state.guidance = replace(human.state.guidance, given=())
+        said(human, stop, times)
+        said_it = replace(human.state.speech.cleared(), said=(stop,), last=stop, last_end=human.view.time, repairs=0)
+        human.state.speech = said_it
+        explain_again(human.state, human.view, human.rng)
+        assert human.moves() == [move]
