@@ -207,3 +207,11 @@ def test_stop_that_is_not_heeded_is_repeated_shortly_behind_the_place(
     human.state.speech = human.state.speech.cleared()
     human.observation["time"] = human.observation["time"] + 4.5
     assert human.says() == said
+
+
+@pytest.mark.parametrize(("before", "stops"), [(9.6, True), (9.76, True), (11.0, False)])
+def test_car_that_does_not_brake_is_stopped_in_time_although_the_place_was_announced(before, stops):
+    human = Guide(32.0, speed=9.75)
+    human.state.guidance = human.state.guidance.with_approach_announced(True).with_stop_text("stop here please")
+    human.state.motion = replace(human.state.motion, speed=before)
+    assert human.says() == ([ActionValue.STOP] if stops else [])

@@ -202,7 +202,7 @@ def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
 
 def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
-    slow = view.speed < max(state.motion.speed, state.config.slow_speed)
+    slow = view.speed < max(state.motion.speed - BRAKING, state.config.slow_speed)
     if state.guidance.approach_announced and left > state.config.slow_distance and slow:
         return False  # the car is slowing down
     room, after = room_to_stop(state, view, left)
