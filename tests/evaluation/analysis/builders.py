@@ -75,8 +75,8 @@ def exception(time: float, kind: str, **data: Any) -> list[Event]:
     return [_event(time, EventType.EXCEPTION, Role.AD_WIZARD, {"kind": kind, **data})]
 
 
-def subgoal(time: float, landmark: str, status: str, number: int = 0) -> list[Event]:
-    data = {"subgoal": number, "landmark": landmark, "status": status, "cause": "arrival"}
+def subgoal(time: float, landmark: str, status: str, number: int = 0, cause: str = "arrival") -> list[Event]:
+    data = {"subgoal": number, "landmark": landmark, "status": status, "cause": cause}
     return [_event(time, EventType.SUBGOAL, Role.AGENT, data)]
 
 

@@ -37,6 +37,7 @@ from tests.evaluation.analysis.builders import (
     hazard_over,
     human,
     said,
+    subgoal,
 )
 
 P = Predicate
@@ -189,6 +190,9 @@ def test_repetition_that_has_not_happened_is_a_stale_remark():
     turns = [human(time, "turn around", M.INSTRUCT, A.U_TURN) for time in (5.0, 15.0)]
     assert wrong(mention_checks.stale_remarks(drive(turns[0], remark)))
     assert not wrong(mention_checks.stale_remarks(drive(*turns, remark)))
+    for cause, stale in (("task_trigger", False), ("arrival", True)):
+        change = subgoal(20.0, "KFC", "Ongoing", cause=cause)
+        assert bool(wrong(mention_checks.stale_remarks(drive(*turns, change, remark)))) is stale
 
 
 def test_place_that_was_not_passed_twice_makes_a_stale_remark():
