@@ -27,6 +27,7 @@ from dorothie_gym.policies.co_wizard.answers import (
 from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
 from dorothie_gym.policies.co_wizard.goals import (
+    COMMON,
     abandon,
     accept_offer,
     accept_street,
@@ -211,7 +212,8 @@ def _instructed_place(
 ) -> None:
     landmarks = act_builders.named_landmarks(act)
     statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
-    known = state.beliefs.exact or state.beliefs.described
+    # where the town has several, the one that the car is being guided to is meant, not another one on its map
+    known = state.beliefs.exact or state.beliefs.described or landmarks[0] in COMMON
     if GoalStatus.ABANDONED in statuses:
         _abandoned_place(state, view, act, words, rng)
     elif GoalStatus.PENDING in statuses:

@@ -209,3 +209,11 @@ def test_end_of_a_small_distance_far_from_the_destination_is_no_arrival():
     stop = drive(talk.state, replace(view, speed=0.5))
     assert stop is not None and stop.action is PhysicalAction.STOP
     assert not talk.state.intentions.arrived and talk.state.intentions.halted
+
+
+def test_house_that_the_car_is_guided_to_is_not_taken_for_another_one_on_its_map():
+    talk = on_the_way()
+    talk.state.beliefs = talk.state.beliefs.with_unknown_goal(LandmarkName.HOUSE)
+    assert any(mark.name is LandmarkName.HOUSE for mark in view_of(talk, **DRIVING).landmarks)
+    talk.say(M.INSTRUCT, LandmarkName.HOUSE, decisions=6)
+    assert talk.state.beliefs.goal is LandmarkName.HOUSE and not talk.state.beliefs.exact
