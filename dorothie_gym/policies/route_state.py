@@ -110,8 +110,8 @@ class RouteState:
         for cost in dict.fromkeys((progress.manoeuvre_cost, 0.0)):  # rather a U-turn than another lap
             found = router(town).route(start, progress.goal, closed, cost)
             if found is not None and found.length <= longest:
-                spared = RouteProgress.plan(town, start, progress.goal, closed, cost)
-                return replace(self, worn=places, progress=spared)
+                another = RouteProgress.plan(town, start, progress.goal, closed, cost)
+                return replace(self, worn=places, progress=another)
         return replace(self, worn=())
 
     def has_missed(self, before: float, station: float) -> bool:

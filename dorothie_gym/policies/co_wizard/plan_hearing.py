@@ -195,7 +195,7 @@ def _without_opening(heard: HeardUtterance) -> tuple[PlanStep, ...]:
     """Returns the steps of an utterance, where "go ahead and turn left" does not ask to go straight on first."""
     steps = heard.words.plan.steps
     first = steps[0]
-    plain = first.condition is first.ordinal is first.distance is first.place is None
+    plain = all(detail is None for detail in (first.condition, first.ordinal, first.distance, first.place))
     opens = first.action in (StepAction.STRAIGHT, StepAction.GO) and plain
     return steps[1:] if opens and steps[1:] and _GO_AHEAD.match(heard.words.text) else steps
 
