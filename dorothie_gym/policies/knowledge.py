@@ -20,6 +20,7 @@ from dorothie_gym.policies.co_wizard.config import CoWizardConfig
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.scripted_agent_limits import USUAL_SPEED
+from dorothie_gym.policies.travel_time import CruiseSpeed
 
 TOLD_TO_STOP: Final = Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
 """The usual reason for stopping on an instruction."""
@@ -81,6 +82,7 @@ class CoWizardKnowledge:
         rests_for: obstacle for which the car stops by a decision.
         rests_until: end of that stop [s].
         usual_speed: cruise speed where nothing is said about it [km/h].
+        cruise: cruise speed that is meant now and later.
     """
 
     town: Town
@@ -105,3 +107,4 @@ class CoWizardKnowledge:
     rests_for: ObjectClass = ObjectClass.UNLABELED
     rests_until: float = -math.inf
     usual_speed: int = USUAL_SPEED
+    cruise: CruiseSpeed = CruiseSpeed()

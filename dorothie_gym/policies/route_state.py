@@ -23,7 +23,7 @@ WAY_ROUND = 60.0
 WORN_OUT = 2
 """Number of times that a section of road is driven on the way to one goal before another route is taken."""
 
-WORN_DETOUR = 350.0
+WORN_DETOUR = 600.0
 """Largest additional length of such a route [m]."""
 
 MOST_AVOIDED = 3
@@ -95,7 +95,8 @@ class RouteState:
     def sparing_worn(self, town: Town, start: Place) -> RouteState:
         """Plans a route without the sections that the car has driven twice, where the present one uses any.
 
-        Sections of the car and of the goal remain. The route is kept if the other one is much longer.
+        Sections of the car and of the goal remain. U-turns and lane changes that the route avoids are allowed where it
+        cannot spare the sections without them. The route is kept if the other one is much longer.
         """
         progress = self.to_goal
         spared = {section(town, start[0]), section(town, progress.goal[0])}
@@ -105,10 +106,13 @@ class RouteState:
         lanes = (lane for lane in town.lanes if not lane.in_junction and section(town, lane.id) in worn)
         places = tuple((lane.id, lane.length / 2.0) for lane in lanes)
         closed = self.blocked + self.avoided + self.kept_off + places
-        found = router(town).route(start, progress.goal, closed, progress.manoeuvre_cost)
-        if found is None or found.length > progress.left(start[1]) + WORN_DETOUR:
-            return replace(self, worn=())
-        return replace(self, worn=places, progress=progress.replanned(town, start, closed))
+        longest = progress.left(start[1]) + WORN_DETOUR
+        for cost in dict.fromkeys((progress.manoeuvre_cost, 0.0)):  # rather a U-turn than another lap
+            found = router(town).route(start, progress.goal, closed, cost)
+            if found is not None and found.length <= longest:
+                another = RouteProgress.plan(town, start, progress.goal, closed, cost)
+                return replace(self, worn=places, progress=another)
+        return replace(self, worn=())
 
     def has_missed(self, before: float, station: float) -> bool:
         """Returns whether the goal, `before` metres ahead on the previous route, now needs a long detour."""

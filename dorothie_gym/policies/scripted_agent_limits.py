@@ -16,8 +16,12 @@ RAIN_LIMIT = 55.0
 USUAL_SPEED = 40
 """Default cruise speed on open road [km/h], which route costs assume."""
 
-NUDGE_DISTANCE = 2.0
-"""Distance meant by "a bit further" [m]; shorter than the stretch around a goal that counts as arrived."""
+NUDGE_DISTANCE = 3.0
+"""Distance meant by "a bit further" [m], of which a car stops half a metre short.
+
+Two of them lead to a goal from `participant.arriving.FURTHER` before it. One does not lead past the stretch around the
+goal that counts as arrived.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import statistics
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
 from dorothie_gym.maps.town import LightColour, Town
-from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED
+from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED, USUAL_SPEED
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.route_progress import RouteProgress
@@ -23,9 +23,36 @@ _DELAYS: Final = (0.8, 0.9, 1.0, 1.1, 1.2)  # factors on the time of driving, eq
 _SETTING_OFF: Final = 2.0  # from a standstill, also before a light that turns green [s]
 _PULLING_UP: Final = 5.0  # at the goal [s]
 _LONGEST_RED: Final = 120.0  # [s]
+_SLOWEST: Final = 10.0  # cruise speed below which cars are not set [km/h]
 
 
-def travel_time(town: Town, progress: RouteProgress, station: float, now: float, speed: float) -> float:
+class CruiseSpeed(NamedTuple):
+    """Cruise speed that a car is set to.
+
+    Attributes:
+        now: present speed [km/h].
+        later: speed from a time on [km/h].
+        until: that time [s].
+    """
+
+    now: float = USUAL_SPEED
+    later: float = USUAL_SPEED
+    until: float = math.inf
+
+    def pace(self, time: float) -> float:
+        """Returns the speed between junctions at a time [m/s, s]."""
+        speed = self.now if time < self.until else self.later
+        return _PACE * min(max(speed, _SLOWEST) / USUAL_SPEED, 1.0)
+
+
+def travel_time(
+    town: Town,
+    progress: RouteProgress,
+    station: float,
+    now: float,
+    speed: float,
+    cruise: CruiseSpeed | None = None,
+) -> float:
     """Returns the expected time until the car stops at the goal of a route [s]; infinity without a route.
 
     The car waits at the lights that are red when it reaches them: navigation systems know their programmes. As
@@ -37,18 +64,22 @@ def travel_time(town: Town, progress: RouteProgress, station: float, now: float,
         station: distance of the car along its lane [m].
         now: time [s].
         speed: current speed [m/s].
+        cruise: cruise speed of the car; None for the usual one. A faster one saves no time in a town.
     """
     if not progress.legs:
         return math.inf
     begun = now + (_SETTING_OFF if speed < STANDING_SPEED else 0.0)
-    return statistics.fmean(_arrival(town, progress, station, begun, delay) for delay in _DELAYS) - now
+    driven = CruiseSpeed() if cruise is None else cruise
+    return statistics.fmean(_arrival(town, progress, station, begun, driven, delay) for delay in _DELAYS) - now
 
 
-def _arrival(town: Town, progress: RouteProgress, station: float, begun: float, delay: float) -> float:
+def _arrival(
+    town: Town, progress: RouteProgress, station: float, begun: float, cruise: CruiseSpeed, delay: float
+) -> float:
     """Returns the time at which a car that sets off at a time stops at the goal, with a factor on driving."""
     time, start = begun, station
     for leg, following in zip(progress.legs, (*progress.legs[1:], None), strict=True):
-        time += delay * _seconds_on(town, leg, start)
+        time += delay * _seconds_on(town, leg, start, cruise.pace(time))
         start = -math.inf
         if following is not None:
             if town.lanes[following.lane].in_junction:
@@ -57,12 +88,12 @@ def _arrival(town: Town, progress: RouteProgress, station: float, begun: float, 
     return time + _PULLING_UP
 
 
-def _seconds_on(town: Town, leg: Leg, start: float) -> float:
+def _seconds_on(town: Town, leg: Leg, start: float, pace: float) -> float:
     """Returns the time for a leg after a place [s]; for minus infinity, of the whole leg with the U-turn into it."""
     length = max(leg.end - max(leg.start, start), 0.0)
     if town.lanes[leg.lane].in_junction:
-        return _CROSSING + length / _CROSSING_PACE
-    return length / _PACE + (_TURNING_ROUND if leg.entry is LaneEntry.U_TURN and start == -math.inf else 0.0)
+        return max(_CROSSING + length / _CROSSING_PACE, length / pace)
+    return length / pace + (_TURNING_ROUND if leg.entry is LaneEntry.U_TURN and start == -math.inf else 0.0)
 
 
 def _after_red(town: Town, lane: int, time: float) -> float:

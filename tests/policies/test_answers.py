@@ -12,7 +12,7 @@ from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
 from dorothie_gym.policies.co_wizard.proposition_truth import seconds_to_goal
 from dorothie_gym.policies.policy import replace as changed
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.policies.travel_time import travel_time
+from dorothie_gym.policies.travel_time import CruiseSpeed, travel_time
 from tests.policies.test_reasons import DRIVING, on_the_way, view_of
 
 M = DialogueMove
@@ -96,6 +96,10 @@ def test_travel_time_grows_with_the_way_and_includes_red_lights():
     halfway = progress.legs[len(progress.legs) // 2]
     later = progress.replanned(town, (halfway.lane, halfway.start))
     assert travel_time(town, later, halfway.start, 0.0, 8.0) < max(times)
+    slow, usual, fast = (travel_time(town, progress, 0.0, 0.0, 5.0, CruiseSpeed(now)) for now in (20.0, 40.0, 55.0))
+    assert 1.3 * usual < slow < 2.2 * usual and fast == usual, "lights and junctions cost the same at any speed"
+    for_a_while = travel_time(town, progress, 0.0, 0.0, 5.0, CruiseSpeed(20.0, 40.0, until=10.0))
+    assert usual < for_a_while < slow
     nowhere = changed(progress, route=None)
     assert travel_time(town, nowhere, 0.0, 0.0, 8.0) == float("inf")
     assert router(town).route(view_of(talk).here, progress.goal) is not None

@@ -8,6 +8,7 @@ import pytest
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
 from dorothie_gym.policies.participant.config import ParticipantConfig
+from dorothie_gym.policies.participant.given_orders import note_said
 from dorothie_gym.policies.participant.guidance import guide
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.retrying import why_standing
@@ -118,6 +119,7 @@ def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time(
     for _ in range(6):
         human.says()
         told.append(human.state.speech.queue[0].act)
+        note_said(human.state, human.view, human.state.speech.queue[0])
         human.state.speech = replace(human.state.speech.cleared(), last_end=-100.0)
         human.observation["time"] = human.observation["time"] + 10.0
     further, why, start = (
@@ -205,3 +207,11 @@ def test_stop_that_is_not_heeded_is_repeated_shortly_behind_the_place(
     human.state.speech = human.state.speech.cleared()
     human.observation["time"] = human.observation["time"] + 4.5
     assert human.says() == said
+
+
+@pytest.mark.parametrize(("before", "stops"), [(9.6, True), (9.76, True), (11.0, False)])
+def test_car_that_does_not_brake_is_stopped_in_time_although_the_place_was_announced(before, stops):
+    human = Guide(32.0, speed=9.75)
+    human.state.guidance = human.state.guidance.with_approach_announced(True).with_stop_text("stop here please")
+    human.state.motion = replace(human.state.motion, speed=before)
+    assert human.says() == ([ActionValue.STOP] if stops else [])

@@ -8,7 +8,9 @@ import pytest
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueMove, Slot
+from dorothie_gym.policies.participant.given_orders import note_said
 from dorothie_gym.policies.participant.guidance import guide
+from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import remark_on_miss, remark_on_wrong_turn
 from dorothie_gym.policies.participant.state import StepKey
 from tests.policies.test_arriving import Guide
@@ -31,10 +33,15 @@ def before_u_turn(human: Guide) -> None:
     raise AssertionError("no place from which the car would turn round")
 
 
+def told_to_turn_round(human: Guide, times: int) -> None:
+    for _ in range(times):
+        note_said(human.state, human.view, order(DialogueMove.INSTRUCT, ActionValue.U_TURN))
+
+
 def test_third_u_turn_is_replaced_by_a_remark_and_another_way():
     human = Guide(1.0)
     before_u_turn(human)
-    human.state.guidance = replace(human.state.guidance, u_turns=2)
+    told_to_turn_round(human, 2)
     guide(human.state, human.view, human.rng)
     assert predicates(human) == [Predicate.TRIED, Predicate.WILL]
     assert human.moves() == [DialogueMove.EXPLAIN, DialogueMove.INSTRUCT]
@@ -47,7 +54,8 @@ def test_third_u_turn_is_replaced_by_a_remark_and_another_way():
 def test_second_u_turn_is_given_without_a_remark():
     human = Guide(1.0)
     before_u_turn(human)
-    human.state.guidance = replace(human.state.guidance, u_turns=1)
+    told_to_turn_round(human, 1)
+    human.state.guidance = replace(human.state.guidance, u_turns=2)  # planned, but not said
     guide(human.state, human.view, human.rng)
     assert Predicate.TRIED not in predicates(human)
 
@@ -55,7 +63,8 @@ def test_second_u_turn_is_given_without_a_remark():
 def test_car_that_has_not_moved_since_the_last_order_does_not_circle():
     human = Guide(1.0)
     before_u_turn(human)
-    human.state.guidance = replace(human.state.guidance, u_turns=2, step_at=45.0)
+    told_to_turn_round(human, 2)
+    human.state.guidance = replace(human.state.guidance, step_at=45.0)
     human.state.motion = replace(human.state.motion, moved_at=40.0, standing_since=40.0)
     guide(human.state, human.view, human.rng)
     assert Predicate.TRIED not in predicates(human)
@@ -75,6 +84,8 @@ def test_car_that_has_said_what_keeps_it_is_not_told_to_turn_round_again(excused
 def test_place_that_was_passed_twice_is_remarked_on():
     human = Guide(20.0, speed=6.0)
     assert human.state.task.goal is not None
+    for away in (90.0, 10.0, 90.0, 10.0):
+        human.state.guidance = human.state.guidance.near_place(away)
     for misses, expected in ((1, [Predicate.WILL]), (2, [Predicate.PASSED, Predicate.WILL])):
         human.state.route = replace(human.state.route, misses=misses)
         remark_on_miss(human.state, human.view, passed=True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue import Predicate
-from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role
+from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role, StreetName
 from dorothie_gym.policies.participant.replies import listen
 from tests.policies.said import with_words
 from tests.policies.test_repairs import Human
@@ -44,3 +44,14 @@ def test_open_question_of_which_nothing_is_understood_is_asked_back_once():
     human.state.speech = replace(human.state.speech.cleared(), last=asked_back)
     hears(human, "what alice is them", M.QUERY_W)
     assert human.moves()[0] is M.REPLY_W
+
+
+def test_wrong_street_is_corrected_even_if_the_place_was_misheard():
+    for right in (False, True):
+        human = Human()
+        goal = human.state.task.destination
+        others = (name for name in StreetName if name not in (goal.street, StreetName.UNKNOWN, StreetName.QUERIED))
+        street = goal.street if right else next(others)
+        raw = with_words(human.observation, Role.CO_WIZARD, "did you mean that", DialogueAct.of(M.CHECK, street))
+        listen(human.state, replace(human.view, raw=raw), human.rng)
+        assert (human.moves()[0] is M.CONFIRM) is right

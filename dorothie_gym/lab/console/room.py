@@ -207,6 +207,7 @@ class Room:
             if seat.inbox is not None:
                 seat.inbox.clear()
         self._frames.events.clear()
+        self._frames.asked.begin(self._seed)
         self._hear()
         self.record, self._early = None, []
         if resumed is not None:
@@ -344,6 +345,8 @@ class Room:
     def _hear(self) -> None:
         session = self.engine.session
         observations = self.engine.observations.of(AGENT_ROLES)
+        if Role.CO_WIZARD.value in self.seats:
+            self._frames.asked.hear(observations[Role.CO_WIZARD.value])
         for seat in self._all():
             if seat.role is not None:
                 seat.talk.hear(observations[seat.role.value])

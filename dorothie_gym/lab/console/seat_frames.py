@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from dorothie_gym.lab.console.asked_steps import AskedSteps
 from dorothie_gym.lab.console.connection import Connection, changes, encode
 from dorothie_gym.lab.console.seat import EXPERIMENTER, Outgoing, PauseReason, RoomState, Seat
 from dorothie_gym.lab.console.seating import SeatPlan
@@ -54,6 +55,7 @@ class SeatFrames:
 
     Attributes:
         events: events of the session in JSON types, for spectators.
+        asked: steps that the participant has asked for, shown to the Co-Wizard.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class SeatFrames:
         self._engine, self._seats, self._config, self._places = engine, seats, config, places
         self._windscreen = windscreen
         self.events: list[dict[str, Any]] = []
+        self.asked = AskedSteps(engine)
 
     def of(self, status: RoomStatus) -> Iterator[Outgoing]:
         """Yields the message to each browser at a tick; none if nothing has changed."""
@@ -101,7 +104,8 @@ class SeatFrames:
         if seat.role is None:
             return spectator_view(self._engine.session, self._places)
         observation = self._engine.observations[seat.role.value]
-        return role_view(seat.role, observation, self._engine.mask(seat.role), self._places)
+        view = role_view(seat.role, observation, self._engine.mask(seat.role), self._places)
+        return {**view, "asked": self.asked.words} if seat.role is Role.CO_WIZARD else view
 
     def _state(self, seat: Seat, status: RoomStatus) -> dict[str, Any]:
         state: dict[str, Any] = {

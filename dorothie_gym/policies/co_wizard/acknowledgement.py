@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.ontology.slots import ActionValue, ObjectClass
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.proposition_truth import DETOUR_TIME, believes, seconds_to_goal
+from dorothie_gym.policies.co_wizard.proposition_truth import DETOUR_TIME, believes, reason_to_stand, seconds_to_goal
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.sim.state.codes import Motion
@@ -23,6 +23,14 @@ if TYPE_CHECKING:
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 """Actions that are carried out immediately, and thus never checked with the participant."""
+
+STEERING_AWAY: Final = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
+"""Requests that a car which is held up keeps for later."""
+
+KEPT_AGAIN: Final = 20.0
+"""Time after which a car that is held up says once more by what [s]."""
+
+_GOING: Final = frozenset({ActionValue.LANE_FOLLOW, ActionValue.START})
 
 
 def acknowledge(
@@ -64,6 +72,31 @@ def acknowledge(
     else:
         more = plan_remark(state, view, rng, joined=True) if state.beliefs.exact and action not in _AT_ONCE else ()
         state.say(taken_on(state, wanted, rng), *more)
+
+
+def what_keeps(state: CoWizardState, view: CoWizardView, action: ActionValue) -> Remark | None:
+    """Returns why the car cannot drive on yet, as a reply to a request to do so; None if nothing holds it up.
+
+    A red light is only mentioned to those who want the car to go at once. What has just been said is not said again.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        action: requested action.
+    """
+    red = view.hazard is ObjectClass.TRAFFIC_LIGHT
+    if action not in (_GOING if red else _GOING | STEERING_AWAY):
+        return None
+    if not view.standing or view.motion is not Motion.HAZARD or view.hazard is ObjectClass.UNLABELED:
+        return None
+    lately = view.time - state.dialogue.hazard_explained_at < KEPT_AGAIN
+    reason = None if lately else reason_to_stand(state.knowledge, view)
+    if reason is None:
+        return None
+    state.dialogue = state.dialogue.after_explaining_hazard(view.time)
+    stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+    because = Proposition.of(Predicate.BECAUSE, effect=stands, cause=reason)
+    return intend(Function.INFORM, because, wording=Wording(topic="because_standing"))
 
 
 def sign_of_hearing(topic: str) -> Remark:

@@ -51,6 +51,12 @@ _ABOUT_THE_VIEW = frozenset({Predicate.VISIBILITY, Predicate.SAFE, Predicate.FAI
 _REQUEST = re.compile(r"\b(could|can|would|will) you\b(?!.*\b(know|find|see|remember|hear|tell|take)\b)")
 """Words that request an action, even if the verb was misheard."""
 
+_MODAL = re.compile(r"^\W*(?:\w+\W+){0,2}?(could|can|would|will)\b(?!\W+(it|that|there|this|they)\b)", re.I)
+"""Beginning of a request, of which "you" may be misheard: "could aw please stop here?"."""
+
+_ASKING = re.compile(r"\b(are|is|was|were|did|do|does|have|has|should|shall|am)\b|'(re|s|m)\b", re.I)
+"""Verb of a question about what the car does."""
+
 RECENT_STOP = 45.0
 """Time after a standstill within which the participant can ask for its reason [s]."""
 
@@ -64,7 +70,7 @@ def answer_yes_no(
     requests = words.asked is None and _REQUEST.search(words.text.lower()) is not None
     if requests and place is not None:
         set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
-    elif requests:
+    elif requests or (place is None and _is_order(act) and not _ASKING.search(words.text)):
         ask_back(state, view, words)  # a request that was misheard is not refused
     elif asked is None:
         ask_back(state, view, words, question=True)
@@ -82,8 +88,13 @@ def answer_yes_no(
 
 def asks_to_act(act: DialogueAct, words: ParsedText) -> bool:
     """Returns whether a question asks the car to do something: "could you stop here?"."""
-    actions = set(act.values(Slot.ACTION)) - {ActionValue.LIGHT_CHANGE, ActionValue.QUERIED}
-    return bool(actions) and _REQUEST.search(words.text.lower()) is not None
+    asks = _REQUEST.search(words.text.lower()) or _MODAL.match(words.text)
+    return _is_order(act) and asks is not None
+
+
+def _is_order(act: DialogueAct) -> bool:
+    """Returns whether an act names an action that the car could be asked for."""
+    return bool(set(act.values(Slot.ACTION)) - {ActionValue.LIGHT_CHANGE, ActionValue.QUERIED})
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:

@@ -100,7 +100,7 @@ class CoWizardConfig:
     wish_time: float = 30.0
     nudge_distance: float = NUDGE_DISTANCE
     recent_stop: float = 40.0
-    open_road_speed: int = 20
+    open_road_speed: int = 25
     slow_time: float = 40.0
     answer_time: float = 12.0
     pause_time: float = 30.0

@@ -16,7 +16,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, sign_of_hearing
+from dorothie_gym.policies.co_wizard.acknowledgement import STEERING_AWAY, acknowledge, sign_of_hearing, what_keeps
 from dorothie_gym.policies.co_wizard.answers import (
     answer_check,
     answer_open,
@@ -27,6 +27,7 @@ from dorothie_gym.policies.co_wizard.answers import (
 from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
 from dorothie_gym.policies.co_wizard.goals import (
+    COMMON,
     abandon,
     accept_offer,
     accept_street,
@@ -34,6 +35,7 @@ from dorothie_gym.policies.co_wizard.goals import (
     complete,
     doubt,
     hear_description,
+    is_on_another_street,
     plan_route,
     postpone,
     set_goal,
@@ -47,6 +49,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,
     check_goal,
     expects_stop,
+    hear_wrong_way,
     is_garbled,
     is_unclear,
     is_unclear_reply,
@@ -188,11 +191,15 @@ def _obey(
         if not state.beliefs.exact:  # the car is guided and need not search for the place
             state.route = state.route.with_progress(None)
     settle_with_order(state, actions, words)
-    contradicts = note_contradiction(state, view, actions[0], words)
+    contradicts = note_contradiction(state, view, actions[0], words.direction, words.ordinal)
     for action in actions:
         OBEYED[action](state, view, act, words)
     answers = act.move is not DialogueMove.INSTRUCT and actions[0] in _WAYS
-    acknowledge(state, view, actions[0], words, rng, answers=answers)
+    keeps = what_keeps(state, view, actions[0])
+    if keeps is None or actions[0] in STEERING_AWAY:
+        acknowledge(state, view, actions[0], words, rng, answers=answers)
+    if keeps is not None:
+        state.say(replace(keeps, joined=not state.speech.idle))
     if ActionValue.SPEED_CHANGE in actions and words.speed is not None:
         state.say(*limit_remark(state, view, words.speed))
     note_order(state, view, actions[0])
@@ -205,7 +212,8 @@ def _instructed_place(
 ) -> None:
     landmarks = act_builders.named_landmarks(act)
     statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
-    known = state.beliefs.exact or state.beliefs.described
+    # where the town has several, the one that the car is being guided to is meant, not another one on its map
+    known = state.beliefs.exact or state.beliefs.described or landmarks[0] in COMMON
     if GoalStatus.ABANDONED in statuses:
         _abandoned_place(state, view, act, words, rng)
     elif GoalStatus.PENDING in statuses:
@@ -332,11 +340,7 @@ def _statement(
     name = landmarks[0] if landmarks else None
     if "wrong" in words.text.lower():
         state.feel(Happening.WRONG_WAY, view.time)
-        if not state.beliefs.exact:
-            state.route = state.route.with_progress(None)
-        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
-        if state.beliefs.exact and state.beliefs.goal is not None:
-            state.say(intend(Function.CHECK_QUESTION, act_builders.destination(state.beliefs.goal), joined=True))
+        hear_wrong_way(state, view)
     elif _is_called_dark(words) and not view.lights:
         switch_lights_on(state)
     elif GoalStatus.PENDING in statuses and name is not None:
@@ -379,7 +383,8 @@ def _reply(
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
     landmarks, streets, goal = act_builders.named_landmarks(act), act_builders.named_streets(act), state.beliefs.goal
-    if act.move is DialogueMove.CLARIFY and landmarks and goal is not landmarks[0]:
+    other = bool(landmarks) and (goal is not landmarks[0] or is_on_another_street(state, view, streets))
+    if act.move is DialogueMove.CLARIFY and other:
         set_goal(state, view, landmarks[0], streets, rng, corrected=True)
     elif (goal is None or state.intentions.arrived) and landmarks:
         set_goal(state, view, landmarks[0], streets, rng)

@@ -142,7 +142,7 @@ def _time(
     mark = next((mark for mark in view.landmarks if mark.name is place), None)
     if place not in (None, goal) and mark is not None:
         progress = RouteProgress.plan(state.town, view.here, mark.place, state.route.blocked)
-        expected = travel_time(state.town, progress, view.station, view.time, view.speed)
+        expected = travel_time(state.town, progress, view.station, view.time, view.speed, state.knowledge.cruise)
         seconds = round(expected) if expected < 1e5 else None
     elif place not in (None, goal):
         seconds = None

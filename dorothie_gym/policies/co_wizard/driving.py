@@ -13,7 +13,6 @@ from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.intentions import Wish
-from dorothie_gym.policies.co_wizard.plan_memory import StepStage
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, slowing_distance, u_turn_start
@@ -43,6 +42,9 @@ CRUISE_TOLERANCE = 2.6
 
 STOP_MARGIN = 0.2
 """Distance by which Stop is commanded early rather than late [m]."""
+
+AT_GOAL = 15.0
+"""Distance to a goal within which a car that was sent on a little has arrived there [m]."""
 
 JUNCTION_LENGTH = 25.0
 """Way through a junction in which the car does not stop on request [m]."""
@@ -108,11 +110,18 @@ def _stop_at_place(state: CoWizardState, view: CoWizardView) -> Physical | None:
     later = left - _way_to_next_decision(state, view) if nudge is not None else left - view.speed * state.clock.interval
     if left + later > 2.0 * STOP_MARGIN:
         return None
-    planned = nudge is not None and state.plan.stage is StepStage.BEGUN and state.beliefs.exact
-    arrived = state.beliefs.goal is not None and not planned
+    elsewhere = nudge is not None and state.beliefs.exact and not _is_at_goal(state, view)
+    arrived = state.beliefs.goal is not None and not elsewhere
     state.intentions = state.intentions.stopped_at_place(arrived=arrived, sent_on=nudge is not None)
     state.commands = state.commands.after_stop(view.time)
     return Physical(action=PhysicalAction.STOP)
+
+
+def _is_at_goal(state: CoWizardState, view: CoWizardView) -> bool:
+    """Returns whether a goal on the map is close ahead or just behind."""
+    place = state.beliefs.stop_place
+    distance = None if place is None else distance_ahead(state, view, place)
+    return distance is not None and abs(distance) < AT_GOAL
 
 
 def _way_to_next_decision(state: CoWizardState, view: CoWizardView) -> float:
@@ -137,8 +146,14 @@ def _carry_out_wish(state: CoWizardState, view: CoWizardView) -> Physical | None
             state.intentions = state.intentions.without_wish()
             return None
         return _turn_round(state, view)
+    if view.manoeuvre is PhysicalAction.LANE_SWITCH and state.intentions.wish_sent:
+        state.intentions = state.intentions.without_wish()
+        return None
     side = LinkType.LANE_CHANGE_LEFT if wish is Wish.SWITCH_LEFT else LinkType.LANE_CHANGE_RIGHT
-    return _switch(state, view, side)
+    command = _switch(state, view, side)
+    if command is not None:
+        state.intentions = state.intentions.with_wish_sent()
+    return command
 
 
 def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
@@ -161,8 +176,6 @@ def _switch(state: CoWizardState, view: CoWizardView, side: LinkType) -> Physica
     ready = not view.manoeuvring and waited >= state.clock.interval and not state.town.lanes[view.lane].in_junction
     if not ready or not can_switch_lane(state.town, view.lane, view.station, side):
         return None
-    if state.intentions.wish is not Wish.U_TURN:
-        state.intentions = state.intentions.without_wish()
     _note_manoeuvre(state, view)
     angle = LANE_SWITCH_LEFT if side is LinkType.LANE_CHANGE_LEFT else LANE_SWITCH_RIGHT
     return Physical(action=PhysicalAction.LANE_SWITCH, angle=int(angle))

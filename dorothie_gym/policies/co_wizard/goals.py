@@ -17,7 +17,7 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.errand_memory import kept_for_later
-from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
+from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
-_COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
-"""Names that several places bear."""
+COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
+"""Names of which a town may have several places."""
 
 
 def known_landmark(
@@ -39,7 +39,7 @@ def known_landmark(
     if fitting:
         return fitting[0]
     # a unique name identifies the place even if the street was not understood
-    return found[0] if found and (not streets or name not in _COMMON) else None
+    return found[0] if found and (not streets or name not in COMMON) else None
 
 
 def aim(state: CoWizardState, view: CoWizardView, mark: SeenLandmark) -> None:
@@ -112,7 +112,7 @@ def set_goal(
             state.say(intend(Function.INFORM, act_builders.action(ActionValue.U_TURN), joined=True))
     elif corrected:
         state.say(intend(Function.ACCEPT, act_builders.destination(name), wording=Wording(topic="sorry")))
-    elif not sure or (not streets and rng.random() < state.style.checks * (2.0 if name in _COMMON else 0.6)):
+    elif not sure or (not streets and rng.random() < state.style.checks * (2.0 if name in COMMON else 0.6)):
         state.say(intend(Function.CHECK_QUESTION, act_builders.destination(name, mark.street)))
     else:
         street = mark.street if streets and rng.random() < state.style.echoes else None
@@ -202,6 +202,20 @@ def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
     state.say(intend(Function.ACCEPT, act_builders.destination(mark.name), wording=Wording(topic="taken")))
 
 
+def believed_destination(state: CoWizardState, view: CoWizardView) -> Proposition:
+    """Returns the destination for a check; where the town has several of its kind, with the street of the place."""
+    goal, place = state.beliefs.goal, state.beliefs.stop_place
+    if goal not in COMMON or place is None:
+        return act_builders.destination(goal)
+    return act_builders.destination(goal, street_of(view.raw, state.town, place[0]))
+
+
+def is_on_another_street(state: CoWizardState, view: CoWizardView, streets: Sequence[StreetName]) -> bool:
+    """Returns whether the place of the destination, of which the town has several, is on none of the streets named."""
+    believed = believed_destination(state, view).get("street")
+    return believed is not None and bool(streets) and believed not in streets
+
+
 def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
     """Prepares a stop at a distance ahead, possibly at a named place, which the car approaches slowly.
 
@@ -213,7 +227,7 @@ def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName |
     """
     if name is not None:
         mark = known_landmark(state, view, name, ())
-        if mark is not None and mark.name not in _COMMON:
+        if mark is not None and mark.name not in COMMON:
             if state.beliefs.place != mark.place:
                 aim(state, view, mark)
             state.say(intend(Function.POSITIVE_FEEDBACK, act_builders.destination(name)))
@@ -296,10 +310,17 @@ def accept_street(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def search_on(state: CoWizardState, view: CoWizardView) -> None:
-    """Drops the guess of a place when the car has arrived there; from then on the car needs guidance."""
+    """Ends the way to a street, or to the guess of a place, when the car has arrived there.
+
+    From then on the car needs guidance, unless it knows its destination.
+    """
     progress = state.route.progress
-    if progress is not None and not state.beliefs.exact and progress.left(view.station) < state.config.search_radius:
+    if progress is None or progress.left(view.station) >= state.config.search_radius:
+        return
+    if not state.beliefs.exact:
         state.route = state.route.with_progress(None)
+    elif progress.goal != state.beliefs.place:
+        plan_route(state, view)
 
 
 def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:
@@ -325,7 +346,7 @@ def complete(state: CoWizardState, name: LandmarkName | None) -> None:
     done = name if name is not None else state.beliefs.goal
     if done is not None:
         state.beliefs = state.beliefs.with_status(done, GoalStatus.COMPLETE)
-    if done in _COMMON and state.beliefs.exact:
+    if done in COMMON and state.beliefs.exact:
         state.beliefs = state.beliefs.with_place_ruled_out()
     state.leave_goal()
     state.intentions = state.intentions.halting().with_speed(state.intentions.usual)
@@ -335,7 +356,7 @@ def complete(state: CoWizardState, name: LandmarkName | None) -> None:
 def doubt(state: CoWizardState) -> None:
     """Drops the assumed place of the goal; the car then needs guidance."""
     if state.beliefs.exact and state.beliefs.place is not None:
-        if state.beliefs.goal in _COMMON:
+        if state.beliefs.goal in COMMON:
             state.beliefs = state.beliefs.with_place_ruled_out()
         state.beliefs = state.beliefs.without_place()
         state.route = state.route.with_progress(None)

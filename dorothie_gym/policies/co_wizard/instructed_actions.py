@@ -58,7 +58,8 @@ def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 
 def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    close = state.intentions.halted or state.intentions.creeping or view.standing
+    lost = view.standing and not state.beliefs.exact  # a car that knows its way stands for the traffic
+    close = state.intentions.halted or state.intentions.creeping or lost
     choice = junction_meant(state.town, view.here, view.choice)
     way = math.inf if choice is None else choice.distance
     across = words.direction is Direction.STRAIGHT or way < STRAIGHT_ON_DISTANCE

@@ -10,6 +10,7 @@ from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.travel_time import CruiseSpeed
 
 
 class Wish(enum.Enum):
@@ -45,6 +46,7 @@ class Intentions:
         directive: requested turn.
         wish: requested manoeuvre.
         wish_until: time at which the manoeuvre is given up [s].
+        wish_sent: whether it was commanded.
         halted: whether the car must stand.
         nudge: place a little further on where the car must stop again.
         creeping: whether the goal is close and its guessed place is carried along ahead of the car.
@@ -60,6 +62,7 @@ class Intentions:
     directive: Directive | None = None
     wish: Wish | None = None
     wish_until: float = 0.0
+    wish_sent: bool = False
     halted: bool = False
     nudge: Place | None = None
     creeping: bool = False
@@ -112,7 +115,11 @@ class Intentions:
 
     def switching(self, wish: Wish, until: float) -> Intentions:
         """Carries out an instruction to switch lanes, given up after `until` [s]."""
-        return replace(self, wish=wish, wish_until=until, halted=False)
+        return replace(self, wish=wish, wish_until=until, wish_sent=False, halted=False)
+
+    def with_wish_sent(self) -> Intentions:
+        """Records that the manoeuvre was commanded; there may be no room for it yet."""
+        return self if self.wish_sent else replace(self, wish_sent=True)
 
     def wishing_until(self, until: float) -> Intentions:
         """Extends the time for the manoeuvre to `until` at least [s]."""
@@ -162,9 +169,15 @@ class Intentions:
         """Sets whether to stop before the junction ahead."""
         return replace(self, pausing=pausing)
 
+    @property
+    def cruise(self) -> CruiseSpeed:
+        """Cruise speed that is meant now, and after a temporary one."""
+        until = self.slow_until if self.speed < self.usual else math.inf
+        return CruiseSpeed(self.speed, self.usual, until)
+
     def with_speed(self, speed: int) -> Intentions:
-        """Sets the target cruise speed [km/h]; the usual speed stays unchanged."""
-        return replace(self, speed=speed)
+        """Sets the target cruise speed [km/h] until further notice; the usual speed stays unchanged."""
+        return replace(self, speed=speed, slow_until=math.inf)
 
     def slow_longer(self, seconds: float) -> Intentions:
         """Extends a temporary speed, by the time that the car stands [s]."""

@@ -226,8 +226,7 @@ def _carry_follow(state: CoWizardState, view: CoWizardView, step: PlanStep) -> b
     if plan.stage is StepStage.UNDER_WAY:
         return not on_it and not state.town.lanes[view.lane].in_junction
     if on_it:
-        if not state.beliefs.exact:
-            state.route = state.route.with_progress(None)
+        plan_route(state, view)  # to the destination, if that is on the map: the way so far ends at the street
         state.plan = plan.staged(StepStage.UNDER_WAY, view.time)
         return len(plan.steps) > 1 or state.beliefs.exact
     if state.route.progress is None or state.beliefs.exact:

@@ -21,6 +21,7 @@ from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING
 from dorothie_gym.policies.co_wizard.plan_objections import object_to
 from dorothie_gym.policies.co_wizard.plan_points import first_objection
+from dorothie_gym.policies.co_wizard.repairs import check_goal, note_contradiction
 from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 _GOES_ON: Final = re.compile(r"^(?:(?:okay|ok|yes|yeah|and|so|um|uh)[, ]+)*(?:then|after that|afterwards|next)\b", re.I)
 """Beginning of an utterance that goes on with the plan before."""
+
+_GO_AHEAD: Final = re.compile(r"^\W*(?:\w+\W+){0,4}?go ahead and\b", re.I)
+"""Opening of an order that asks for nothing by itself."""
 
 _REPAIRS: Final = re.compile(r"\b(not|no|nope|wrong|instead|sorry|meant?|rather|belay)\b", re.I)
 """Words of an utterance that corrects the one before."""
@@ -61,6 +65,9 @@ _SIGNS: Final = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, Dialo
 
 _DESCRIBING: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 """Moves by which a place may be described."""
+
+_STEERED: Final = {StepAction.TURN: ActionValue.J_TURN, StepAction.U_TURN: ActionValue.U_TURN}
+"""Actions by steps that may lead away from the route of the car."""
 
 _ONLY_HERE: Final = frozenset({Anaphor.HERE, Anaphor.THERE})
 
@@ -176,7 +183,31 @@ def take_plan(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, r
         heard: the utterance that states the plan.
         rng: random generator of the decision.
     """
-    steps, text = heard.words.plan.steps, heard.words.text
+    steps = _without_opening(heard)
+    action = _STEERED.get(steps[0].action)
+    leads_away = action is not None and note_contradiction(state, view, action, steps[0].direction, steps[0].ordinal)
+    _take_over(state, view, heard, steps, rng)
+    if leads_away:
+        check_goal(state, view)
+
+
+def _without_opening(heard: HeardUtterance) -> tuple[PlanStep, ...]:
+    """Returns the steps of an utterance, where "go ahead and turn left" does not ask to go straight on first."""
+    steps = heard.words.plan.steps
+    first = steps[0]
+    plain = all(detail is None for detail in (first.condition, first.ordinal, first.distance, first.place))
+    opens = first.action in (StepAction.STRAIGHT, StepAction.GO) and plain
+    return steps[1:] if opens and steps[1:] and _GO_AHEAD.match(heard.words.text) else steps
+
+
+def _take_over(
+    state: CoWizardState,
+    view: CoWizardView,
+    heard: HeardUtterance,
+    steps: tuple[PlanStep, ...],
+    rng: np.random.Generator,
+) -> None:
+    text = heard.words.text
     state.dialogue = state.dialogue.with_proposal(None).after_steering(view.time)
     corrected = corrected_step(state, heard)
     if corrected is not None:

@@ -142,6 +142,8 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
 def _update_route(state: CoWizardState, view: CoWizardView) -> None:
     """Updates standstill, directive and route with the position of the car."""
     state.standstill = state.standstill.observed(view.time, standing=view.standing)
+    if view.manoeuvring and not view.standing:
+        state.commands = state.commands.manoeuvring(view.time)
     if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
         # the manoeuvre cannot begin before the light is green
         state.intentions = state.intentions.wishing_until(view.time + state.config.red_light_extension)

@@ -65,7 +65,7 @@ def seconds_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> int | None:
     """Returns the expected time until the car stops at the goal [s]; None if its place is unknown or the car halts."""
     if known.progress is None or not known.goal_is_on_map or known.halted:
         return None
-    seconds = travel_time(known.town, known.progress, view.station, view.time, view.speed)
+    seconds = travel_time(known.town, known.progress, view.station, view.time, view.speed, known.cruise)
     return round(seconds) if math.isfinite(seconds) else None
 
 

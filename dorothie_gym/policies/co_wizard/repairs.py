@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.goals import doubt
+from dorothie_gym.policies.co_wizard.goals import believed_destination, doubt
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend, repeated
 
@@ -114,14 +114,47 @@ def repeat_last(state: CoWizardState) -> None:
     state.say(repeated(last, Function.CORRECTION) if again else replace(last, text="", joined=False))
 
 
-def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
-    """Counts an instruction that leads away from the route to a destination on the map; returns whether it does."""
-    if not _contradicts(state, view, action, words):
+def note_contradiction(
+    state: CoWizardState,
+    view: CoWizardView,
+    action: ActionValue,
+    direction: Direction | None,
+    ordinal: int | None = None,
+) -> bool:
+    """Counts an instruction that leads away from the route to a destination on the map; returns whether it does.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        action: requested action.
+        direction: side of a turn.
+        ordinal: number of the opportunity to turn, from 1.
+    """
+    if not _contradicts(state, view, action, direction, ordinal):
         return False
+    _count_contradiction(state)
+    return True
+
+
+def _count_contradiction(state: CoWizardState) -> int:
+    """Counts a contradiction to the destination; returns the number of those to the present one."""
     goal, count = state.dialogue.contradicted
     count = count + 1 if goal is state.beliefs.goal else 1
     state.dialogue = state.dialogue.with_contradictions(state.beliefs.goal, count)
-    return True
+    return count
+
+
+def hear_wrong_way(state: CoWizardState, view: CoWizardView) -> None:
+    """Apologises for a wrong way, and checks the destination once; if it is the wrong way again, gives up its place."""
+    if not state.beliefs.exact:
+        state.route = state.route.with_progress(None)
+    state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
+    if not state.beliefs.exact or state.beliefs.goal is None:
+        return
+    if _count_contradiction(state) == 1:
+        state.say(intend(Function.CHECK_QUESTION, believed_destination(state, view), joined=True))
+    elif state.dialogue.contradicted[1] > state.config.contradictions:
+        check_goal(state, view)
 
 
 def check_goal(state: CoWizardState, view: CoWizardView) -> None:
@@ -134,7 +167,7 @@ def check_goal(state: CoWizardState, view: CoWizardView) -> None:
         return
     if count == state.config.contradictions:
         state.dialogue = state.dialogue.after_asking(view.time)
-        state.say(intend(Function.CHECK_QUESTION, act_builders.destination(goal)))
+        state.say(intend(Function.CHECK_QUESTION, believed_destination(state, view)))
     elif count >= 2 * state.config.contradictions:
         state.dialogue = state.dialogue.with_contradictions(goal, 0)
         doubt(state)
@@ -142,14 +175,16 @@ def check_goal(state: CoWizardState, view: CoWizardView) -> None:
         state.say(intend(Function.INFORM, unknown, elided=("place",)))
 
 
-def _contradicts(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
+def _contradicts(
+    state: CoWizardState, view: CoWizardView, action: ActionValue, direction: Direction | None, ordinal: int | None
+) -> bool:
     progress = state.route.progress
     if progress is None or not state.beliefs.exact:
         return False
     if action is ActionValue.U_TURN:
         return not progress.turns_round_first(state.town, view.station)
     crossing = progress.next_crossing(state.town, view.station)
-    if action is not ActionValue.J_TURN or crossing is None or words.direction is None or (words.ordinal or 1) > 1:
+    if action is not ActionValue.J_TURN or crossing is None or (ordinal or 1) > 1:
         return False
     sides = (Direction.LEFT, Direction.RIGHT)
-    return words.direction in sides and crossing.direction in sides and words.direction is not crossing.direction
+    return direction in sides and crossing.direction in sides and direction is not crossing.direction

@@ -25,7 +25,9 @@ _COUNTED: Final = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 
 
 def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) -> None:
-    """Records an executed order; remarks on the third equal one, and asks for another route.
+    """Records an order; remarks on one that was carried out twice before, and asks for another route.
+
+    Orders that the car could not carry out yet do not count.
 
     Args:
         state: working copy of the state.
@@ -34,7 +36,8 @@ def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) ->
     """
     if action not in _COUNTED:
         return
-    state.dialogue = state.dialogue.after_order(action, view.time, view.time - MEMORY)
+    done_at = state.commands.manoeuvred_at
+    state.dialogue = state.dialogue.after_order(action, view.time, view.time - MEMORY, done_at=done_at)
     if sum(known is action for known, _ in state.dialogue.orders) < REPEATED:
         return
     state.dialogue = state.dialogue.with_orders_settled()

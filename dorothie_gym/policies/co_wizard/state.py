@@ -107,10 +107,17 @@ class DialogueState:
         """Records an instruction to turn round at `now` [s]."""
         return replace(self, u_turn_instructed_at=now)
 
-    def after_order(self, action: ActionValue, now: float, since: float) -> DialogueState:
-        """Records an order at `now`, and forgets those before `since` [s]."""
-        recent = tuple(pair for pair in self.orders if pair[1] >= since)
-        return replace(self, orders=(*recent, (action, now)))
+    def after_order(self, action: ActionValue, now: float, since: float, *, done_at: float) -> DialogueState:
+        """Records an order, in place of an equal one that was not carried out.
+
+        Args:
+            action: the action.
+            now: time of the order [s].
+            since: time before which orders are forgotten [s].
+            done_at: time at which a manoeuvre was last carried out [s].
+        """
+        kept = (pair for pair in self.orders if pair[1] >= since and (pair[0] is not action or pair[1] <= done_at))
+        return replace(self, orders=(*kept, (action, now)))
 
     def with_orders_settled(self) -> DialogueState:
         """Forgets the latest orders, for a new goal or another route."""
@@ -181,6 +188,7 @@ class CommandState:
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
         manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
+        manoeuvred_at: time at which the car was last seen to carry out one [s].
         stop_sent_at: time of the last Stop command [s].
         rest_until: end of a stop for an obstruction [s].
         rest_for: object that the car stops for.
@@ -191,6 +199,7 @@ class CommandState:
     turn_sent: tuple[int, int] = (-1, 0)
     turn_sent_at: float = -math.inf
     manoeuvre_sent_at: float = -math.inf
+    manoeuvred_at: float = -math.inf
     stop_sent_at: float = -math.inf
     rest_until: float = -math.inf
     rest_for: ObjectClass = ObjectClass.UNLABELED
@@ -208,6 +217,10 @@ class CommandState:
     def after_manoeuvre(self, now: float) -> CommandState:
         """Records a lane switch or U-turn command."""
         return replace(self, manoeuvre_sent_at=now)
+
+    def manoeuvring(self, now: float) -> CommandState:
+        """Records that the car switches lanes or turns round."""
+        return replace(self, manoeuvred_at=now)
 
     def after_turn(self, turn: tuple[int, int], now: float) -> CommandState:
         """Records a turn command: lane and angle [degrees]."""
@@ -281,4 +294,5 @@ class CoWizardState(SpeakingState[CoWizardStyle, CoWizardConfig]):
             rests_for=self.commands.rest_for,
             rests_until=self.commands.rest_until,
             usual_speed=intentions.usual,
+            cruise=intentions.cruise,
         )

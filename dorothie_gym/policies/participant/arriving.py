@@ -16,6 +16,7 @@ from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies.participant.given_orders import times_told
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.policy import replace
@@ -23,7 +24,7 @@ from dorothie_gym.policies.route_progress import stopping_distance
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
-    from dorothie_gym.policies.participant.state import ParticipantState
+    from dorothie_gym.policies.participant.state import GuidanceState, ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
 STOP_REPEAT = 5.0
@@ -46,6 +47,15 @@ FURTHER = 5.0
 
 SHORT_RESERVE = 1.0
 """Distance by which short spoken distances are shortened [m]."""
+
+HARDLY = 1.0
+"""Way of the car that shows that it follows instructions to drive on a little [m]."""
+
+FEWEST = 3.0
+"""Smallest distance that is said in metres [m]; the car stops a little earlier."""
+
+ROLLING = 3.5
+"""Speed up to which a car that was sent on a little may still stop by itself [m/s]; it may have misheard how far."""
 
 SHOUTS = 3
 """Number of short wordings that are compared when there is only time for a shout."""
@@ -81,8 +91,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if view.standing:
         return _guide_standing(state, view, left)
     close = left < config.stop_distance
-    sent_a_little = view.time - state.guidance.nudged_at < config.nudge_time and state.guidance.nudges <= IN_VAIN
-    if not state.guidance.guiding or sent_a_little:
+    if not state.guidance.guiding or _is_sent_a_little(state, view):
         return close  # a car that was sent on a little stops by itself
     prepare_stop(state, view, left, rng)
     if _is_time_to_stop(state, view, left):
@@ -95,6 +104,14 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
         _announce_place(state, view, left, rng)
     return close
+
+
+def _is_sent_a_little(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car was just told to drive on a little, rather than straight on, and does so."""
+    lately = view.time - state.guidance.nudged_at < state.config.nudge_time
+    straight_on = state.guidance.nudges > IN_VAIN and state.guidance.sent_straight_on
+    runs_past = view.speed > ROLLING and state.route.to_goal.left(view.station) < stopping_distance(view.speed)
+    return lately and not (straight_on or runs_past)
 
 
 def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
@@ -112,16 +129,26 @@ def prepare_stop(state: ParticipantState, view: ParticipantView, left: float, rn
         _choose_stop_words(state, rng)
     if room_to_stop(state, view, left)[0] < -state.config.late_stop:
         # there is only time for a shout
-        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
+        points_out = _has_stopped_twice(state)
+        act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording())
+        shouts = [word_act(act, Role.PARTICIPANT, rng, wording, style=_SHOUTING) for _ in range(SHOUTS)]
         options = [text for text in (*shouts, state.guidance.stop_text) if text != state.guidance.stop_said] or shouts
         shortest = min(options, key=state.speech.delivery.seconds)
-        state.guidance = state.guidance.with_stop_text(shortest)
+        state.guidance = state.guidance.with_stop_text(shortest, points_out=points_out)
+
+
+def _has_stopped_twice(state: ParticipantState) -> bool:
+    """Returns whether the car was told to stop for the place twice, so that a third time is said in another way."""
+    return times_told(state, ActionValue.STOP) >= IN_VAIN
 
 
 def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> None:
-    """Chooses the words to stop the car with: an instruction or, once, the statement that this is the place."""
+    """Chooses the words to stop the car with: an instruction, or the statement that this is the place.
+
+    The statement is made the first time at most, and from the third time on.
+    """
     first = not state.route.misses and state.guidance.stopped_at == -math.inf
-    points_out = first and rng.random() < state.style.points_out
+    points_out = (first and rng.random() < state.style.points_out) or _has_stopped_twice(state)
     act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording(here=True))
     text = said = state.guidance.stop_said
     for _ in range(REWORDINGS):
@@ -175,7 +202,7 @@ def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
 
 def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
-    slow = view.speed < max(state.motion.speed, state.config.slow_speed)
+    slow = view.speed < max(state.motion.speed - BRAKING, state.config.slow_speed)
     if state.guidance.approach_announced and left > state.config.slow_distance and slow:
         return False  # the car is slowing down
     room, after = room_to_stop(state, view, left)
@@ -230,25 +257,33 @@ def _is_excused(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
-    """Returns the instruction for a car that stands a little before the place.
+    """Returns the instruction for a car that stands a little before the place; it counts when it is said.
 
-    The instructions count as unsuccessful until the car has moved by more than a few metres. A third one is replaced
-    by the question why the car stands; then the car is told to go straight on, in case it waits before a junction, and
-    to start.
+    A third instruction to a car that has hardly moved is replaced by the question why it stands; then the car is told
+    to go straight on, in case it waits before a junction, and to start. A car that moves, but too little, is told the
+    distance.
     """
     left = state.route.to_goal.left(view.station)
-    state.guidance = state.guidance.after_nudging(view.time, left)
-    again, attempt = divmod(state.guidance.nudges, IN_VAIN + 1)
-    if attempt == 0:
+    counted = state.guidance.after_nudging(view.time, left)
+    words = _nudge(state, view, left, counted)
+    state.guidance = replace(state.guidance, planned_nudge=words.act)
+    return words
+
+
+def _nudge(state: ParticipantState, view: ParticipantView, left: float, counted: GuidanceState) -> Remark:
+    again, attempt = divmod(counted.nudges, IN_VAIN + 1)
+    too_little = counted.nudges > IN_VAIN and counted.nudged_from - left > HARDLY
+    if attempt == 0 and not too_little:
         return why_standing(state, view)
-    if again and attempt == IN_VAIN:
-        return order(DialogueMove.INSTRUCT, ActionValue.START)
-    if again:
-        return straight_on()
+    if again and not too_little:
+        return order(DialogueMove.INSTRUCT, ActionValue.START) if attempt == IN_VAIN else straight_on()
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
     reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE
-    wording = Wording(distance=left - reserve) if left > FURTHER else Wording(topic="further")
+    if too_little:
+        wording = Wording(distance=max(left, FEWEST))
+    else:
+        wording = Wording(distance=left - reserve) if left > FURTHER else Wording(topic="further")
     return order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording)
 
 

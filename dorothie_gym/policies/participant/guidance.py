@@ -20,6 +20,7 @@ from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach, repeat_stop
+from dorothie_gym.policies.participant.given_orders import has_turned_since, last_given
 from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
@@ -42,6 +43,7 @@ from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
+from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState, StepKey
@@ -52,6 +54,9 @@ ANNOUNCING_TIME = 1.5
 
 U_TURN_WAIT = 4.0
 """Standstill on the lane of a U-turn after which the U-turn is announced although it is not near [s]."""
+
+ROUND_TIME = 7.0
+"""Time that a car is given to begin a U-turn, before it is guided in another way [s]."""
 
 WRONG_WAY_EXPIRES = 4.0
 """Time within which a wrong turn is pointed out [s]."""
@@ -65,7 +70,13 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
     config = state.config
     before = former.left(view.station)
     state.route = state.route.entering(state.town, view.lane)
+    if state.task.goal is not None:
+        x, y = view.position
+        away = pm.hypot(state.task.goal.x - x, state.task.goal.y - y)
+        state.guidance = state.guidance.near_place(away)
     former = former.followed(state.town, view.lane, view.station)
+    if _is_about_to_turn_round(state, view):
+        return  # the way is looked at again when the car has turned, or has failed to
     if former.astray and _is_changing_for_turn(state, view):
         former = replace(former, astray=0)
     state.route = state.route.with_progress(former)
@@ -90,6 +101,14 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
     state.guidance = state.guidance.with_distance(state.route.to_goal.left(view.station))
 
 
+def _is_about_to_turn_round(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car was just told to turn round, and has not done so yet."""
+    last = last_given(state)
+    if last is None or ActionValue.U_TURN not in last.act.slots or not state.guidance.guiding or view.standing:
+        return False
+    return view.time - last.time < ROUND_TIME and not has_turned_since(view, last)
+
+
 def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether the car is heading for the lane of the announced turn on lanes of its own choice."""
     step = state.guidance.step
@@ -104,6 +123,9 @@ def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before
     farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
     if not guidance.guiding or guidance.step is None or guidance.step[0] != "turn" or not farther:
         return
+    if state.motion.moved_at <= guidance.wrong_way_at:
+        return  # it was pointed out, and the car has not moved since
+    state.guidance = guidance.after_pointing_out(view.time)
     state.feel(Happening.WRONG_WAY, view.time)
     if not remark_on_wrong_turn(state, view, guidance.step):
         expires = view.time + WRONG_WAY_EXPIRES
@@ -143,7 +165,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     stop_circling(state, view)
     if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding:
         return
-    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
+    step = None if _is_about_to_turn_round(state, view) else next_step(state, view, DialogueMove.INSTRUCT, rng)
     if step is None:
         return
     key, distance, words = step

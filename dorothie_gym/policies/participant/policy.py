@@ -10,10 +10,11 @@ import numpy as np
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
+from dorothie_gym.policies.participant.given_orders import drop_repetition, note_said
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
 from dorothie_gym.policies.participant.reactions import react, scene_of
-from dorothie_gym.policies.participant.reconsidering import own_up
+from dorothie_gym.policies.participant.reconsidering import admit_repetition, own_up
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
@@ -99,10 +100,14 @@ class ScriptedParticipant(Policy[ParticipantState]):
         watch(updated, view)
         guide(updated, view, rng)
         react(updated, view, rng)
+        admit_repetition(updated, view)
         own_up(updated, view)
         scene = None if updated.speech.idle else scene_of(updated, view)
         speech, updated.speech = updated.speech.speak(
             view.time, view.speaking, rng, scene, interval=updated.clock.interval, other_speaking=view.other_speaking
         )
+        if speech is not None and updated.speech.last is not None:
+            note_said(updated, view, updated.speech.last)
+            drop_repetition(updated, updated.speech.last)
         updated.motion = updated.motion.with_speed(view.speed)
         return ParticipantAction(speech=speech).encode(self.limits), updated

@@ -1,14 +1,17 @@
-"""Orders that contradict the last one: the participant says that it has changed its mind."""
+"""Orders that contradict the last one, or repeat two others: the participant says a word about it before."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.speech import intend
+from dorothie_gym.policies.participant.given_orders import has_turned_since, last_given, times_given
+from dorothie_gym.policies.participant.retrying import IN_VAIN
+from dorothie_gym.policies.speech import LONGEST_BREATH, intend
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState
@@ -21,6 +24,29 @@ JUST_ORDERED: Final = 9.0
 _ORDERS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _SIDES: Final = frozenset({Direction.LEFT, Direction.RIGHT})
 _TURNS: Final = frozenset({ActionValue.J_TURN, ActionValue.U_TURN})
+_WAYS: Final = _TURNS | {ActionValue.LANE_FOLLOW}
+_COUNTED: Final = _TURNS | {ActionValue.LANE_SWITCH, ActionValue.START, ActionValue.SPEED_CHANGE}
+"""Orders that need a remark the third time; a third stop is worded as the statement that this is the place."""
+
+
+def admit_repetition(state: ParticipantState, view: ParticipantView) -> None:
+    """Puts "that's the third time I'm saying it" in front of an order that was given twice at this place."""
+    queue = state.speech.queue
+    if not queue or queue[0].joined or view.speaking > 0.0:
+        return
+    breath = queue[: 1 + next((number for number, item in enumerate(queue[1:]) if not item.joined), len(queue))]
+    if any(said.predicate in _ADMITTING for item in breath for said in item.meaning):
+        return
+    for item in breath[:LONGEST_BREATH]:
+        action = next(iter(_COUNTED & item.act.slots), None)
+        if action is None or item.act.move is not DialogueMove.INSTRUCT:
+            continue
+        if times_given(state, view, item) >= IN_VAIN:
+            tried = Proposition.of(Predicate.TRIED, action=action, times=IN_VAIN)
+            wording = Wording(topic="said_before")
+            admitted = intend(CommunicativeFunction.INFORM, tried, elided=("action", "times"), wording=wording)
+            state.speech = state.speech.led_by(admitted)
+            return
 
 
 def own_up(state: ParticipantState, view: ParticipantView) -> None:
@@ -28,6 +54,9 @@ def own_up(state: ParticipantState, view: ParticipantView) -> None:
 
     An order that is already preceded by a word of why, or that follows a turn of the car, needs none.
     """
+    last = last_given(state)
+    if last is not None and has_turned_since(view, last):
+        return
     queue = state.speech.queue
     if not queue or queue[0].joined or view.speaking > 0.0 or view.turning:
         return
@@ -39,10 +68,13 @@ def own_up(state: ParticipantState, view: ParticipantView) -> None:
         state.speech = state.speech.led_by(intend(CommunicativeFunction.INFORM, wording=wording))
 
 
+_ADMITTING: Final = frozenset({Predicate.TRIED, Predicate.PASSED})
+
+
 def _last_order(state: ParticipantState) -> Remark | None:
     """Returns the last order, unless something else that explains another one was said after it."""
     for item in reversed(state.speech.said):
-        if item.act.move in _ORDERS and _TURNS & item.act.slots:
+        if item.act.move in _ORDERS and _WAYS & item.act.slots:
             return item
         if item.act.move is not DialogueMove.ACKNOWLEDGE:
             return None
@@ -50,9 +82,12 @@ def _last_order(state: ParticipantState) -> Remark | None:
 
 
 def _contradicts(former: Remark, order: Remark) -> bool:
-    """Returns whether two orders cannot both be meant: left and right, or a turn and turning round."""
-    actions = [next(iter(_TURNS & item.act.slots), None) for item in (former, order)]
+    """Returns whether two orders cannot both be meant: left and right, or another way and turning round."""
+    actions = [next(iter(_WAYS & item.act.slots), None) for item in (former, order)]
     if None in actions:
         return False
+    if former.wording.topic == "further" or former.wording.distance is not None:
+        return False  # a little way to the place, before anything else
     other_side = {former.wording.direction, order.wording.direction} >= _SIDES
-    return actions[0] is not actions[1] or (actions[0] is ActionValue.J_TURN and other_side)
+    turns_round = actions[0] is not actions[1] and ActionValue.U_TURN in actions
+    return turns_round or (actions[0] is actions[1] is ActionValue.J_TURN and other_side)

@@ -12,7 +12,9 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.participant.given_orders import times_told
 from dorothie_gym.policies.participant.guidance import next_step, note_step
+from dorothie_gym.policies.participant.retrying import IN_VAIN
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
@@ -121,7 +123,9 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
     ordered = last is not None and last.act.move is DialogueMove.INSTRUCT and bool(last.act.slots)
     if last is not None and lately and (not ordered or _is_of_the_moment(last)):
-        state.say_first(replace(last, text="", joined=False))
+        again = ordered and max(times_told(state, action) for action in _actions(last)) >= IN_VAIN
+        said = repeated(last, CommunicativeFunction.CORRECTION) if again else replace(last, text="", joined=False)
+        state.say_first(said)
         return
     step = next_step(state, view, DialogueMove.CLARIFY, rng) if state.guidance.step is not None else None
     if state.guidance.guiding and step is not None:
@@ -154,6 +158,10 @@ def _is_of_the_moment(said: Remark) -> bool:
     if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
+
+
+def _actions(said: Remark) -> tuple[ActionValue, ...]:
+    return tuple(value for value in said.act.values(Slot.ACTION) if isinstance(value, ActionValue))
 
 
 def _has_named_slot(act: DialogueAct) -> bool:

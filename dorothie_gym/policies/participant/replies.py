@@ -76,6 +76,12 @@ _LACKS_PLACE = re.compile(
 )
 """Words by which the car says that it does not find the place, even if parts of them are misheard."""
 
+_KNOWS_WAY = re.compile(
+    r"\b((?<!don't )know (the way|how to get)|have (a|the) (route|way)|(the|got the) way (is clear|on my map))\b"
+    r"|\b(minutes?|seconds) (to go|from here)\b"
+)
+"""Words by which the car says that it knows the way to its destination."""
+
 _LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
 """Words by which the car says that it has stopped because it does not know the way."""
 
@@ -211,6 +217,12 @@ def _explanation(
     if lost and state.task.goal is not None and (names_goal or not landmarks):
         describe(state, view, Function.INFORM, rng)
         return
+    if _has_another_goal(state, act, words):
+        goal = state.task.destination
+        state.feel(Happening.MISUNDERSTOOD, view.time)
+        state.task = state.task.after_reminding(view.time)
+        state.say_only(intend(Function.CORRECTION, act_builders.destination(goal.name, goal.street)))
+        return
     claims = bool(landmarks) and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) is not None
     if claims and not names_goal and view.standing and not has_just_finished(state, view, landmarks):
         deny_other_place(state, landmarks)
@@ -222,6 +234,12 @@ def _explanation(
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(state, view, near=True)
+
+
+def _has_another_goal(state: ParticipantState, act: DialogueAct, words: ParsedText) -> bool:
+    """Returns whether the car says that it knows the way, although it is guided to a place that is not on its map."""
+    guided = state.guidance.guiding and state.task.described and state.task.goal is not None
+    return guided and not act.slots and _KNOWS_WAY.search(words.text.lower()) is not None
 
 
 def _answer_to_why(

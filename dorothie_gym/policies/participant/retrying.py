@@ -10,6 +10,7 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies.participant.given_orders import times_told
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
@@ -43,7 +44,8 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
         view: observation.
         passed: whether the car has driven past the place; otherwise it has left the route shortly before it.
     """
-    state.guidance = replace(state.guidance, passes=state.guidance.passes + passed)
+    if passed:
+        state.guidance = state.guidance.after_passing()
     passes, goal = state.guidance.passes, state.task.goal
     if state.route.misses < IN_VAIN or goal is None:
         slower = _more_slowly(state, view) if passed else ()
@@ -90,15 +92,11 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     if any(item.act.move in _ANSWERS for item in state.speech.queue):
         return  # questions of the car are answered first
     manoeuvre = progress.next_manoeuvre(view.station)
-    if manoeuvre is None or (guidance.step is None and not guidance.u_turns):
-        return
-    if state.motion.moved_at <= guidance.step_at:
+    if manoeuvre is None or state.motion.moved_at <= guidance.step_at:
         return  # a car that has not moved since the last order does not circle
-    turns_again = manoeuvre[0] is LaneEntry.U_TURN and guidance.u_turns >= IN_VAIN
-    asked = sum(lane == view.lane for lane, _ in guidance.lane_changes)
-    if guidance.step is not None and guidance.step[:2] == ("lane", view.lane):
-        asked = max(asked, guidance.repeats + 1)
-    changes_again = manoeuvre[0] is not LaneEntry.U_TURN and asked >= IN_VAIN
+    turns = manoeuvre[0] is LaneEntry.U_TURN
+    turns_again = turns and times_told(state, ActionValue.U_TURN) >= IN_VAIN
+    changes_again = not turns and times_told(state, ActionValue.LANE_SWITCH, view.lane) >= IN_VAIN
     if not turns_again and not changes_again:
         return
     state.guidance = guidance.without_circling(view.lane)

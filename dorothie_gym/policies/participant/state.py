@@ -12,11 +12,13 @@ from typing import TypeAlias
 
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.errors import PolicyStateError
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
+from dorothie_gym.policies.participant.given_orders import GivenOrder
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.speech import Remark, SpeakingState
@@ -26,6 +28,9 @@ UNSAID = 6.0
 
 NUDGED = 8.0
 """Way of the car after which an instruction to drive on a little has worked [m]."""
+
+CLOSE_BY, LEFT_AGAIN = 25.0, 40.0
+"""Distance up to which the car comes close to a place, and from which on it has left it again [m]."""
 
 StepKey: TypeAlias = tuple[str, int, int]
 """Identity of a guidance step: "turn", "lane", "round" or "on", and the lanes concerned."""
@@ -220,7 +225,11 @@ class GuidanceState:
         step_at: time at which it was announced [s].
         repeats: number of repetitions of that step.
         u_turns: number of U-turns announced on the way to the target.
+        given: orders that were said about the target since the last remark that something was tried in vain.
         passes: number of times that the car has driven past the place.
+        visits: number of times that it has come close to the place.
+        close: whether it is close to the place.
+        wrong_way_at: time of the last remark that the car is going the wrong way [s].
         retries: number of other routes that were tried.
         wrong_turns: turns that were announced and not taken.
         lane_changes: lanes that the car was instructed to leave, and the times of the instructions [s].
@@ -233,6 +242,8 @@ class GuidanceState:
         nudged_at: time of the last instruction to drive on a little [s].
         nudges: number of such instructions, and of remarks about them, while the car has hardly moved.
         nudged_from: distance to the place at the first of them [m].
+        planned_nudge: such an instruction, or remark about them, that has not been said yet.
+        sent_straight_on: whether the last of them did not say how far.
         way: steps of the way ahead that have been described and are still to come.
         way_at: time of that description [s].
         way_taken_up: whether the car has repeated it.
@@ -247,7 +258,11 @@ class GuidanceState:
     step_at: float = -math.inf
     repeats: int = 0
     u_turns: int = 0
+    given: tuple[GivenOrder, ...] = ()
     passes: int = 0
+    visits: int = 0
+    close: bool = False
+    wrong_way_at: float = -math.inf
     retries: int = 0
     wrong_turns: tuple[StepKey, ...] = ()
     lane_changes: tuple[tuple[int, float], ...] = ()
@@ -260,6 +275,8 @@ class GuidanceState:
     nudged_at: float = -math.inf
     nudges: int = 0
     nudged_from: float = math.inf
+    planned_nudge: DialogueAct | None = None
+    sent_straight_on: bool = False
     way: tuple[StepKey, ...] = ()
     way_at: float = -math.inf
     way_taken_up: bool = False
@@ -332,6 +349,21 @@ class GuidanceState:
     def for_another_approach(self) -> GuidanceState:
         """Prepares another announcement of the approach."""
         return replace(self, approach_announced=False, stop_text="", points_out=False, nudges=0, nudged_from=math.inf)
+
+    def near_place(self, distance: float) -> GuidanceState:
+        """Counts the times that the car comes close to the place, `distance` metres away as the crow flies."""
+        close = distance <= (LEFT_AGAIN if self.close else CLOSE_BY)
+        if close is self.close:
+            return self
+        return replace(self, close=close, visits=self.visits + close)
+
+    def after_passing(self) -> GuidanceState:
+        """Counts a drive past the place, at most one for each time that the car has come close to it."""
+        return replace(self, passes=min(self.passes + 1, self.visits))
+
+    def after_pointing_out(self, now: float) -> GuidanceState:
+        """Records a remark at `now` [s] that the car is going the wrong way."""
+        return replace(self, wrong_way_at=now)
 
     def after_miss(self) -> GuidanceState:
         """Prepares another request to slow down."""

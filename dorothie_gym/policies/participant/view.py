@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,6 +82,11 @@ class ParticipantView:
         """Position of the car [m]."""
         x, y = self.raw["pose"][:2]
         return float(x), float(y)
+
+    @property
+    def heading(self) -> float:
+        """Heading of the car, counterclockwise from east [degrees]."""
+        return math.degrees(float(self.raw["pose"][2]))
 
     @property
     def place(self) -> Place:

@@ -42,8 +42,11 @@ def check(
     """Confirms or corrects a check of the car."""
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     goal = state.task.goal
-    if goal is not None and landmarks:
-        right = landmarks == (goal.name,) and streets in ((), (goal.street,))
+    where = (
+        streets if not act.values(Slot.ACTION) else ()
+    )  # its place may have been misheard: "the ... on Beal, right?"
+    if goal is not None and (landmarks or where):
+        right = landmarks in ((), (goal.name,)) and streets in ((), (goal.street,))
         if not right:
             again = intend(Function.REQUEST, act_builders.destination(goal.name, goal.street), joined=True)
             state.say_first(denied(checked(state, act, words)), again)

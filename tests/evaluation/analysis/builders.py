@@ -75,8 +75,8 @@ def exception(time: float, kind: str, **data: Any) -> list[Event]:
     return [_event(time, EventType.EXCEPTION, Role.AD_WIZARD, {"kind": kind, **data})]
 
 
-def subgoal(time: float, landmark: str, status: str, number: int = 0) -> list[Event]:
-    data = {"subgoal": number, "landmark": landmark, "status": status, "cause": "arrival"}
+def subgoal(time: float, landmark: str, status: str, number: int = 0, cause: str = "arrival") -> list[Event]:
+    data = {"subgoal": number, "landmark": landmark, "status": status, "cause": cause}
     return [_event(time, EventType.SUBGOAL, Role.AGENT, data)]
 
 
@@ -93,6 +93,10 @@ def believed(time: float, action: MentalAction, **data: Any) -> list[Event]:
 
 def hazard(time: float) -> list[Event]:
     return [_event(time, EventType.HAZARD_STOP, Role.AGENT, {"reason": "TrafficLight", "distance": 6.0})]
+
+
+def hazard_over(time: float, reason: str) -> list[Event]:
+    return [_event(time, EventType.HAZARD_END, Role.AGENT, {"reason": reason, "seconds": 5.0})]
 
 
 def drive(*parts: Sequence[Event], seconds: float = 60.0, **header: Any) -> Session:

@@ -3,7 +3,7 @@ import pytest
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
 from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName
-from tests.evaluation.analysis.builders import drive, human
+from tests.evaluation.analysis.builders import HUMAN, act, drive, human, said
 
 M, A = DialogueMove, ActionValue
 
@@ -57,3 +57,10 @@ def test_other_order_in_between_does_not_end_a_loop():
     other = human(22.0, "take the next right", M.INSTRUCT, A.J_TURN)
     assert has_loop(drive(turns_round(5.0), turns_round(20.0), other, turns_round(35.0)))
     assert not has_loop(drive(turns_round(5.0), turns_round(20.0), other))
+
+
+def test_equal_turns_of_one_description_are_no_loop():
+    way = said(5.0, HUMAN, *[("take the next right", act(M.INSTRUCT, A.J_TURN))] * 3)
+    assert not has_loop(drive(way))
+    again = [human(time, "take the next right", M.INSTRUCT, A.J_TURN) for time in (7.0, 9.0)]
+    assert not has_loop(drive(way, again[0])) and has_loop(drive(way, *again))

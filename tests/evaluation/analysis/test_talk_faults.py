@@ -16,6 +16,8 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     reply_checks,
 )
 from dorothie_gym.evaluation.analysis.truth_checks.checks import SHARES, TalkChecks, check_session
+from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.session.recording import Session
 from tests.evaluation.analysis.builders import (
@@ -31,8 +33,11 @@ from tests.evaluation.analysis.builders import (
     car,
     did,
     drive,
+    hazard,
+    hazard_over,
     human,
     said,
+    subgoal,
 )
 
 P = Predicate
@@ -127,6 +132,8 @@ def test_reversal_with_a_word_of_why_is_accepted(why):
 
 def test_next_turn_is_no_reversal():
     assert not wrong(order_checks.reversals(drive(LEFT, did(7.5, PhysicalAction.J_TURN, angle=80.0), RIGHT)))
+    at_once = did(5.5, PhysicalAction.J_TURN, angle=80.0)  # while the order is being said
+    assert not wrong(order_checks.reversals(drive(LEFT, at_once, RIGHT)))
     late = human(20.0, "turn right", M.INSTRUCT, A.J_TURN)
     assert not wrong(order_checks.reversals(drive(LEFT, late)))
     blocked = car(7.0, "the road is blocked", M.QUERY_YN)
@@ -183,6 +190,9 @@ def test_repetition_that_has_not_happened_is_a_stale_remark():
     turns = [human(time, "turn around", M.INSTRUCT, A.U_TURN) for time in (5.0, 15.0)]
     assert wrong(mention_checks.stale_remarks(drive(turns[0], remark)))
     assert not wrong(mention_checks.stale_remarks(drive(*turns, remark)))
+    for cause, stale in (("task_trigger", False), ("arrival", True)):
+        change = subgoal(20.0, "KFC", "Ongoing", cause=cause)
+        assert bool(wrong(mention_checks.stale_remarks(drive(*turns, change, remark)))) is stale
 
 
 def test_place_that_was_not_passed_twice_makes_a_stale_remark():
@@ -229,3 +239,11 @@ def test_done_errands_begin_new_groups_of_orders():
     done = human(20.0, "that's done", M.EXPLAIN, S.COMPLETE)
     moved = human(30.0, "stop", M.INSTRUCT, A.STOP)
     assert not wrong(order_checks.unchanged(drive(*orders, done, moved)))
+
+
+def test_obstacle_that_took_the_place_of_a_red_light_is_a_reason_too():
+    recorded = drive(hazard(10.0), hazard_over(20.0, "Vehicles"), hazard(40.0), hazard_over(45.0, "TrafficLight"))
+    world = SessionWorld(recorded, load_town("brookside"))
+    assert world.hazards(15.0, 0.0) == {"TrafficLight", "Vehicles"}
+    assert world.hazards(30.0, 0.0) == set(), "the first one is over"
+    assert world.hazards(42.0, 0.0) == {"TrafficLight"}

@@ -101,8 +101,8 @@ def test_the_co_wizard_is_sent_no_hidden_place_story_or_arrival(played: Any) -> 
     assert not any(goal.description.encode() in content for goal in board.subgoals)
     assert set().union(*frames(people["co_wizard"])) == {
         "k", "time", "pose", "speed", "landmarks", "speaking", "other_speaking", "covariance", "cruise", "lights",
-        "motion", "sight", "hazard", "manoeuvre", "path", "exits", "objects", "guesses", "feasible", "state", "why",
-        "outcome", "done", "refused",
+        "motion", "sight", "hazard", "manoeuvre", "path", "exits", "objects", "guesses", "feasible", "asked", "state",
+        "why", "outcome", "done", "refused",
     }  # fmt: skip
 
 

@@ -17,8 +17,9 @@ from dorothie_gym.ontology import (
     Slot,
     StreetName,
 )
-from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts
+from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts, take_plan
 from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.policy import replace
 from tests.policies.co_wizard.rides import Ride
@@ -247,3 +248,23 @@ def test_place_without_a_name_on_the_map_is_declined_with_a_question() -> None:
     ride.say("take me to the airport please", seconds=6.0)
     assert ride.moves[:2] == [DialogueMove.EXPLAIN, DialogueMove.QUERY_W]
     assert ride.said[0].meaning[0].predicate is Predicate.KNOWS and ride.said[0].meaning[0].negated
+
+
+@pytest.mark.parametrize(
+    ("words", "first"),
+    [
+        ("go ahead and take the second left, then stop at the lights", "left"),
+        ("Yo, go ahead and turn left, then take the second right", "left"),
+        ("go straight ahead, then take the second left", "straight"),
+    ],
+)
+def test_go_ahead_and_opens_an_order_and_is_none(words: str, first: str) -> None:
+    ride = Ride(RING)
+    ride.run(2.0)
+    updated, rng = ride.state.next_decision()
+    view = CoWizardView.read(ride.observations["co_wizard"], ride.env.town)
+    acts = (DialogueAct.of(DialogueMove.INSTRUCT),)
+    take_plan(updated, view, HeardUtterance(acts=acts, words=understand(words)), rng)
+    meant = [content for item in updated.speech.queue for content in item.meaning]
+    said = meant[0].get("action") if meant else None
+    assert said is (ActionValue.LANE_FOLLOW if first == "straight" else ActionValue.J_TURN)

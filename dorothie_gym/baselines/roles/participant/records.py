@@ -10,6 +10,7 @@ from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
 from dorothie_gym.policies.participant.arriving import about_to_arrive
+from dorothie_gym.policies.participant.given_orders import note_said
 from dorothie_gym.policies.participant.guidance import note_step
 from dorothie_gym.policies.participant.route_steps import RouteStep, route_step
 
@@ -33,6 +34,7 @@ _STEPS: Final = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH
 
 def note_remark(records: ParticipantState, view: ParticipantView, remark: Remark) -> None:
     """Enters into the records what a remark of the participant announces, describes, requests or mentions."""
+    note_said(records, view, remark)
     act, now, goal = remark.act, view.time, records.task.goal
     actions, statuses = act.values(Slot.ACTION), act.values(Slot.STATUS)
     later = {GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(statuses)

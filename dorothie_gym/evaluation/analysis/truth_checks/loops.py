@@ -48,7 +48,7 @@ _AGAIN: Final = re.compile(r"\b(again|twice|third time|(going|go) (back and fort
 
 
 class _Order(NamedTuple):
-    """Order: its speaker and content, and position [m] and heading [degrees] of the car."""
+    """Order: speaker, content, position [m] and heading [degrees] of the car, and the number of the utterance."""
 
     speaker: Role
     act: DialogueAct
@@ -56,10 +56,11 @@ class _Order(NamedTuple):
     x: float
     y: float
     heading: float
+    utterance: int
 
     def repeats(self, other: _Order) -> bool:
-        """Returns whether both are the same order at one place."""
-        if self[:3] != other[:3]:
+        """Returns whether both are the same order at one place; turns of one description are different ones."""
+        if self[:3] != other[:3] or self.utterance == other.utterance:
             return False
         distance = math.hypot(self.x - other.x, self.y - other.y)
         if ActionValue.U_TURN in self.act.slots:
@@ -79,8 +80,9 @@ def has_loop(session: Session) -> bool:
             given.clear()
         if move.act.move is not DialogueMove.INSTRUCT or not _ORDERS & set(move.act.values(Slot.ACTION)):
             continue
-        order = _Order(move.speaker, move.act, understand(move.span).direction, *_place(session, move.start))
-        if sum(order.repeats(other) for other in given) + 1 >= SAME_ORDERS:
+        direction, place = understand(move.span).direction, _place(session, move.start)
+        order = _Order(move.speaker, move.act, direction, *place, move.utterance)
+        if len({other.utterance for other in given if order.repeats(other)}) + 1 >= SAME_ORDERS:
             return True
         given.append(order)
     return False

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 PASSING: Final = 30.0
 """Distance from a place within which the car passes it [m]."""
 
+_ADDED: Final = "task_trigger"  # another errand is added to the list, the present one goes on
 _AGAIN: Final = frozenset({Predicate.TRIED, Predicate.PASSED})
 _SHARED: Final = frozenset({LandmarkName.HOUSE, LandmarkName.PERSON})
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
@@ -56,7 +57,8 @@ def stale_remarks(session: Session) -> Iterator[Case]:
 
 
 def _times(session: Session, said: Proposition, move: MoveRecord) -> float:
-    since = max((event.time for event in session.of_type(EventType.SUBGOAL) if event.time < move.start), default=0.0)
+    changes = (event for event in session.of_type(EventType.SUBGOAL) if event.data.get("cause") != _ADDED)
+    since = max((event.time for event in changes if event.time < move.start), default=0.0)
     place, action = said.get("place"), said.get("action")
     if said.predicate is Predicate.PASSED:
         return _passes(session, place, since, move.start) if isinstance(place, LandmarkName) else math.inf

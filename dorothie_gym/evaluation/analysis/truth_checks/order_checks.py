@@ -126,7 +126,7 @@ def reversals(session: Session) -> Iterator[Case]:
             excused = excused or any(move.act.move not in _TAKING_UP for move in said.moves)
             continue
         if former is not None and (_way_of(said) is not None) and said.start - former.end <= SECONDS:
-            turned = any(former.end <= row.frame / FRAME_RATE <= said.end for row in session.physical_actions)
+            turned = any(former.start <= row.frame / FRAME_RATE <= said.end for row in session.physical_actions)
             contradicts = _contradict(_way_of(former), _way_of(said)) and not turned
             yield judged(not contradicts or excused or _says_why(said), former, said)
         if _way_of(said) is not None:

@@ -205,8 +205,12 @@ class SessionWorld:
             reason = str(event.data.get("reason"))
             if event.type is EventType.HAZARD_STOP:
                 begun.setdefault(reason, event.time)
-            elif reason in begun:
-                found.append((begun.pop(reason), event.time, reason))
+            else:
+                # the reason may have changed while the car was braking, or standing: a red light, then a car in front
+                start = min([event.time, *begun.values()])
+                found += [(since, event.time, other) for other, since in begun.items()]
+                found.append((begun.get(reason, start), event.time, reason))
+                begun.clear()
         return found + [(start, math.inf, reason) for reason, start in begun.items()]
 
     def failed(self, time: float, sensor: Sensor) -> bool:

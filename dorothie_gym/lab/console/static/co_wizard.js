@@ -65,12 +65,14 @@ export class CoWizardPage {
     this.lights.dataset.action = 'LightChange';
     keys.add('l', 'Head lights on or off', () => this.lights.click());
     for (let k = 1; k <= 8; k++) keys.add(String(k), `Turn number ${k} at the next junction`, () => this.exits.children[k - 1]?.click());
+    this.asked = h('ol', { class: 'asked' });
     this.noteRows = h('ul', { class: 'notes' });
     this.links = new PinLinks(this.map, this.noteRows, 'Place');
     this.element = h('div', { class: 'page co_wizard' },
       h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, this.links.element, this.status, this.sign.element, this.windscreen.element, this.modes(keys)),
       h('div', { class: 'controls' },
         panel('Next junction', { class: 'turns' }, this.exits),
+        this.askedPanel = panel('Asked for', { class: 'way', hidden: true }, this.asked),
         panel('Driving', { class: 'driving' }, h('div', { class: 'grid' }, this.buttons, this.lights), this.rule),
         this.notes(keys)),
       this.talk.element);
@@ -232,9 +234,16 @@ export class CoWizardPage {
     if ('lights' in fields) this.lights.setAttribute('aria-pressed', String(state.lights));
     if (fields.exits || 'manoeuvre' in fields) this.showExits(state);
     if (fields.landmarks) this.showNotes();
+    if (fields.asked) this.showAsked(state.asked);
     this.showStatus(state);
     this.sign.update(state, this.stops().filter(({ mark }) => mark), this.link.hello.stop);
     this.hints.update(state);
+  }
+
+  /** Shows the steps that the passenger has asked for and that wait for their place. */
+  showAsked(steps) {
+    this.askedPanel.hidden = !steps.length;
+    rebuild(this.asked, steps, () => steps.map((words, k) => h('li', { text: words, 'aria-current': k ? null : 'step' })));
   }
 
   showExits({ exits, manoeuvre, feasible }) {
