@@ -6,7 +6,8 @@ import pytest
 
 from dorothie_gym.maps.model import NO_STREET, Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive import read_opendrive
-from dorothie_gym.maps.street_inference import lay_sites, name_streets
+from dorothie_gym.maps.site_inference import lay_sites
+from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 
 from .opendrive_text import shared_map

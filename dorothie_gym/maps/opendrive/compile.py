@@ -15,7 +15,8 @@ from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalk
 from dorothie_gym.maps.opendrive.lane_changes import lane_change_links
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
-from dorothie_gym.maps.street_inference import lay_sites, name_streets
+from dorothie_gym.maps.site_inference import lay_sites
+from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 

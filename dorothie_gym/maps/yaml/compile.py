@@ -14,7 +14,7 @@ import numpy as np
 from dorothie_gym.maps.import_notes import ImportNotes
 from dorothie_gym.maps.long_lanes import cut_long_lanes
 from dorothie_gym.maps.model import NO_JUNCTION, NO_STREET, Array, Junction, Lane, LaneLink, LinkType, Site, Street
-from dorothie_gym.maps.street_inference import lay_sites
+from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml.arms import POCKET, Approach, Arm, LaneEnd
 from dorothie_gym.maps.yaml.furniture import crosswalks, place_signals, place_sites, sidewalks
