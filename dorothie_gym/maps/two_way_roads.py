@@ -110,4 +110,5 @@ def _is_oncoming(row: Array, others: Array) -> np.ndarray[tuple[int], np.dtype[n
     """Returns which points (n, 5) are on the level of a point (5,) and have the opposite direction (n,)."""
     turn = np.abs((others[:, 3] - row[3] + math.pi) % (2.0 * math.pi) - math.pi)
     result: np.ndarray[tuple[int], np.dtype[np.bool_]] = turn >= MIN_OPPOSITION
-    return result & (np.abs(others[:, 2] - row[2]) <= MAX_HEIGHT)
+    result &= np.abs(others[:, 2] - row[2]) <= MAX_HEIGHT
+    return result
