@@ -28,6 +28,7 @@ class NoteKind(enum.StrEnum):
     ROAD = "road"
     SECTION = "lane section"
     LANE = "lane"
+    TURNAROUND = "turnaround"
     ROAD_LINK = "road link"
     LANE_LINK = "lane link"
     JUNCTION = "junction"
@@ -92,9 +93,12 @@ class ImportNotes:
         return next((n for n in self._notes if n.action is NoteAction.DROPPED and n.kind in kinds), None)
 
     def log(self) -> None:
-        """Logs what was dropped as warnings, a few of each kind; lanes without access for cars are no fault."""
+        """Logs what was dropped as warnings, a few of each kind.
+
+        Lanes without access for cars, and turnarounds beside other ways on, are no loss.
+        """
         dropped = (note for note in self.sorted() if note.action is NoteAction.DROPPED)
-        lost = [note for note in dropped if note.kind is not NoteKind.ACCESS]
+        lost = [note for note in dropped if note.kind not in (NoteKind.ACCESS, NoteKind.TURNAROUND)]
         for kind, count in Counter(note.kind for note in lost).items():
             for note in islice((note for note in lost if note.kind is kind), LOGGED):
                 _log.warning("%s: %s: %s: dropped", self.source, note.element, note.message)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.opendrive.connectors import redraw_connectors
+from dorothie_gym.maps.opendrive.connectors import repair_connectors
 from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
 from dorothie_gym.maps.opendrive.parse import refuse_empty
 from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord, SectionRecord
@@ -123,7 +123,7 @@ def sample_centrelines(
             break
         topology = topology.without(faults)  # ends that have lost their links may now be wedges
     lines = [thin(line) for line in lines]
-    redraw_connectors(records, topology, lines)
+    topology, lines = repair_connectors(records, topology, lines)
     _stitch(lines, topology.links)
     return topology, lines
 

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import NO_JUNCTION
@@ -33,6 +35,9 @@ RADIUS = 4.2
 # Largest sum of turns in addition to the change of direction [rad]: two swings in a U-turn, but no loop.
 MOST_SWING = math.radians(220.0)
 
+# Smallest change of direction of a turnaround [rad].
+_TURNAROUND = math.radians(150.0)
+
 _STEP = 0.3  # distance between points on arcs [m]
 
 
@@ -44,33 +49,82 @@ class Pose(NamedTuple):
     heading: float
 
 
-def redraw_connectors(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> None:
+def repair_connectors(
+    records: OpenDriveRecords, topology: Topology, lines: list[Array]
+) -> tuple[Topology, list[Array]]:
     """Draws the connectors again that no car can follow, between the lanes that they link.
+
+    Such turnarounds are dropped where their lanes have other ways on and no part of the town is cut off: a car turns
+    round on the street.
 
     Args:
         records: records of the file.
         topology: lanes of the file.
-        lines: centre lines (n, 4) of the lanes; changed in place.
+        lines: centre lines (n, 4) of the lanes.
+
+    Returns:
+        The lanes that are left, and their centre lines.
     """
+    before, after = _neighbours(topology)
+    faults: dict[int, str] = {}
+    for k, chain in enumerate(topology.chains):
+        inside = records.roads[chain[0].road].junction != NO_JUNCTION
+        if inside and len(before[k]) == len(after[k]) == 1:
+            fault = _fault(lines[before[k][0]], lines[k], lines[after[k][0]])
+            if fault:
+                faults[k] = fault
+    spare = {
+        k
+        for k in faults
+        if len(after[before[k][0]]) > 1
+        and len(before[after[k][0]]) > 1
+        and _turn(lines[before[k][0]], lines[after[k][0]]) > _TURNAROUND
+    }
+    if spare and not _is_unchanged(topology, spare):
+        spare = set()
+    new = list(lines)
+    for k, fault in faults.items():
+        element = _name(records, topology, k)
+        if k in spare:
+            reason = f"{fault}; cars turn round on the street, and other ways lead on"
+            records.notes.dropped(NoteKind.TURNAROUND, element, reason)
+        elif (line := _path(lines[before[k][0]], lines[k], lines[after[k][0]])) is not None:
+            records.notes.repaired(NoteKind.LANE, element, f"{fault}; the path across the junction was drawn again")
+            new[k] = line
+    return topology.without(spare), [line for k, line in enumerate(new) if k not in spare]
+
+
+def _neighbours(topology: Topology) -> tuple[defaultdict[int, list[int]], defaultdict[int, list[int]]]:
+    """Returns the lanes before and after each lane."""
     before: defaultdict[int, list[int]] = defaultdict(list)
     after: defaultdict[int, list[int]] = defaultdict(list)
     for source, target in topology.links:
         after[source].append(target)
         before[target].append(source)
-    drawn = {}
-    for k, chain in enumerate(topology.chains):
-        road = records.roads[chain[0].road]
-        if road.junction == NO_JUNCTION or len(before[k]) != 1 or len(after[k]) != 1:
-            continue
-        source, target = lines[before[k][0]], lines[after[k][0]]
-        fault = _fault(source, lines[k], target)
-        line = _path(source, lines[k], target) if fault else None
-        if line is not None:
-            drawn[k] = line
-            element = f"road {road.name} / laneSection {chain[0].section} / lane {chain[0].lane}"
-            records.notes.repaired(NoteKind.LANE, element, f"{fault}; the path across the junction was drawn again")
-    for k, line in drawn.items():
-        lines[k] = line
+    return before, after
+
+
+def _name(records: OpenDriveRecords, topology: Topology, lane: int) -> str:
+    first = topology.chains[lane][0]
+    return f"road {records.roads[first.road].name} / laneSection {first.section} / lane {first.lane}"
+
+
+def _turn(source: Array, target: Array) -> float:
+    """Returns the change of direction from the end of a lane to the start of another one, without sign [rad]."""
+    return abs(math.remainder(_pose(target, 0).heading - _pose(source, -1).heading, math.tau))
+
+
+def _is_unchanged(topology: Topology, spare: set[int]) -> bool:
+    """Returns whether the lanes that are left without some are connected with each other as before."""
+    links = np.array(topology.links, dtype=np.intp).reshape(-1, 2)
+    kept = np.array([k not in spare for k in range(len(topology.chains))])
+    parts = []
+    for rows in (links, links[kept[links].all(axis=1)]):
+        shape = (len(kept), len(kept))
+        graph = coo_array((np.ones(len(rows)), (rows[:, 0], rows[:, 1])), shape=shape).tocsr()
+        parts.append(connected_components(graph, directed=True, connection="strong")[1][kept])
+    pairs = len(set(zip(*(part.tolist() for part in parts), strict=True)))
+    return pairs == len(set(parts[0].tolist())) == len(set(parts[1].tolist()))
 
 
 def _fault(source: Array, line: Array, target: Array) -> str:
@@ -95,8 +149,7 @@ def _path(source: Array, line: Array, target: Array) -> Array | None:
     begin, end = _pose(source, -1), _pose(target, 0)
     legs = shortest_legs(begin, end, RADIUS)
     turned = sum(abs(length) for kind, length in legs if kind != 0) / RADIUS
-    turn = abs(math.remainder(end.heading - begin.heading, math.tau))
-    if turned > turn + MOST_SWING:
+    if turned > _turn(source, target) + MOST_SWING:
         return None
     points = np.array([(begin.x, begin.y), *_points(begin, legs)])
     points[-1] = end.x, end.y
