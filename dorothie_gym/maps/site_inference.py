@@ -14,6 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array, Lane, LaneLink, Site
+from dorothie_gym.maps.routing import Router
+from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
 
 # Distance from the lane's edge to a landmark [m].
@@ -34,7 +36,9 @@ def lay_sites(
     """Places landmark sites at the kerb, spread over the town by farthest-point sampling.
 
     A site lies to the right of the outermost lane of a road, at half the lane width plus 6 m, where no other lane is as
-    close. Its lane belongs to the largest strongly connected part of the town.
+    close. All sites can be reached from each other: on the links of the town if its kerb lanes are strongly connected,
+    else by all manoeuvres of a car, U-turns at dead ends included. A map without such places, of one-way roads that
+    lead nowhere, has sites along its largest part.
 
     Args:
         lanes: lanes of the town, with streets.
@@ -45,23 +49,74 @@ def lay_sites(
     Returns:
         At most `count` sites; fewer if the map has no room.
     """
-    usable = _calm([lane for lane in _kerb_lanes(lanes, links) if lane.id not in avoid])
-    for shortest, margin in SITE_RULES:
-        places = _candidates([lane for lane in usable if lane.length >= shortest], margin)
-        if len(places):
-            places = places[_is_clear(lanes, places)]
-        if len(places) >= count:
-            break
+    outermost = [lane for lane in _outermost(lanes) if lane.id not in avoid]
+    part = _parts(lanes, links)
+    closed = _is_closed(outermost, links, part)
+    places = _places(lanes, outermost, count) if closed else np.empty((0, 6))
+    if len(places) < count:  # an open network, or a small one
+        around = _Surroundings(lanes, links)
+        for group in (outermost, [lane for lane in lanes if not lane.in_junction and lane.id not in avoid]):
+            places = max(places, _places(lanes, group, count, around), key=len)
+            if len(places) >= count:
+                break
+    if not len(places):  # no car can return to any place
+        places = _places(lanes, [lane for lane in outermost if part[lane.id] == _largest(part)], count)
     chosen = _spread(places[:, 2:4], count) if len(places) else []
     return tuple(_site(k, lanes[int(places[row, 0])], places[row]) for k, row in enumerate(sorted(chosen)))
 
 
-def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
-    """Returns the outermost lanes outside junctions in the largest strongly connected part of the town."""
+class _Surroundings:
+    """Groups of places that a car can reach from each other."""
+
+    def __init__(self, lanes: Sequence[Lane], links: Sequence[LaneLink]) -> None:
+        self._router = Router(Town(name="", lanes=lanes, links=links, junctions=()))
+        self._labels = self._router.parts()
+
+    def largest(self, places: Array) -> Array:
+        """Returns the largest group of places (n, 6) that can be reached from each other."""
+        cells = np.array([self._router.cell(int(lane), station) for lane, station in places[:, :2]], dtype=np.int64)
+        labels = self._labels[cells]
+        counts = np.bincount(labels[labels >= 0], minlength=1)
+        found: Array = places[labels == np.argmax(counts)]
+        return found
+
+
+def _places(lanes: Sequence[Lane], kerbs: list[Lane], count: int, around: _Surroundings | None = None) -> Array:
+    """Returns candidate sites (n, 6) by the first rule that gives enough of them; see `_candidates`."""
+    usable, best = _calm(kerbs), np.empty((0, 6))
+    for shortest, margin in SITE_RULES:
+        places = _candidates([lane for lane in usable if lane.length >= shortest], margin)
+        if len(places):
+            places = places[_is_clear(lanes, places)]
+        best = places if around is None else around.largest(places)
+        if len(best) >= count:
+            break
+    return best
+
+
+def _parts(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> np.ndarray[tuple[int], np.dtype[np.int32]]:
+    """Returns the strongly connected part of each lane (n,)."""
     pairs = np.array([(link.source, link.target) for link in links], dtype=int).reshape(-1, 2)
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(lanes), len(lanes)))
-    _, part = connected_components(graph, directed=True, connection="strong")
-    largest = int(np.argmax(np.bincount(part)))
+    result: np.ndarray[tuple[int], np.dtype[np.int32]] = connected_components(
+        graph, directed=True, connection="strong"
+    )[1]
+    return result
+
+
+def _is_closed(kerbs: list[Lane], links: Sequence[LaneLink], part: np.ndarray[tuple[int], np.dtype[np.int32]]) -> bool:
+    """Returns whether all kerb lanes belong to the largest part, in which each lane leads to the others and back."""
+    largest = _largest(part)
+    leads_on = (link for link in links if not link.type.is_lane_change and part[link.source] == part[link.target])
+    return any(part[link.source] == largest for link in leads_on) and all(part[lane.id] == largest for lane in kerbs)
+
+
+def _largest(part: np.ndarray[tuple[int], np.dtype[np.int32]]) -> int:
+    return int(np.argmax(np.bincount(part)))
+
+
+def _outermost(lanes: Sequence[Lane]) -> list[Lane]:
+    """Returns the outermost lanes of each road outside junctions."""
     outermost: dict[tuple[int, bool], int] = defaultdict(int)
     for lane in lanes:
         side = lane.road_id, lane.lane_id > 0
@@ -69,9 +124,7 @@ def _kerb_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> list[Lane]:
     return [
         lane
         for lane in lanes
-        if not lane.in_junction
-        and part[lane.id] == largest
-        and abs(lane.lane_id) == outermost[lane.road_id, lane.lane_id > 0]
+        if not lane.in_junction and abs(lane.lane_id) == outermost[lane.road_id, lane.lane_id > 0]
     ]
 
 

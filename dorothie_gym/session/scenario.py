@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -11,13 +13,15 @@ import gymnasium
 import numpy as np
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
-from dorothie_gym.errors import did_you_mean, short_repr
+from dorothie_gym.errors import StoryboardError, did_you_mean, short_repr
+from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Site
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.config import EnvConfig
 
@@ -91,20 +95,24 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
     """Draws a scenario; equal arguments give equal scenarios.
 
     Args:
-        town: the map, with at least one site for each landmark of the storyboard and one for the departure.
-        template: template of the storyboard; None draws one of the shipped templates.
+        town: the map, with at least one site for each landmark of the storyboard.
+        template: template of the storyboard; None draws one of the shipped templates that fit the town.
         seed: any integer >= 0.
 
     Raises:
-        StoryboardError: the template cannot be bound to the town.
+        StoryboardError: the template cannot be bound to the town, or none fits it.
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    sites = connected_sites(town)
     if template is None:
         names = tasks.template_names()
         template = tasks.load_template(names[int(task.integers(len(names)))])
-    storyboard = tasks.bind(template, town.sites, task)
+        if tasks.needed_places(template) > len(sites):
+            fitting = fitting_templates(town)
+            template = fitting[int(task.integers(len(fitting)))]
+    storyboard = tasks.bind(template, sites, task)
     taken = {landmark.site for landmark in storyboard.landmarks}
-    free = [site for site in town.sites if site.id not in taken] or list(town.sites)
+    free = [site for site in sites if site.id not in taken] or list(sites)
     start = free[int(departure.integers(len(free)))]
     return Scenario(
         seed=seed,
@@ -112,6 +120,34 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
         street_names=_name_streets(town, streets),
         departure=(start.lane, start.station),
     )
+
+
+@lru_cache(maxsize=16)
+def connected_sites(town: Town) -> tuple[Site, ...]:
+    """Returns the largest group of sites that a car can reach from each other, by U-turns too: all, in most towns."""
+    search = router(town)
+    parts = search.parts()
+    labels = [int(parts[search.cell(site.lane, site.station)]) for site in town.sites]
+    most = Counter(label for label in labels if label >= 0).most_common(1)
+    return tuple(site for site, label in zip(town.sites, labels, strict=True) if most and label == most[0][0])
+
+
+def fitting_templates(town: Town) -> list[StoryboardTemplate]:
+    """Returns the shipped storyboards for whose landmarks a town has places.
+
+    Raises:
+        StoryboardError: there is none; the message has the numbers.
+    """
+    templates = [tasks.load_template(name) for name in tasks.template_names()]
+    fitting = [template for template in templates if tasks.needed_places(template) <= len(connected_sites(town))]
+    if not fitting:
+        least = min(templates, key=tasks.needed_places)
+        reason = (
+            f"needs {tasks.needed_places(least)} places, fewer than any other, but town {town.name} has"
+            f" {len(connected_sites(town))} that cars can reach and leave again; use a larger town with connected roads"
+        )
+        raise StoryboardError(least.name, "landmarks", reason)
+    return fitting
 
 
 def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...]:
