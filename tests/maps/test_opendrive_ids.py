@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dorothie_gym.maps import NoteKind, SignalKind, Town
@@ -30,6 +31,12 @@ def test_a_reference_may_write_a_number_in_another_way() -> None:
 def test_two_texts_of_one_number_are_two_ids() -> None:
     numbers = IdNumbers(["1", "01"])
     assert (numbers.get("1"), numbers.get("01")) == (1, 2)
+
+
+def test_numbers_fit_the_arrays_of_the_simulation() -> None:
+    numbers = IdNumbers(["a", str(MAX_ID), "0", "b", str(2 * MAX_ID)])
+    assert [numbers.get(text) for text in ("a", "b", str(2 * MAX_ID), str(MAX_ID))] == [1, 2, 3, MAX_ID]
+    assert np.iinfo(np.int32).max >= MAX_ID
 
 
 def test_ids_without_any_number_begin_at_zero() -> None:

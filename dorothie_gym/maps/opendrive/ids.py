@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from itertools import count
 
-# Largest magnitude of an id that keeps its number; ids beyond it get a number like those that are text.
-MAX_ID = 2**40
+# Largest magnitude of an id that keeps its number: the arrays of the simulation hold 32 bits. Ids beyond it get a
+# number like those that are text.
+MAX_ID = 2**31 - 1
 
 _WHOLE_NUMBER = re.compile(r"\s*[+-]?[0-9]{1,13}\s*")
 
@@ -29,8 +31,9 @@ class IdNumbers:
             else:
                 self._numbers[text] = number
                 used.add(number)
-        free = max(used, default=-1) + 1
-        self.renamed = {text: max(free, 0) + k for k, text in enumerate(rest)}
+        free = max(0, max(used, default=-1) + 1)
+        unused = count(free if free + len(rest) <= MAX_ID else 0)
+        self.renamed = dict(zip(rest, (number for number in unused if number not in used), strict=False))
         """Numbers of the ids that are no whole numbers, or too large."""
         self._numbers |= self.renamed
         self._kept = frozenset(used)
