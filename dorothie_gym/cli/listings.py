@@ -24,6 +24,9 @@ from dorothie_gym.ontology.roles import AGENT_ROLES
 FAULTY = 1
 """Exit code for a town that has faults."""
 
+ENOUGH_PLACES = 12
+"""Number of places that suffices for the landmarks of every session."""
+
 NOTES_SHOWN = 10
 """Number of notes of each kind that are printed."""
 
@@ -67,7 +70,7 @@ def towns(
             _show_notes(notes)
             _show_faults(facts, faults)
         else:
-            _show_town(facts)
+            _show_town(facts, _places(loaded))
         if picture is not None:
             stdout().print(f"Map: {picture}", markup=False, soft_wrap=True)
     if faults:
@@ -214,7 +217,20 @@ def _show_towns(rows: Sequence[Facts]) -> None:
     console.print("OpenDRIVE maps (.xodr) and town files (.yaml) can be given by their path.", style="dim")
 
 
-def _show_town(facts: Facts) -> None:
+def _places(town: town_maps.Town) -> str:
+    """Returns the number of sites, and for few of them the numbers that storyboards need."""
+    connected = len(town_maps.connected_sites(town))
+    if connected >= ENOUGH_PLACES:
+        return str(len(town.sites))
+    needs = [tasks.needed_places(tasks.load_template(name)) for name in tasks.template_names()]
+    fitting = sum(need <= connected for need in needs)
+    return (
+        f"{len(town.sites)}, of which cars can drive between {connected}; {fitting} of {len(needs)} storyboards fit,"
+        f" which need {min(needs)} to {max(needs)} places"
+    )
+
+
+def _show_town(facts: Facts, places: str) -> None:
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
@@ -225,6 +241,8 @@ def _show_town(facts: Facts) -> None:
             text = _sizes(value)
         elif isinstance(value, list):
             text = ", ".join(value)
+        elif key == "sites":
+            text = places
         else:
             text = str(value)
         table.add_row(key.replace("_", " "), text)

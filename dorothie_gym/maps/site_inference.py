@@ -5,8 +5,9 @@ They depend on lanes and links alone, so that a map always yields the same sites
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -14,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array, Lane, LaneLink, Site
-from dorothie_gym.maps.routing import Router
+from dorothie_gym.maps.routing import Router, router
 from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
 
@@ -196,3 +197,16 @@ def _site(number: int, lane: Lane, row: Array) -> Site:
         waypoint=(float(x), float(y)),
         street=lane.street,
     )
+
+
+# --- Sites of a town --------------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=16)
+def connected_sites(town: Town) -> tuple[Site, ...]:
+    """Returns the largest group of sites that a car can reach from each other, by U-turns too: all, in most towns."""
+    search = router(town)
+    parts = search.parts()
+    labels = [int(parts[search.cell(site.lane, site.station)]) for site in town.sites]
+    most = Counter(label for label in labels if label >= 0).most_common(1)
+    return tuple(site for site, label in zip(town.sites, labels, strict=True) if most and label == most[0][0])

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -14,14 +12,13 @@ import numpy as np
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
 from dorothie_gym.errors import StoryboardError, did_you_mean, short_repr
-from dorothie_gym.maps.routing import router
+from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Site
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.config import EnvConfig
 
@@ -120,16 +117,6 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
         street_names=_name_streets(town, streets),
         departure=(start.lane, start.station),
     )
-
-
-@lru_cache(maxsize=16)
-def connected_sites(town: Town) -> tuple[Site, ...]:
-    """Returns the largest group of sites that a car can reach from each other, by U-turns too: all, in most towns."""
-    search = router(town)
-    parts = search.parts()
-    labels = [int(parts[search.cell(site.lane, site.station)]) for site in town.sites]
-    most = Counter(label for label in labels if label >= 0).most_common(1)
-    return tuple(site for site, label in zip(town.sites, labels, strict=True) if most and label == most[0][0])
 
 
 def fitting_templates(town: Town) -> list[StoryboardTemplate]:

@@ -175,3 +175,13 @@ def test_many_notes_of_a_kind_are_cut_short_but_in_json() -> None:
     assert result.exit_code == 0
     assert "dropped: 40 speed limits" in result.stdout and "and 30 more; --json lists all" in result.stdout
     assert len(json.loads(call("--check", path, "--json").stdout)["dropped"]["speed limit"]) == 40
+
+
+def test_a_map_with_few_places_says_how_many_storyboards_need() -> None:
+    straight = '<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>'
+    path = Path("one_way.xodr")
+    path.write_text(KERB_TO_KERB.format(roads=ROAD.format(number=1, other=9, half=straight, width=3.5)))
+    words = " ".join(call(path).stdout.split())
+    assert "of which cars can drive between 0; 0 of 54 storyboards fit" in words
+    assert re.search(r"need 2 to \d+ places", words)
+    assert "storyboards" not in call("brookside").stdout
