@@ -24,6 +24,12 @@ from dorothie_gym.ontology.roles import AGENT_ROLES
 FAULTY = 1
 """Exit code for a town that has faults."""
 
+ENOUGH_PLACES = 12
+"""Number of places that suffices for the landmarks of every session."""
+
+NOTES_SHOWN = 10
+"""Number of notes of each kind that are printed."""
+
 
 def towns(
     town: Annotated[
@@ -53,13 +59,18 @@ def towns(
         loaded = town_maps.load_town(town)
         facts = town_maps.describe(loaded)
         faults = town_maps.check_town(loaded) if check else ()
+        notes = town_maps.import_report(town) if check else ()
         if picture is not None:
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 drawing.town_picture(loaded, picture, fold=town_maps.fold_of(loaded.name))
     if as_json:
-        print_json({"town": loaded.name, "faults": [_fault_row(fault) for fault in faults]} if check else facts)
+        print_json(_check_report(loaded.name, faults, notes) if check else facts)
     else:
-        _show_faults(facts, faults) if check else _show_town(facts)
+        if check:
+            _show_notes(notes)
+            _show_faults(facts, faults)
+        else:
+            _show_town(facts, _places(loaded))
         if picture is not None:
             stdout().print(f"Map: {picture}", markup=False, soft_wrap=True)
     if faults:
@@ -206,7 +217,20 @@ def _show_towns(rows: Sequence[Facts]) -> None:
     console.print("OpenDRIVE maps (.xodr) and town files (.yaml) can be given by their path.", style="dim")
 
 
-def _show_town(facts: Facts) -> None:
+def _places(town: town_maps.Town) -> str:
+    """Returns the number of sites, and for few of them the numbers that storyboards need."""
+    connected = len(town_maps.connected_sites(town))
+    if connected >= ENOUGH_PLACES:
+        return str(len(town.sites))
+    needs = [tasks.needed_places(tasks.load_template(name)) for name in tasks.template_names()]
+    fitting = sum(need <= connected for need in needs)
+    return (
+        f"{len(town.sites)}, of which cars can drive between {connected}; {fitting} of {len(needs)} storyboards fit,"
+        f" which need {min(needs)} to {max(needs)} places"
+    )
+
+
+def _show_town(facts: Facts, places: str) -> None:
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
@@ -217,6 +241,8 @@ def _show_town(facts: Facts) -> None:
             text = _sizes(value)
         elif isinstance(value, list):
             text = ", ".join(value)
+        elif key == "sites":
+            text = places
         else:
             text = str(value)
         table.add_row(key.replace("_", " "), text)
@@ -243,6 +269,35 @@ def _show_faults(facts: Facts, faults: Sequence[town_maps.Fault]) -> None:
         console.print(f"{facts['name']}: no faults: {numbers}, {more}", markup=False)
 
 
+def _show_notes(notes: Sequence[town_maps.ImportNote]) -> None:
+    """Prints what the import dropped, repaired or assumed: for each kind the number, and the first elements."""
+    console = stdout()
+    groups: dict[tuple[str, str], list[town_maps.ImportNote]] = {}
+    for note in notes:
+        groups.setdefault((note.action, note.kind), []).append(note)
+    for (action, kind), found in groups.items():
+        console.print(f"{action}: {_count(len(found), kind)}", style="yellow", markup=False)
+        for note in found[:NOTES_SHOWN]:
+            console.print(f"  {note.element}: ", style="dim", markup=False, end="")
+            console.print(note.message, markup=False, soft_wrap=True)
+        if len(found) > NOTES_SHOWN:
+            console.print(f"  and {len(found) - NOTES_SHOWN} more; --json lists all", style="dim", markup=False)
+
+
+def _check_report(name: str, faults: Sequence[town_maps.Fault], notes: Sequence[town_maps.ImportNote]) -> Facts:
+    report: Facts = {"town": name, "faults": [_fault_row(fault) for fault in faults]}
+    return report | {str(action): _note_rows(notes, action) for action in town_maps.NoteAction}
+
+
+def _note_rows(notes: Sequence[town_maps.ImportNote], action: town_maps.NoteAction) -> Facts:
+    """Returns the notes of an action by kind: elements and messages."""
+    rows: Facts = {}
+    for note in notes:
+        if note.action is action:
+            rows.setdefault(str(note.kind), []).append({"element": note.element, "message": note.message})
+    return rows
+
+
 def _fault_row(fault: town_maps.Fault) -> Facts:
     x, y = fault.position
     return {
@@ -258,7 +313,8 @@ def _words(kind: str) -> str:
 
 
 def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    plural = f"{noun}es" if noun.endswith("s") else f"{noun}s"
+    return f"{number} {noun if number == 1 else plural}"
 
 
 def _sizes(sizes: Sequence[int]) -> str:

@@ -4,10 +4,15 @@ from .catalogue import SEEN_TOWNS as SEEN_TOWNS
 from .catalogue import UNSEEN_TOWNS as UNSEEN_TOWNS
 from .catalogue import describe as describe
 from .catalogue import fold_of as fold_of
+from .catalogue import import_report as import_report
 from .catalogue import load_town as load_town
 from .catalogue import town_names as town_names
+from .import_notes import ImportNote as ImportNote
+from .import_notes import NoteAction as NoteAction
+from .import_notes import NoteKind as NoteKind
 from .lint import check_town as check_town
 from .lint.fault import Fault as Fault
+from .lint.fault import FaultKind as FaultKind
 from .model import NO_JUNCTION as NO_JUNCTION
 from .model import NO_STREET as NO_STREET
 from .model import Crosswalk as Crosswalk
@@ -21,6 +26,7 @@ from .model import Signal as Signal
 from .model import SignalKind as SignalKind
 from .model import Site as Site
 from .model import Street as Street
+from .site_inference import connected_sites as connected_sites
 from .town import LightColour as LightColour
 from .town import LightPhase as LightPhase
 from .town import LightProgramme as LightProgramme

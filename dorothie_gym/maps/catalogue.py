@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -21,6 +22,7 @@ from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.import_notes import ImportNote, ImportNotes
     from dorothie_gym.support.files import JsonValue
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
@@ -57,9 +59,28 @@ def load_town(name_or_path: str | Path) -> Town:
     Raises:
         TownError: no town or file has this name, or the file is invalid.
     """
+    with _located(name_or_path) as path:
+        return _load(path)
+
+
+def import_report(name_or_path: str | Path) -> tuple[ImportNote, ...]:
+    """Compiles a town again, and returns what was dropped from its file, repaired or assumed, by action and kind.
+
+    Raises:
+        TownError: no town or file has this name, or the file is invalid.
+    """
+    with _located(name_or_path) as path:
+        _stamp(path)
+        return _import(path)[1].sorted()
+
+
+@contextmanager
+def _located(name_or_path: str | Path) -> Iterator[Path]:
+    """Yields the file of a town, which is a shipped one or a map of the user."""
     if str(name_or_path) in town_names():
         with as_file(_FOLDER / f"{name_or_path}.yaml") as path:
-            return _load(path)
+            yield path
+        return
     path = Path(name_or_path)
     if path.suffix.lower() not in _SUFFIXES:
         raise TownError(
@@ -68,7 +89,7 @@ def load_town(name_or_path: str | Path) -> Town:
             f"there is no such town; {did_you_mean(str(name_or_path), town_names())}"
             f"known towns are {', '.join(town_names())}, and files end in .xodr or .yaml",
         )
-    return _load(path)
+    yield path
 
 
 def find_town(name: str, maps: Path | None) -> Town | None:
@@ -86,6 +107,15 @@ def find_town(name: str, maps: Path | None) -> Town | None:
 
 
 def _load(path: Path) -> Town:
+    return _read(*_stamp(path))
+
+
+def _stamp(path: Path) -> tuple[Path, int, int]:
+    """Returns the resolved path of a map, and its modification time and size.
+
+    Raises:
+        TownError: the file cannot be read.
+    """
     try:
         resolved = path.resolve(strict=True)
         stamp = resolved.stat()
@@ -96,7 +126,7 @@ def _load(path: Path) -> Town:
         raise TownError(str(path), "file", error.reason) from None
     except ValueError as error:  # a null character in the path
         raise TownError(repr(str(path)), "file", f"cannot be read ({error}); check the path") from None
-    return _read(resolved, stamp.st_mtime_ns, stamp.st_size)
+    return resolved, stamp.st_mtime_ns, stamp.st_size
 
 
 @lru_cache(maxsize=16)
@@ -106,9 +136,16 @@ def _read(path: Path, _modified: int, _size: int) -> Town:
 
 
 def _compile(path: Path) -> Town:
-    town = opendrive.read_opendrive(path) if path.suffix.lower() == ".xodr" else yaml.read_yaml_town(path)
-    check_extent(town, str(path))
+    town, notes = _import(path)
+    notes.log()
     return town
+
+
+def _import(path: Path) -> tuple[Town, ImportNotes]:
+    read = opendrive.import_opendrive if path.suffix.lower() == ".xodr" else yaml.import_yaml_town
+    town, notes = read(path)
+    check_extent(town, str(path))
+    return town, notes
 
 
 # --- Summary figures -------------------------------------------------------------------------------------------------

@@ -287,6 +287,16 @@ class Router:
         found[self._graph.start] = False
         return found
 
+    def parts(self) -> NDArray[np.int64]:
+        """Returns a label of each cell (cells,): cells of one label can be reached from each other.
+
+        The label is -1 for cells to which a car cannot return.
+        """
+        matrix = self._matrix(())
+        _, labels = connected_components(matrix, directed=True, connection="strong")
+        returns = (np.bincount(labels)[labels] > 1) | (matrix.diagonal() > 0.0)
+        return np.where(returns, labels, NONE).astype(np.int64)[: self._graph.cells]
+
     def safe(
         self, goals: Sequence[int], blocked: Sequence[Place] = (), stands: Sequence[Place] = ()
     ) -> NDArray[np.bool_]:

@@ -11,7 +11,8 @@ import gymnasium
 import numpy as np
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
-from dorothie_gym.errors import did_you_mean, short_repr
+from dorothie_gym.errors import StoryboardError, did_you_mean, short_repr
+from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
 from dorothie_gym.support.copying import shared
@@ -91,20 +92,24 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
     """Draws a scenario; equal arguments give equal scenarios.
 
     Args:
-        town: the map, with at least one site for each landmark of the storyboard and one for the departure.
-        template: template of the storyboard; None draws one of the shipped templates.
+        town: the map, with at least one site for each landmark of the storyboard.
+        template: template of the storyboard; None draws one of the shipped templates that fit the town.
         seed: any integer >= 0.
 
     Raises:
-        StoryboardError: the template cannot be bound to the town.
+        StoryboardError: the template cannot be bound to the town, or none fits it.
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    sites = connected_sites(town)
     if template is None:
         names = tasks.template_names()
         template = tasks.load_template(names[int(task.integers(len(names)))])
-    storyboard = tasks.bind(template, town.sites, task)
+        if tasks.needed_places(template) > len(sites):
+            fitting = fitting_templates(town)
+            template = fitting[int(task.integers(len(fitting)))]
+    storyboard = tasks.bind(template, sites, task)
     taken = {landmark.site for landmark in storyboard.landmarks}
-    free = [site for site in town.sites if site.id not in taken] or list(town.sites)
+    free = [site for site in sites if site.id not in taken] or list(sites)
     start = free[int(departure.integers(len(free)))]
     return Scenario(
         seed=seed,
@@ -112,6 +117,24 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
         street_names=_name_streets(town, streets),
         departure=(start.lane, start.station),
     )
+
+
+def fitting_templates(town: Town) -> list[StoryboardTemplate]:
+    """Returns the shipped storyboards for whose landmarks a town has places.
+
+    Raises:
+        StoryboardError: there is none; the message has the numbers.
+    """
+    templates = [tasks.load_template(name) for name in tasks.template_names()]
+    fitting = [template for template in templates if tasks.needed_places(template) <= len(connected_sites(town))]
+    if not fitting:
+        least = min(templates, key=tasks.needed_places)
+        reason = (
+            f"needs {tasks.needed_places(least)} places, fewer than any other, but town {town.name} has"
+            f" {len(connected_sites(town))} that cars can reach and leave again; use a larger town with connected roads"
+        )
+        raise StoryboardError(least.name, "landmarks", reason)
+    return fitting
 
 
 def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...]:

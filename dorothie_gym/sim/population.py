@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lane_neighbours import rightmost
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
@@ -296,6 +297,10 @@ def _draw_places(town: Town, rng: np.random.Generator, count: int) -> tuple[NDAr
 def _open_lanes(town: Town) -> tuple[NDArray[np.int64], Array, Array]:
     """Returns ids and lengths [m] of the lanes on which vehicles appear, and their shares of the road, cumulated."""
     lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > SHORTEST]
+    if not lanes:
+        longest = max((lane.length for lane in town.lanes if not lane.in_junction), default=0.0)
+        reason = f"no lane is longer than {SHORTEST:g} m, the longest has {longest:.0f} m; use a larger map"
+        raise TownError(town.name, "town", reason)
     lengths = np.array([lane.length for lane in lanes])
     return np.array([lane.id for lane in lanes]), lengths, _cumulated(lengths)
 

@@ -1,6 +1,7 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
 from .binding import bind as bind
+from .binding import needed_places as needed_places
 from .catalogue import LandmarkKind as LandmarkKind
 from .catalogue import catalogue as catalogue
 from .catalogue import map_label as map_label

@@ -172,7 +172,8 @@ def bind(
     """Samples landmarks, values and sites for a template.
 
     All ten landmark kinds are placed, together with the additional houses and people that the story needs; landmarks of
-    the story are assigned the sites with the widest spread.
+    the story are assigned the sites with the widest spread. A small town has only as many kinds besides those of the
+    story as leave a place for the departure.
 
     Args:
         template: the template.
@@ -181,14 +182,14 @@ def bind(
         name: name of the storyboard; the name of the template by default.
 
     Raises:
-        StoryboardError: if the town has fewer sites than there are landmarks.
+        StoryboardError: if the town has fewer sites than there are landmarks in the story.
     """
     parts = cast(template, rng)
     values = _draw_values(template, parts, rng)
-    names, indices = _line_up(parts)
-    if len(names) > len(places):
-        reason = f"{len(names)} landmarks need as many places, but the town has {len(places)}; use a larger town"
+    if len(parts) > len(places):
+        reason = f"{len(parts)} landmarks need as many places, but the town has {len(places)}; use a larger town"
         raise StoryboardError(template.name, "variables", reason)
+    names, indices = _line_up(parts, len(places))
     hidden = {indices[f"${variable}"] for variable in template.hidden}
     return Storyboard(
         name=template.name if name is None else name,
@@ -225,9 +226,25 @@ def longest_values(template: StoryboardTemplate) -> dict[str, str]:
     return values
 
 
-def _line_up(parts: Mapping[str, LandmarkName]) -> tuple[list[LandmarkName], dict[str, int]]:
-    """Returns the names of all landmarks (each kind once, then repeated ones) and the index of each part."""
+def needed_places(template: StoryboardTemplate) -> int:
+    """Returns the number of places that a storyboard needs at least: one for each of its landmarks."""
+    return len(cast(template))
+
+
+def _line_up(parts: Mapping[str, LandmarkName], places: int) -> tuple[list[LandmarkName], dict[str, int]]:
+    """Returns the names of all landmarks (each kind once, then repeated ones) and the index of each part.
+
+    If there are too few places, kinds that the story does not mention are left out, and one place remains free.
+
+    Args:
+        parts: kinds of the landmarks in the story.
+        places: number of places; at least that of the parts.
+    """
     names = list(catalogue())
+    spare = [name for name in names if name not in parts.values()]
+    if len(parts) + len(spare) > places:
+        left_out = spare[max(places - 1 - len(parts), 0) :]
+        names = [name for name in names if name not in left_out]
     indices: dict[str, int] = {}
     seen: set[LandmarkName] = set()
     for part, name in parts.items():

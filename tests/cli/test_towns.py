@@ -34,6 +34,7 @@ ARC = (
     '<geometry s="0" x="0" y="{y}" hdg="{heading}" length="100">'
     '<arc curvature="0.031415926535897934"/></geometry>'  # a half circle of 100 m
 )
+NO_NOTES: dict[str, Any] = {"dropped": {}, "repaired": {}, "assumed": {}}
 RADIUS = 100.0 / 3.141592653589793
 
 
@@ -86,7 +87,7 @@ class TestCheck:
 
     def test_faultless_town_as_json(self) -> None:
         result = call("--check", "brookside", "--json")
-        assert result.exit_code == 0 and loaded(result) == {"town": "brookside", "faults": []}
+        assert result.exit_code == 0 and loaded(result) == {"town": "brookside", "faults": [], **NO_NOTES}
 
     def test_imported_map_is_checked_like_a_shipped_one(self) -> None:
         result = call("--check", ring())
@@ -104,7 +105,7 @@ class TestCheck:
         result = call("--check", ring("path.xodr", width=1.5), "--json")
         assert result.exit_code == 1
         value = loaded(result)
-        assert list(value) == ["town", "faults"] and value["town"] == "path" and len(value["faults"]) == 2
+        assert value == {"town": "path", "faults": value["faults"], **NO_NOTES} and len(value["faults"]) == 2
         fault = value["faults"][0]
         assert list(fault) == ["kind", "lanes", "position", "message"]
         assert fault["kind"] == "narrow" and fault["lanes"] == [0] and len(fault["position"]) == 2
@@ -135,3 +136,52 @@ def test_picture_without_a_file_is_named_after_the_town(tmp_path: Path, monkeypa
         assert "Map: brookside.png" in result.output
         assert (tmp_path / "brookside.png").stat().st_size > 10_000
         (tmp_path / "brookside.png").unlink()
+
+
+def noted_ring() -> Path:
+    """The ring with a link to nowhere, a signal with a name, and lane sections in disorder."""
+    path = ring()
+    text = path.read_text(encoding="utf-8")
+    text = text.replace('elementId="2" contactPoint="end"', 'elementId="99" contactPoint="end"', 1)
+    sign = '<signals><signal id="S_1" s="50" t="-5" dynamic="no" type="206" orientation="+"/></signals></road>'
+    path.write_text(text.replace("</road>", sign, 1), encoding="utf-8")
+    return path
+
+
+def test_a_check_says_what_was_dropped_and_assumed() -> None:
+    result = call("--check", noted_ring())
+    lines = result.stdout.splitlines()
+    assert "dropped: 1 road link" in lines
+    assert lines[lines.index("dropped: 1 road link") + 1].startswith("  road 1 / link / predecessor")
+    assert "road 99" in lines[lines.index("dropped: 1 road link") + 1]
+    assert lines[lines.index("assumed: 1 id") + 1] == "  signal S_1: is signal 0 of the town"
+
+
+def test_the_json_of_a_check_holds_all_notes_by_kind() -> None:
+    report = json.loads(call("--check", noted_ring(), "--json").stdout)
+    assert list(report) == ["town", "faults", "dropped", "repaired", "assumed"]
+    (link,) = report["dropped"]["road link"]
+    assert link["element"].startswith("road 1 / link / predecessor") and "road 99" in link["message"]
+    assert report["repaired"] == {}
+    assert [row["element"] for row in report["assumed"]["id"]] == ["signal S_1"]
+
+
+def test_many_notes_of_a_kind_are_cut_short_but_in_json() -> None:
+    path = ring()
+    text = path.read_text(encoding="utf-8")
+    limits = '<speed sOffset="0" max="9" unit="knots"/>' * 40
+    path.write_text(text.replace("</lane>\n  </right>", f"{limits}</lane>\n  </right>", 1), encoding="utf-8")
+    result = call("--check", path)
+    assert result.exit_code == 0
+    assert "dropped: 40 speed limits" in result.stdout and "and 30 more; --json lists all" in result.stdout
+    assert len(json.loads(call("--check", path, "--json").stdout)["dropped"]["speed limit"]) == 40
+
+
+def test_a_map_with_few_places_says_how_many_storyboards_need() -> None:
+    straight = '<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>'
+    path = Path("one_way.xodr")
+    path.write_text(KERB_TO_KERB.format(roads=ROAD.format(number=1, other=9, half=straight, width=3.5)))
+    words = " ".join(call(path).stdout.split())
+    assert "of which cars can drive between 0; 0 of 54 storyboards fit" in words
+    assert re.search(r"need 2 to \d+ places", words)
+    assert "storyboards" not in call("brookside").stdout

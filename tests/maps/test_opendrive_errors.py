@@ -3,9 +3,10 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.errors import TownError
-from dorothie_gym.maps.opendrive import read_opendrive
+from dorothie_gym.maps import ImportNote, NoteAction, NoteKind
+from dorothie_gym.maps.opendrive import import_opendrive, read_opendrive
 
-from .opendrive_text import geometry, lane, opendrive, road, section, shared_map
+from .opendrive_text import geometry, lane, linked, opendrive, road, section, shared_map
 
 
 def _error(tmp_path: Path, text: str) -> TownError:
@@ -16,6 +17,16 @@ def _error(tmp_path: Path, text: str) -> TownError:
     assert caught.value.source == str(path)
     assert str(path) in str(caught.value)
     return caught.value
+
+
+def _note(tmp_path: Path, text: str, lanes: int) -> ImportNote:
+    """The only thing that was dropped from a map, of which that many lanes are left."""
+    path = tmp_path / "map.xodr"
+    path.write_text(text)
+    town, notes = import_opendrive(path)
+    assert len(town.lanes) == lanes
+    (note,) = (note for note in notes.sorted() if note.action is NoteAction.DROPPED)
+    return note
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -64,10 +75,17 @@ def test_a_map_without_driving_lanes_is_refused(tmp_path: Path) -> None:
     assert "no driving lanes" in _error(tmp_path, opendrive(pavement)).reason
 
 
-def test_an_unknown_geometry_is_named(tmp_path: Path) -> None:
-    error = _error(tmp_path, opendrive(road(1), road(12, plan=geometry("<bezier/>", 100.0))))
+def test_a_road_of_an_unknown_geometry_is_dropped_and_named(tmp_path: Path) -> None:
+    note = _note(tmp_path, opendrive(road(1), road(12, plan=geometry("<bezier/>", 100.0))), lanes=1)
+    assert note.kind is NoteKind.ROAD
+    assert note.element.startswith("road 12 / geometry / bezier")
+    assert "unknown geometry bezier" in note.message
+
+
+def test_a_map_of_which_no_lane_is_left_is_refused_with_the_first_loss(tmp_path: Path) -> None:
+    error = _error(tmp_path, opendrive(*(road(k, plan=geometry("<bezier/>", 100.0)) for k in (12, 13))))
     assert error.element.startswith("road 12 / geometry / bezier")
-    assert "unknown geometry bezier" in error.reason
+    assert "unknown geometry bezier" in error.reason and "no driving lane is left" in error.reason
 
 
 @pytest.mark.parametrize(
@@ -76,7 +94,6 @@ def test_an_unknown_geometry_is_named(tmp_path: Path) -> None:
         ('hdg="0.0"', 'hdg="north"', "road 12 / geometry", "hdg"),
         ('length="100.0" id="12"', 'length="nan" id="12"', "road 12", "length"),
         ('a="4"', 'a="wide"', "road 12 / laneSection / lane -1 / width", "a"),
-        ('junction="-1"', 'junction="none"', "road 12", "junction"),
         (' x="0.0"', "", "road 12 / geometry", "x is missing"),
     ],
 )
@@ -90,29 +107,42 @@ def test_a_broken_attribute_is_named_with_its_element(
     assert f"attribute {attribute}" in error.reason
 
 
-def test_a_road_that_leads_to_no_road_is_named(tmp_path: Path) -> None:
-    link = '<successor elementType="road" elementId="99" contactPoint="start"/>'
-    error = _error(tmp_path, opendrive(road(12, link=link)))
-    assert error.element.startswith("road 12 / link / successor")
-    assert "road 99" in error.reason
+@pytest.mark.parametrize("side", ["predecessor", "successor"])
+@pytest.mark.parametrize(
+    ("link", "missing"),
+    [
+        ('elementType="road" elementId="99" contactPoint="start"', "road 99"),
+        ('elementType="junction" elementId="7"', "junction 7"),
+        ('elementType="road" elementId="broken" contactPoint="start"', "road broken"),
+        ("", "elementId is missing"),
+    ],
+)
+def test_a_link_of_a_road_to_nothing_is_dropped(tmp_path: Path, side: str, link: str, missing: str) -> None:
+    broken = road(2, length=-1.0, plan=geometry("<line/>", 100.0)).replace('id="2"', 'id="broken"')
+    parts = [road(12, link=f"<{side} {link}/>"), *([broken] if "broken" in link else [])]
+    path = tmp_path / "map.xodr"
+    path.write_text(opendrive(*parts))
+    town, notes = import_opendrive(path)
+    assert len(town.lanes) == 1
+    (note,) = (note for note in notes.sorted() if note.kind is NoteKind.ROAD_LINK)
+    assert note.action is NoteAction.DROPPED
+    assert note.element.startswith(f"road 12 / link / {side}")
+    assert missing in note.message
 
 
-def test_a_road_that_leads_to_no_junction_is_named(tmp_path: Path) -> None:
-    error = _error(tmp_path, opendrive(road(12, link='<successor elementType="junction" elementId="7"/>')))
-    assert "junction 7" in error.reason
+@pytest.mark.parametrize("contact", ['contactPoint="start"', ""])
+def test_a_connection_to_no_road_is_dropped(tmp_path: Path, contact: str) -> None:
+    junction = f'<junction id="5"><connection id="0" incomingRoad="12" connectingRoad="44" {contact}/></junction>'
+    note = _note(tmp_path, opendrive(road(12), junction), lanes=1)
+    assert note.kind is NoteKind.CONNECTION
+    assert note.element.startswith("junction 5 / connection 0")
+    assert "road 44" in note.message
 
 
-def test_a_junction_that_refers_to_no_road_is_named(tmp_path: Path) -> None:
-    junction = (
-        '<junction id="5"><connection id="0" incomingRoad="12" connectingRoad="44" contactPoint="start"/></junction>'
-    )
-    error = _error(tmp_path, opendrive(road(12), junction))
-    assert error.element.startswith("junction 5 / connection 0")
-    assert "road 44" in error.reason
-
-
-def test_two_roads_of_one_id_are_refused(tmp_path: Path) -> None:
-    assert "same id" in _error(tmp_path, opendrive(road(3), road(3))).reason
+def test_of_two_roads_of_one_id_the_first_is_read(tmp_path: Path) -> None:
+    second = road(3, sections=section(0.0, lane(-1), lane(-2)))
+    note = _note(tmp_path, opendrive(road(3), second), lanes=1)
+    assert note.kind is NoteKind.ROAD and "same id" in note.message
 
 
 def test_a_road_without_geometry_is_named(tmp_path: Path) -> None:
@@ -143,14 +173,43 @@ def test_an_impossible_length_is_refused_before_it_is_sampled(tmp_path: Path, le
     assert "length" in _error(tmp_path, opendrive(road(3, length=length, plan=geometry("<line/>", 100.0)))).reason
 
 
-def test_a_lane_section_behind_the_end_of_its_road_is_refused(tmp_path: Path) -> None:
+def test_a_lane_section_behind_the_end_of_its_road_is_dropped(tmp_path: Path) -> None:
     sections = section(0.0, lane(-1)) + section(1e9, lane(-1))
-    assert "lane sections" in _error(tmp_path, opendrive(road(3, sections=sections))).reason
+    assert "lane sections" in _note(tmp_path, opendrive(road(3, sections=sections)), lanes=1).message
 
 
-def test_an_unknown_unit_of_speed_is_named(tmp_path: Path) -> None:
+def test_lane_sections_are_put_into_the_order_of_s(tmp_path: Path) -> None:
+    path = tmp_path / "map.xodr"
+    ahead, behind = section(40.0, lane(-1, more=linked(before=-1))), section(0.0, lane(-1, more=linked(after=-1)))
+    path.write_text(opendrive(road(3, sections=ahead + behind)))
+    town, notes = import_opendrive(path)
+    assert [lane.length for lane in town.lanes] == pytest.approx([100.0])
+    assert [note.action for note in notes.sorted()] == [NoteAction.REPAIRED]
+
+
+def test_an_unknown_unit_of_speed_is_named_and_the_limit_dropped(tmp_path: Path) -> None:
     kind = '<type s="0" type="town"><speed max="30" unit="knots"/></type>'
-    assert "knots" in _error(tmp_path, opendrive(road(3, more=kind))).reason
+    note = _note(tmp_path, opendrive(road(3, more=kind)), lanes=1)
+    assert note.kind is NoteKind.SPEED and "knots" in note.message
+
+
+@pytest.mark.parametrize("value", ['x="west"', 'x="1e300"', 'hdg="inf"'])
+def test_one_broken_road_does_not_take_the_others_with_it(tmp_path: Path, value: str) -> None:
+    name = value.split("=")[0]
+    broken = road(2).replace(f' {name}="0.0"', f" {value}")
+    assert broken != road(2)
+    note = _note(tmp_path, opendrive(road(1), broken, road(3)), lanes=2)
+    assert note.element.startswith("road 2") and f"attribute {name}" in note.message
+
+
+def test_what_was_dropped_is_logged_with_a_few_of_each_kind(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    link = '<successor elementType="road" elementId="99" contactPoint="start"/>'
+    path = tmp_path / "map.xodr"
+    path.write_text(opendrive(*(road(k, link=link) for k in range(9))))
+    assert len(read_opendrive(path).lanes) == 9
+    lines = [record.getMessage() for record in caplog.records]
+    assert len(lines) == 4
+    assert "road 0 / link / successor" in lines[0] and "6 more" in lines[-1]
 
 
 def test_a_map_cannot_draw_in_other_files(tmp_path: Path) -> None:

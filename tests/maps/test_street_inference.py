@@ -1,3 +1,4 @@
+import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -6,7 +7,9 @@ import pytest
 
 from dorothie_gym.maps.model import NO_STREET, Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive import read_opendrive
-from dorothie_gym.maps.street_inference import lay_sites, name_streets
+from dorothie_gym.maps.routing import router
+from dorothie_gym.maps.site_inference import lay_sites
+from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 
 from .opendrive_text import shared_map
@@ -167,3 +170,22 @@ def test_sites_lie_at_the_kerb() -> None:
     lanes = [_lane(0, 1, (0, 0), (100, 0)), _lane(1, 1, (0, 4), (100, 4), lane_id=-2)]
     both = [LaneLink(0, 1, LinkType.LANE_CHANGE_RIGHT), LaneLink(1, 0, LinkType.LANE_CHANGE_LEFT)]
     assert {site.lane for site in lay_sites(lanes, both, 5)} == {1}
+
+
+@pytest.mark.parametrize("length", [100.0, 300.0])
+def test_sites_of_a_street_without_a_junction_lie_on_both_sides(length: float) -> None:
+    lanes = [_lane(0, 1, (0, 0), (length, 0)), _lane(1, 1, (length, -4), (0, -4), lane_id=1)]
+    sites = lay_sites(lanes, [], 12)
+    assert len(sites) == 12
+    assert {site.lane for site in sites} == {0, 1}
+    town = Town(name="street", lanes=lanes, links=[], junctions=[], sites=sites)
+    for start, goal in itertools.permutations(sites, 2):
+        assert router(town).route((start.lane, start.station), (goal.lane, goal.station)) is not None
+
+
+def test_of_two_streets_apart_the_one_with_more_room_has_the_sites() -> None:
+    lanes = [
+        *(_lane(0, 1, (0, 0), (100, 0)), _lane(1, 1, (100, -4), (0, -4), lane_id=1)),
+        *(_lane(2, 2, (0, 300), (250, 300)), _lane(3, 2, (250, 296), (0, 296), lane_id=1)),
+    ]
+    assert {site.lane for site in lay_sites(lanes, [], 12)} == {2, 3}

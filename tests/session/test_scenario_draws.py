@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import gymnasium
 import pytest
 
-from dorothie_gym.maps import load_town, town_names
+import dorothie_gym  # noqa: F401 - registers the environments
+from dorothie_gym.errors import StoryboardError, TownError
+from dorothie_gym.maps import Town, load_town, town_names
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.session.scenario import draw_scenario
+from tests.maps.opendrive_text import lane, opendrive, road, section
 
 DRAWS = 1000
 
@@ -44,3 +50,36 @@ def test_seeds_vary_street_names_sites_and_departures(name: str) -> None:
 @pytest.mark.parametrize("name", town_names())
 def test_every_street_of_shipped_towns_gets_a_name(name: str) -> None:
     assert 8 <= len(load_town(name).streets) <= 15
+
+
+# --- Small towns -----------------------------------------------------------------------------------------------------
+
+
+def _with_sites(count: int) -> Town:
+    town = load_town("brookside")
+    parts = ("lanes", "links", "junctions", "streets", "signals", "crosswalks", "sidewalks", "programmes")
+    return Town(name="few", sites=town.sites[:count], **{part: getattr(town, part) for part in parts})
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 8, 11])
+def test_a_small_town_plays_storyboards_that_fit_it(count: int) -> None:
+    town = _with_sites(count)
+    for seed in range(10):
+        scenario = draw_scenario(town, None, seed)
+        assert len(scenario.storyboard.landmarks) <= count
+        assert scenario.departure in {(site.lane, site.station) for site in town.sites}
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_town_too_small_for_any_storyboard_is_refused_with_numbers(count: int) -> None:
+    with pytest.raises(StoryboardError, match=rf"needs 2 places, fewer than any other, but town few has {count} "):
+        draw_scenario(_with_sites(count), None, 3)
+
+
+def test_a_town_without_places_is_one_error_in_navigation(tmp_path: Path) -> None:
+    path = tmp_path / "short.xodr"
+    path.write_text(opendrive(road(1, length=12.0, sections=section(0.0, lane(1), lane(-1)))))
+    with pytest.raises(StoryboardError, match="town short has 0"):
+        gymnasium.make("dorothie_gym/Navigation-v0", town=str(path)).reset(seed=1)
+    with pytest.raises(TownError, match="short: town: no lane is longer than 12 m"):
+        gymnasium.make("dorothie_gym/Town-v0", town=str(path)).reset(seed=1)

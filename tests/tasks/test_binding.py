@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.tasks import bind, catalogue, load_template, template_names
+from dorothie_gym.tasks import bind, catalogue, load_template, needed_places, template_names
 from dorothie_gym.tasks.binding import SITE_SPACING, cast, spread_places
 
 from .builders import FakePlace, bound, grid_places, parse, plain, templates
@@ -204,11 +204,29 @@ def test_changed_subgoal_has_its_other_landmark():
     assert board.subgoals[1].change == "Only look" and board.subgoals[1].change_landmark is None
 
 
-def test_town_with_too_few_sites_raises_error():
-    template = parse(plain({}, {}, variables=[["A", "people"], ["B", "people"]]))
-    with pytest.raises(StoryboardError, match="11 landmarks need as many places, but the town has 10; use a larger"):
-        bind(template, grid_places(10), np.random.default_rng(0))
-    assert len(bind(template, grid_places(11), np.random.default_rng(0)).landmarks) == 11
+def _two_people():
+    fields = plain({}, {}, variables=[["A", "people"], ["B", "people"]])
+    fields["subgoals"] = [{"destination": "$A", "description": "a"}, {"destination": "$B", "description": "b"}]
+    return parse(fields)
+
+
+def test_town_with_fewer_sites_than_the_story_has_landmarks_raises_error():
+    with pytest.raises(StoryboardError, match="2 landmarks need as many places, but the town has 1; use a larger"):
+        bind(_two_people(), grid_places(1), np.random.default_rng(0))
+    assert needed_places(_two_people()) == 2
+    assert len(bind(_two_people(), grid_places(2), np.random.default_rng(0)).landmarks) == 2
+
+
+@pytest.mark.parametrize(
+    ("places", "landmarks"), [(2, 2), (3, 2), (4, 3), (7, 6), (10, 9), (11, 11), (12, 11), (40, 11)]
+)
+def test_a_small_town_has_fewer_landmarks_besides_those_of_the_story(places, landmarks):
+    board = bind(_two_people(), grid_places(places), np.random.default_rng(0))
+    assert len(board.landmarks) == landmarks
+    assert [landmark.index for landmark in board.landmarks] == list(range(landmarks))
+    assert len({landmark.site for landmark in board.landmarks}) == landmarks
+    assert [board.landmarks[goal.landmark].name.label for goal in board.subgoals] == ["Person", "Person"]
+    assert len({landmark.label for landmark in board.landmarks}) == landmarks
 
 
 def test_storyboard_name_is_configurable():

@@ -28,7 +28,7 @@ from dorothie_gym.policies.navigation.observation_vector import HeardInstruction
 from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.observations import LazyObservations
-from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.scenario import Scenario, fitting_templates
 from dorothie_gym.session.spaces.actions import Mental
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.sim.batch.threads import turns_of
@@ -145,6 +145,8 @@ class DrivingRows(CachedViews):
         self._tables, self._graph = route_tables(town), routing_graph(town)
         self._searches = stacked(empty_search(self._graph), self.threads)
         self._cost_rows: dict[tuple[Place, tuple[Place, ...]], int] = {}
+        if not town.sites:
+            fitting_templates(town)  # raises the error
         first = town.sites[0]
         self._common = DrivingTown(
             exit_sectors(town),

@@ -1,4 +1,4 @@
-"""Towns from OpenDRIVE files (ASAM OpenDRIVE 1.4, as CARLA's towns)."""
+"""Towns from OpenDRIVE files (ASAM OpenDRIVE 1.4 to 1.8)."""
 
 import lazy_loader
 

@@ -1,3 +1,4 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
+from .compile import import_opendrive as import_opendrive
 from .compile import read_opendrive as read_opendrive

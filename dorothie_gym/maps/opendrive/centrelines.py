@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.errors import TownError
+from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.opendrive.parse import MAX_NUMBER
-from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord
+from dorothie_gym.maps.opendrive.connectors import repair_connectors
+from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
+from dorothie_gym.maps.opendrive.parse import refuse_empty
+from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord, SectionRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
 from dorothie_gym.support import portable_arrays as pn
 
@@ -35,6 +38,21 @@ _STITCH_LENGTH = 10.0
 _OPEN_WIDTH, _OPEN_SHARE = 1.75, 0.5
 
 
+class LanePlace(NamedTuple):
+    """Place of a lane beside its reference line.
+
+    Attributes:
+        centre: lateral position of its centre (m,) [m].
+        width: (m,) [m].
+        level_from: lateral position (m,) from which the cross-section is level, although the road is tilted; None for
+            a lane that is tilted with its road.
+    """
+
+    centre: Array
+    width: Array
+    level_from: Array | None = None
+
+
 @dataclass(frozen=True)
 class RoadSamples:
     """Samples along one road, in the frame of the file.
@@ -44,8 +62,7 @@ class RoadSamples:
         heading: direction of the reference line (n,) [rad].
         tilt: roll angle of the road (n,) [rad], positive with the left side up.
         spans: range of samples of each lane section.
-        centres: for each section, by lane number: lateral position of the centre and width (m,) [m] of driving
-            lanes and sidewalks.
+        centres: for each section, the places of driving lanes and sidewalks by lane number.
     """
 
     x: Array
@@ -54,29 +71,33 @@ class RoadSamples:
     heading: Array
     tilt: Array
     spans: tuple[slice, ...]
-    centres: tuple[dict[int, tuple[Array, Array]], ...]
+    centres: tuple[dict[int, LanePlace], ...]
 
     def line(self, pieces: Iterable[tuple[int, int]]) -> Array:
         """Returns the centre line of successive pieces (section, lane): x, y, z, width in the frame of the TOWN."""
-        rows = []
-        for section, lane in pieces:
-            here = self.spans[section]
-            lateral, width = self.centres[section][lane]
-            across = lateral * pn.cos(self.tilt[here])
-            x = self.x[here] - across * pn.sin(self.heading[here])
-            y = self.y[here] + across * pn.cos(self.heading[here])
-            z = self.z[here] + lateral * pn.sin(self.tilt[here])
-            rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y points south below
-        return np.concatenate(rows)
+        with np.errstate(over="ignore", invalid="ignore"):  # see `sample_road`
+            return np.concatenate([self._piece(section, lane) for section, lane in pieces])
+
+    def _piece(self, section: int, lane: int) -> Array:
+        here = self.spans[section]
+        lateral, width, level_from = self.centres[section][lane]
+        tilted = lateral if level_from is None else level_from
+        across = tilted * pn.cos(self.tilt[here])
+        if level_from is not None:
+            across = across + (lateral - level_from)
+        x = self.x[here] - across * pn.sin(self.heading[here])
+        y = self.y[here] + across * pn.cos(self.heading[here])
+        z = self.z[here] + tilted * pn.sin(self.tilt[here])
+        return np.column_stack((x, -y, z, np.maximum(width, 0.0)))  # y points south in the town
 
 
 def sample_centrelines(
     records: OpenDriveRecords, topology: Topology, samples: Mapping[int, RoadSamples]
-) -> list[Array]:
+) -> tuple[Topology, list[Array]]:
     """Returns the centre lines of all lanes in the frame of the town and in driving direction, joined at links.
 
     A lane that opens or closes beside others without a link at that end begins where it reaches half of its width:
-    the wedge before cannot be driven.
+    the wedge before cannot be driven. A lane whose centre line has no length, or a jump, is dropped with a note.
 
     Args:
         records: records of the file.
@@ -84,26 +105,41 @@ def sample_centrelines(
         samples: samples of the roads, by road id.
 
     Returns:
-        One array (n, 4) for each lane: x, y, z and width [m].
+        The lanes that are left, and one array (n, 4) for each: x, y, z and width [m].
 
     Raises:
-        TownError: a centre line has no length, or a jump.
+        TownError: no lane is left.
     """
+    while True:
+        lines = _dense_lines(records, topology, samples)
+        faults = {k: fault for k, line in enumerate(lines) if (fault := _fault(line))}
+        for k, fault in faults.items():
+            first = topology.chains[k][0]
+            element = f"road {records.roads[first.road].name} / laneSection {first.section} / lane {first.lane}"
+            records.notes.dropped(NoteKind.LANE, element, fault)
+        if len(faults) == len(lines):
+            refuse_empty(records.source, records.notes, "has no driving lane whose centre line can be driven")
+        if not faults:
+            break
+        topology = topology.without(faults)  # ends that have lost their links may now be wedges
+    lines = [thin(line) for line in lines]
+    topology, lines = repair_connectors(records, topology, lines)
+    _stitch(lines, topology.links)
+    return topology, lines
+
+
+def _dense_lines(records: OpenDriveRecords, topology: Topology, samples: Mapping[int, RoadSamples]) -> list[Array]:
+    """Returns the samples of all lanes (n, 4) in driving direction, without wedges."""
     entered, left = ({link[k] for link in topology.links} for k in (1, 0))
     lines = []
     for k, chain in enumerate(topology.chains):
         road = records.roads[chain[0].road]
-        forward = runs_forward(road, chain[0].lane)
+        forward = runs_forward(road, chain[0].section, chain[0].lane)
         dense = samples[road.id].line((p.section, p.lane) for p in (chain if forward else chain[::-1]))
         dense = dense if forward else dense[::-1]
         if k not in entered or k not in left:
             dense = _without_wedges(dense, k not in entered, k not in left)
-        fault = _fault(dense)
-        if fault:
-            element = f"road {road.id} / laneSection {chain[0].section} / lane {chain[0].lane}"
-            raise TownError(records.source, element, fault)
-        lines.append(thin(dense))
-    _stitch(lines, topology.links)
+        lines.append(dense)
     return lines
 
 
@@ -145,32 +181,37 @@ def sample_road(road: RoadRecord) -> RoadSamples:
         spans.append(slice(total, total + count))
         total += count
     s, pick = np.concatenate(pieces), np.concatenate(picks)
-    x, y, heading = road.line.place(s, pick)
-    offset = road.offset.at(s, pick)
-    centres = tuple(
-        _lateral_places(road, k, s[span] - road.sections[k].start, pick[span] - road.sections[k].start, offset[span])
-        for k, span in enumerate(spans)
-    )
-    elevation, tilt = road.elevation.at(s, pick), road.superelevation.at(s, pick)
+    with np.errstate(over="ignore", invalid="ignore"):  # lanes at such places are dropped
+        x, y, heading = road.line.place(s, pick)
+        offset = road.offset.at(s, pick)
+        elevation, tilt = road.elevation.at(s, pick), road.superelevation.at(s, pick)
+        tilts = bool(np.any(tilt))
+        centres = tuple(
+            _lateral_places(section, s[span] - section.start, pick[span] - section.start, offset[span], tilts)
+            for section, span in zip(road.sections, spans, strict=True)
+        )
     return RoadSamples(x=x, y=y, z=elevation, heading=heading, tilt=tilt, spans=tuple(spans), centres=centres)
 
 
-def _lateral_places(
-    road: RoadRecord, section: int, ds: Array, pick: Array, offset: Array
-) -> dict[int, tuple[Array, Array]]:
-    """Returns lateral position and width of the lanes of a section, stacked from the centre outwards.
+def _lateral_places(section: SectionRecord, ds: Array, pick: Array, offset: Array, tilts: bool) -> dict[int, LanePlace]:
+    """Returns the places of the lanes of a section, stacked from the centre outwards.
 
-    A lane with a border ends at it regardless of the lanes between (OpenDRIVE 1.7, section 11.6.2).
+    A lane with a border ends at it regardless of the lanes between (OpenDRIVE 1.7, section 11.6.2). Level lanes at the
+    edge of a tilted road continue level from the tilted lanes.
     """
-    lanes = road.sections[section].lanes
     places = {}
     for side in (1, -1):
-        edge = offset
-        for number in sorted((n for n in lanes if n * side > 0), key=abs):
-            lane = lanes[number]
-            width = lane.width.at(ds, pick) if lane.border is None else side * (lane.border.at(ds, pick) - edge)
+        edge, level_from = offset, None
+        for number in sorted((n for n in section.lanes if n * side > 0), key=abs):
+            lane = section.lanes[number]
+            here, picked = ds + lane.shift, pick + lane.shift
+            width = lane.width.at(here, picked) if lane.border is None else side * (lane.border.at(here, picked) - edge)
+            if not (tilts and lane.level):
+                level_from = None
+            elif level_from is None:
+                level_from = edge
             if lane.drives or lane.type in SIDEWALK_TYPES:
-                places[number] = (edge + 0.5 * side * width, width)
+                places[number] = LanePlace(edge + 0.5 * side * width, width, level_from)
             edge = edge + side * width
     return places
 

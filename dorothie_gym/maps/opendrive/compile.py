@@ -8,30 +8,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, LinkType
+from dorothie_gym.maps.long_lanes import cut_long_lanes
+from dorothie_gym.maps.model import Array, Junction, Lane
 from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_road
 from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
+from dorothie_gym.maps.opendrive.lane_changes import lane_change_links
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
-from dorothie_gym.maps.street_inference import lay_sites, name_streets
+from dorothie_gym.maps.site_inference import lay_sites
+from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.import_notes import ImportNotes
     from dorothie_gym.maps.opendrive.records import OpenDriveRecords, RoadRecord
 
 # Speed limit of roads without one, as in built-up areas [m/s] (50 km/h).
 DEFAULT_SPEED_LIMIT = 50.0 / 3.6
 
-# Shortest length of parallel lanes with a lane change [m].
-SHORTEST_LANE_CHANGE = 5.0
-
 
 def read_opendrive(path: str | Path) -> Town:
-    """Reads an OpenDRIVE file (1.4, as CARLA's towns) into a town with the name of the file.
+    """Reads an OpenDRIVE file (1.4 to 1.8) into a town with the name of the file.
 
     The y axis of the file points north and that of a town south: all coordinates are mirrored. A lane is a chain of
-    lane sections of one road; lanes of types other than "driving" (and those of ramps) are ignored.
+    lane sections of one road; lanes of types other than "driving" (and those of ramps) are ignored. Elements that
+    cannot be understood are dropped, and the first of each kind logged as warnings.
 
     Args:
         path: file to read.
@@ -40,16 +42,24 @@ def read_opendrive(path: str | Path) -> Town:
         The town. Streets and landmark sites, which OpenDRIVE does not have, are inferred.
 
     Raises:
-        TownError: the file is invalid; the message names the file, the element and the reason.
+        TownError: the file is no OpenDRIVE, or has no driving lane; the message names the file, the element and the
+            reason.
     """
+    town, notes = import_opendrive(path)
+    notes.log()
+    return town
+
+
+def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
+    """Reads a file like `read_opendrive`; also returns what was dropped, repaired or assumed."""
     records = parse_opendrive(path)
-    topology = build_topology(records)
     samples = {road.id: sample_road(road) for road in records.roads.values()}
-    lanes = _lanes(records, topology, sample_centrelines(records, topology, samples))
-    links = successor_links(lanes, topology) + _lane_change_links(records, topology, lanes)
+    topology, lines = sample_centrelines(records, build_topology(records), samples)
+    lanes = _lanes(records, topology, lines)
+    links = successor_links(lanes, topology) + lane_change_links(records, topology, lanes)
     lanes, streets = name_streets(lanes, links)
     junctions, signals = _junctions(lanes), place_signals(records, topology, lanes)
-    return Town(
+    town = Town(
         name=Path(path).stem,
         lanes=lanes,
         links=links,
@@ -61,6 +71,7 @@ def read_opendrive(path: str | Path) -> Town:
         sidewalks=lay_sidewalks(records, samples, lanes),
         programmes=derive_programmes(lanes, links, junctions, signals),
     )
+    return cut_long_lanes(town, records.notes), records.notes
 
 
 def _lanes(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> tuple[Lane, ...]:
@@ -99,41 +110,6 @@ def _own_limit(road: RoadRecord, chain: tuple[LanePiece, ...]) -> float | None:
         until = [*(s for s, _ in road.speeds[1:]), np.inf]
         limits = [v for (s, v), e in zip(road.speeds, until, strict=False) if s < end and e > start]
     return min(limits, default=None)
-
-
-def _lane_change_links(records: OpenDriveRecords, topology: Topology, lanes: tuple[Lane, ...]) -> tuple[LaneLink, ...]:
-    """Returns lane changes between parallel lanes, each pair once and the longest neighbour of a lane first."""
-    lane_of = {piece: k for k, chain in enumerate(topology.chains) for piece in chain}
-    shared: defaultdict[tuple[int, int], float] = defaultdict(float)
-    open_: defaultdict[tuple[int, int], bool] = defaultdict(bool)
-    for piece, inner in lane_of.items():
-        road = records.roads[piece.road]
-        section = road.sections[piece.section]
-        outward = 1 if piece.lane > 0 else -1
-        outer = lane_of.get(LanePiece(piece.road, piece.section, piece.lane + outward))
-        if lanes[inner].in_junction or outer is None:
-            continue
-        changes = section.lanes[piece.lane].changes  # the mark on a lane's outer edge
-        for pair, toward in (((inner, outer), outward), ((outer, inner), -outward)):
-            shared[pair] += section.end - section.start
-            open_[pair] |= _permits(changes, toward)
-    rows = []
-    for (source, target), length in shared.items():
-        if open_[source, target] and length >= SHORTEST_LANE_CHANGE:
-            outward = abs(lanes[target].lane_id) > abs(lanes[source].lane_id)
-            rows.append((source, -length, target, _side(records.roads[lanes[source].road_id], outward)))
-    return tuple(LaneLink(source, target, side) for source, _, target, side in sorted(rows))
-
-
-def _permits(changes: tuple[str, ...], toward: int) -> bool:
-    """Returns whether a road mark permits changes to higher (1) or lower (-1) lane numbers; by default it does."""
-    allowing = ("both", "increase" if toward > 0 else "decrease")
-    return not changes or any(change in allowing for change in changes)
-
-
-def _side(road: RoadRecord, outward: bool) -> LinkType:
-    """Returns the side on which the outer (or inner) lane lies: the outer one is at the kerb."""
-    return LinkType.LANE_CHANGE_RIGHT if outward == road.right_hand else LinkType.LANE_CHANGE_LEFT
 
 
 def _junctions(lanes: tuple[Lane, ...]) -> tuple[Junction, ...]:

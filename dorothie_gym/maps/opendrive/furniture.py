@@ -10,6 +10,7 @@ import numpy as np
 
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
+from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
 from dorothie_gym.maps.opendrive.records import (
     SIDEWALK_TYPES,
     CrosswalkRecord,
@@ -88,17 +89,18 @@ class _Ways:
         # section of the signal, or an adjacent one if it is omitted for zero length
         here = min((piece for piece, _ in self._at[road.id]), key=away, default=None)
         for piece, lane in self._at[road.id]:
-            if here is None or piece.section != here.section or not _names(road, record, piece.lane):
+            if here is None or piece.section != here.section or not _names(road, record, piece):
                 continue
             if record.lanes or not controls or self._lanes[lane].in_junction or self._is_ahead(road, record, lane):
                 yield lane
 
     def _is_ahead(self, road: RoadRecord, record: SignalRecord, lane: int) -> bool:
         """Returns whether a signal stands before the junction as seen from its lane."""
-        sections = [road.sections[piece.section] for piece, k in self._at[road.id] if k == lane]
+        pieces = [piece for piece, k in self._at[road.id] if k == lane]
+        sections = [road.sections[piece.section] for piece in pieces]
         behind = record.s - min(section.start for section in sections)
         ahead = max(section.end for section in sections) - record.s
-        if not runs_forward(road, self._lanes[lane].lane_id):
+        if not runs_forward(road, pieces[0].section, pieces[0].lane):
             behind, ahead = ahead, behind
         return ahead <= max(behind, _NEAR_THE_END)
 
@@ -129,13 +131,17 @@ class _Ways:
         return lane
 
 
-def _names(road: RoadRecord, record: SignalRecord, lane: int) -> bool:
+def _names(road: RoadRecord, record: SignalRecord, piece: LanePiece) -> bool:
     """Returns whether a signal applies to a lane; if it lists both directions or none, the orientation decides."""
     spans: list[tuple[float, float]] = [(min(span), max(span)) for span in record.lanes] or [(-math.inf, math.inf)]
-    if not any(low <= lane <= high for low, high in spans):
+    if not any(low <= piece.lane <= high for low, high in spans):
         return False
     both = min(low for low, _ in spans) < 0 < max(high for _, high in spans)
-    return not both or record.orientation not in "+-" or (record.orientation == "+") == runs_forward(road, lane)
+    return (
+        not both
+        or record.orientation not in "+-"
+        or (record.orientation == "+") == runs_forward(road, piece.section, piece.lane)
+    )
 
 
 def _signal(
@@ -235,6 +241,8 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
 
 def _wide_parts(line: Array) -> list[Array]:
     """Returns the parts of a centre line with sufficient width, split at jumps in the profiles."""
+    if not np.all(np.abs(line) <= MAX_NUMBER):  # also for NaN
+        return []
     wide = line[:, 3] >= NARROWEST_SIDEWALK
     step = pn.hypot(*np.diff(line[:, :2], axis=0).T)
     edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1

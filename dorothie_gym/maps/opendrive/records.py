@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dorothie_gym.maps.import_notes import ImportNotes
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import Cubics, ReferenceLine
 
@@ -31,25 +32,37 @@ class LaneRecord:
         width: profile over the distance from the section's start.
         border: profile of the lateral position of the outer edge, positive left, if the file contains this instead of
             widths.
-        predecessor, successor: linked lane numbers before and after it along the reference line, or None.
+        predecessors, successors: linked lane numbers before and after it along the reference line.
         speeds: (offset from the section's start [m], limit [m/s]).
         changes: lane changes permitted by the outer road marks, one entry for each mark ("none", "both", "increase",
             "decrease"); empty if unspecified.
+        reversed: whether traffic runs against the rule of its side.
+        level: whether it stays level where its road is tilted.
+        access: (offset from the start of its profiles [m], whether cars have access from there); cars have access
+            where nothing is said.
+        closed: whether cars have no access.
+        shift: distance from the start of its profiles to the start of its section [m]; not 0 where a section was
+            divided, or continues the lanes of the one before.
     """
 
     id: int
     type: str
     width: Cubics
     border: Cubics | None = None
-    predecessor: int | None
-    successor: int | None
+    predecessors: tuple[int, ...] = ()
+    successors: tuple[int, ...] = ()
     speeds: tuple[tuple[float, float], ...] = ()
     changes: tuple[str, ...] = ()
+    reversed: bool = False
+    level: bool = False
+    access: tuple[tuple[float, bool], ...] = ()
+    closed: bool = False
+    shift: float = 0.0
 
     @property
     def drives(self) -> bool:
         """Whether it is a lane for cars."""
-        return self.type in DRIVING_TYPES
+        return self.type in DRIVING_TYPES and not self.closed
 
     @property
     def is_closed(self) -> bool:
@@ -68,7 +81,10 @@ class SectionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class RoadLink:
-    """Link at one end of a road: to the "start" or "end" of a road, or to a junction."""
+    """Link at one end of a road: to the "start" or "end" of a road, or to a junction.
+
+    The parser completes links without a contact point.
+    """
 
     is_road: bool
     id: int
@@ -80,7 +96,7 @@ class SignalRecord:
     """Sign or light of a road.
 
     Attributes:
-        id: id in the file.
+        id: number of its id.
         type, dynamic, value: attributes in the file.
         s, t, z: road coordinates [m] and height above the road [m].
         heading: angle relative to the road [rad].
@@ -118,7 +134,8 @@ class RoadRecord:
     """Road.
 
     Attributes:
-        id: id in the file.
+        id: number of its id.
+        name: its id in the file.
         length: [m].
         junction: junction that the road crosses, or -1.
         right_hand: traffic keeps to the right.
@@ -131,6 +148,7 @@ class RoadRecord:
     """
 
     id: int
+    name: str
     length: float
     junction: int
     right_hand: bool
@@ -151,7 +169,7 @@ class ConnectionRecord:
     """Connection in a junction: links from lanes of the incoming road to lanes of the connecting road.
 
     Attributes:
-        incoming, connecting: road ids.
+        incoming, connecting: numbers of the roads.
         contact: end of the connecting road at the incoming road, "start" or "end".
         lanes: pairs (lane of the incoming road, lane of the connecting road); empty for equal lane numbers.
         direct: whether the junction has no connecting roads: the linked road starts or ends at it, and its lanes may
@@ -167,8 +185,9 @@ class ConnectionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class OpenDriveRecords:
-    """Contents of a file: roads in its order, and connections by junction id."""
+    """Contents of a file: roads in its order, connections by junction number, and notes, to which later steps add."""
 
     source: str
+    notes: ImportNotes
     roads: dict[int, RoadRecord]
     junctions: dict[int, tuple[ConnectionRecord, ...]] = field(default_factory=dict)

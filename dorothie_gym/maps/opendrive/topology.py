@@ -6,16 +6,16 @@ chain of one-to-one linked lane sections of one road; it ends where it forks, me
 
 from __future__ import annotations
 
-import logging
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dorothie_gym.errors import TownError
+from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType
+from dorothie_gym.maps.opendrive.parse import refuse_empty
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.portable_math import wrap_degrees
 
@@ -27,8 +27,6 @@ JOINT_LENGTH = 1e-3
 
 # Merged lanes shorter than this are contracted [m].
 SHORTEST_LANE = 0.1
-
-_log = logging.getLogger(__name__)
 
 
 class LanePiece(NamedTuple):
@@ -51,16 +49,22 @@ class Topology:
     chains: tuple[tuple[LanePiece, ...], ...]
     links: tuple[tuple[int, int], ...]
 
+    def without(self, lanes: Collection[int]) -> Topology:
+        """Returns the topology without some lanes and their links."""
+        kept = {old: new for new, old in enumerate(k for k in range(len(self.chains)) if k not in lanes)}
+        links = ((kept[a], kept[b]) for a, b in self.links if a in kept and b in kept)
+        return Topology(tuple(self.chains[k] for k in kept), tuple(links))
 
-def runs_forward(road: RoadRecord, lane: int) -> bool:
+
+def runs_forward(road: RoadRecord, section: int, lane: int) -> bool:
     """Returns whether traffic in a lane follows the reference line (right-hand traffic: the lanes on its right)."""
-    return (lane < 0) == road.right_hand
+    return ((lane < 0) == road.right_hand) != road.sections[section].lanes[lane].reversed
 
 
 def build_topology(records: OpenDriveRecords) -> Topology:
     """Returns the lanes of a file and their links.
 
-    Links to missing lanes or against the traffic are errors of exporters: they are logged and ignored.
+    Links to missing lanes or against the traffic are errors of exporters: they are dropped with a note.
 
     Raises:
         TownError: the file has no driving lanes.
@@ -84,7 +88,7 @@ def build_topology(records: OpenDriveRecords) -> Topology:
             graph.contract(piece)
         chains = graph.chains()
     if not chains:
-        raise TownError(records.source, "OpenDRIVE", "has no driving lanes; a town needs at least one")
+        refuse_empty(records.source, records.notes, "has no driving lanes; a town needs at least one")
     chains.sort(key=lambda chain: min(chain))
     index = {chain[0]: k for k, chain in enumerate(chains)}
     links = sorted((k, index[target]) for k, chain in enumerate(chains) for target in graph.after[chain[-1]])
@@ -158,12 +162,13 @@ def _lane_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[Lane
     for piece in graph.length:
         road = records.roads[piece.road]
         lane = road.sections[piece.section].lanes[piece.lane]
-        for number, step in ((lane.predecessor, -1), (lane.successor, 1)):
-            touch = _neighbour_section(records, road, piece.section, step)
-            if number is not None and touch is not None:
+        where = f"road {road.name} / laneSection {piece.section} / lane {piece.lane}"
+        for numbers, step in ((lane.predecessors, -1), (lane.successors, 1)):
+            touch = _neighbour_section(records, road, piece.section, step) if numbers else None
+            if touch is not None:
                 here = _Touch(piece.road, piece.section, step < 0)
-                where = f"road {piece.road} / laneSection {piece.section} / lane {piece.lane}"
-                yield from _joined(records, graph, (here, piece.lane), (touch, number), where)
+                for number in numbers:
+                    yield from _joined(records, graph, (here, piece.lane), (touch, number), where)
 
 
 def _neighbour_section(records: OpenDriveRecords, road: RoadRecord, section: int, step: int) -> _Touch | None:
@@ -194,16 +199,15 @@ def _joined(
     pieces = []
     for touch, number in (a, b):
         if number not in records.roads[touch.road].sections[touch.section].lanes:
-            _log.warning(
-                "%s: %s: links lane %d of road %d: no such lane there", records.source, where, number, touch.road
-            )
+            reason = f"links lane {number} of road {records.roads[touch.road].name}: no such lane there"
+            records.notes.dropped(NoteKind.LANE_LINK, where, reason)
             return
         pieces.append(LanePiece(touch.road, touch.section, number))
     if any(piece not in graph.length for piece in pieces):
         return
-    leaves = [runs_forward(records.roads[t.road], number) != t.at_start for t, number in (a, b)]
+    leaves = [runs_forward(records.roads[t.road], t.section, number) != t.at_start for t, number in (a, b)]
     if leaves[0] == leaves[1]:
-        _log.warning("%s: %s: links lanes of opposite directions: left out", records.source, where)
+        records.notes.dropped(NoteKind.LANE_LINK, where, "links lanes of opposite directions")
     else:
         yield (pieces[0], pieces[1]) if leaves[0] else (pieces[1], pieces[0])
 
@@ -213,7 +217,8 @@ def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tupl
     for junction, connections in records.junctions.items():
         for connection in connections:
             there = _touched(records, connection.connecting, connection.contact)
-            where = f"junction {junction} / connection from road {connection.incoming} to road {connection.connecting}"
+            names = [records.roads[number].name for number in (connection.incoming, connection.connecting)]
+            where = f"junction {junction} / connection from road {names[0]} to road {names[1]}"
             for here in _incoming_ends(records, junction, connection):
                 for source, target in connection.lanes or _equal_lanes(records, here, there):
                     yield from _joined(records, graph, (here, source), (there, target), where)

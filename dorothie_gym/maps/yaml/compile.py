@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.maps.import_notes import ImportNotes
+from dorothie_gym.maps.long_lanes import cut_long_lanes
 from dorothie_gym.maps.model import NO_JUNCTION, NO_STREET, Array, Junction, Lane, LaneLink, LinkType, Site, Street
-from dorothie_gym.maps.street_inference import lay_sites
+from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml.arms import POCKET, Approach, Arm, LaneEnd
 from dorothie_gym.maps.yaml.furniture import crosswalks, place_signals, place_sites, sidewalks
@@ -34,7 +36,13 @@ def read_yaml_town(path: str | FilePath) -> Town:
     Raises:
         TownError: with the file, the line, the element, and the remedy.
     """
-    return compile_town(lay_out(read_plan(FilePath(path))))
+    return import_yaml_town(path)[0]
+
+
+def import_yaml_town(path: str | FilePath) -> tuple[Town, ImportNotes]:
+    """Compiles a town file like `read_yaml_town`; also returns what was repaired: lanes that were too long."""
+    notes = ImportNotes(str(path))
+    return cut_long_lanes(compile_town(lay_out(read_plan(FilePath(path)))), notes), notes
 
 
 def compile_town(layout: Layout) -> Town:

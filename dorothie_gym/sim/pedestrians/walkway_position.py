@@ -182,6 +182,8 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
             stretch = row[low + 1 : high]
             if len(stretch) and stretch[-1, 2] - stretch[0, 2] >= SHORTEST_WALK:
                 found.append(StreetWalk(lane, stretch))
+    if not found:  # short roads, or lanes on both sides
+        return []
     across = [_across(points, lanes, town, walk) for walk in found]
     far = [_far(walk.points, way) for walk, way in zip(found, across, strict=True)]
     landing = np.split(edges.free(np.concatenate(far), KERB / 2), np.cumsum([len(each) for each in far])[:-1])

@@ -17,6 +17,7 @@ from dorothie_gym.pictures.maps.icons import pin_icon
 from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.map_sheet import Legend, sheet_painter, sheet_size
 from dorothie_gym.pictures.maps.street_axes import roadways
+from tests.maps.opendrive_text import geometry, lane, opendrive, road, section
 
 MAPS = Path(__file__).parents[3] / "../shared/maps"
 TOWNS = ["brookside", "Town01", "Town05"]
@@ -259,3 +260,15 @@ def test_a_narrow_town_gets_a_sheet_wide_enough_for_its_title() -> None:
     lane = Lane(id=0, road_id=0, lane_id=-1, points=points, widths=np.full(2, 3.5), speed_limit=10.0)
     width, height = sheet_size(Town(name="narrow", lanes=[lane], links=[], junctions=[]))
     assert height <= 4000 and width > 0.5 * height
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.5707963])
+@pytest.mark.parametrize("length", [400.0, 900.0])
+def test_a_straight_road_gets_a_sheet_in_either_direction(tmp_path: Path, heading: float, length: float) -> None:
+    path = tmp_path / "straight.xodr"
+    plan = geometry("<line/>", length, hdg=heading)
+    path.write_text(opendrive(road(1, length=length, plan=plan, sections=section(0.0, lane(1), lane(-1)))))
+    painter = town_picture(load_town(path), tmp_path / "map.png")
+    width, height = pygame.image.load(str(tmp_path / "map.png")).get_size()
+    assert (width, height) == painter.size
+    assert max(width, height) <= 4000
