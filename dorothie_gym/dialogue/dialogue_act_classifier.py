@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
@@ -273,9 +274,13 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     Returns:
         Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
-    segments = [segment for sentence in _SENTENCE_END.split(text.strip()) for segment in _segments(sentence)]
+    broken = with_breaks(text.strip())
+    segments = [segment for sentence in _SENTENCE_END.split(broken) for segment in _segments(sentence)]
     spans: list[Span] = []
-    for segment, core in joined([segment for segment in segments if segment], after):
+    words, place = text.split(), 0
+    for marked, core in joined([segment for segment in segments if segment], after):
+        begin, place = place, place + len(marked.split())
+        segment = " ".join(words[begin:place])
         act = guess_act(core, after if not spans else None)
         spans.append(Span(segment, in_context(act, understand(core), [span.act.move for span in spans], after)))
     return tuple(spans)

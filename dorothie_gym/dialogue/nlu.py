@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
+from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
@@ -191,7 +192,7 @@ def understand(text: str) -> ParsedText:
     """
     lists = word_lists()
     parse = read_plan(text)
-    said = without_asides(with_plain_lights(without_vocative(split_words(text), lists)), lists, machines=True)
+    said = without_asides(with_plain_lights(without_vocative(split_words(with_breaks(text)), lists)), lists, machines=True)
     spoken = " ".join(said)
     mentions, words = find_names(said)
     words = mask_directions(words, lists)

@@ -6,6 +6,7 @@ import functools
 import re
 from collections.abc import Sequence
 
+from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseReader
 from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import find_names, known_words
@@ -62,7 +63,7 @@ def read_plan(text: str) -> PlanParse:
     Args:
         text: free English; may be empty.
     """
-    sentences = (_sentence(part) for part in _SENTENCE.split(text))
+    sentences = (_sentence(part) for part in _SENTENCE.split(with_breaks(text)))
     return parse_plan([sentence for sentence in sentences if sentence is not None])
 
 

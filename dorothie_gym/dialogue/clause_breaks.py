@@ -1,0 +1,112 @@
+"""Boundaries of clauses in speech without marks, as recognisers and hurried writers leave it.
+
+"turn left here it's the second house" has two clauses. A comma is put where a clause begins by its form: a subject with
+its finite verb, an imperative with what belongs to it, a verb before its subject, or words that take something back. The
+other readers of this package then see the same boundaries as in punctuated text.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from dorothie_gym.dialogue.lexicon import plain_word, read_data, strings
+from dorothie_gym.dialogue.route_grammar import PhraseIndex
+
+_FILE: Final = "clause_breaks.yaml"
+_MARKS: Final = (",", ".", "?", "!", ";", ":", "\u2026", "\u2014", "\u2013", "-")
+_OPENS: Final = frozenset({"and", "so", "but", "then", "now", "well", "oh", "okay", "ok", "please", "just", "yeah"})
+"""Words that are no clause yet, however many of them open one."""
+
+_PERSONAL: Final = frozenset(
+    {"i", "we", "you", "he", "she", "they", "i'm", "we're", "you're", "i've", "we've", "he's", "what's"}
+)
+
+
+@dataclass(frozen=True)
+class _Breaks:
+    """Contents of data/clause_breaks.yaml; that file explains each list."""
+
+    starts: PhraseIndex
+    answers: PhraseIndex
+    phrases: PhraseIndex
+    joining: frozenset[str]
+    antecedents: frozenset[str]
+    subordinate: frozenset[str]
+
+
+@functools.cache
+def _breaks() -> _Breaks:
+    data = read_data(_FILE)
+    starts = [
+        ("starts", kind, text)
+        for kind, phrases in data.get("starts", {}).items()
+        for text in strings(f"{_FILE}: starts.{kind}", phrases)
+    ]
+    indexes = {
+        name: PhraseIndex(
+            [(name, name, text) for text in strings(f"{_FILE}: {name}", data.get(name))], adverbs=False
+        )
+        for name in ("answers", "phrases")
+    }
+    words = {
+        name: frozenset(strings(f"{_FILE}: {name}", data.get(name)))
+        for name in ("joining", "antecedents", "subordinate")
+    }
+    return _Breaks(PhraseIndex(starts, adverbs=False), **indexes, **words)
+
+
+@functools.lru_cache(maxsize=4096)
+def with_breaks(text: str) -> str:
+    """Returns a text with commas between clauses that no mark separates; words and their number stay the same.
+
+    Args:
+        text: free English; may be empty.
+    """
+    raw = text.split()
+    if len(raw) < 3:
+        return text
+    words = [plain_word(word) for word in raw]
+    begin = 0
+    changed = False
+    for place in range(1, len(raw)):
+        if raw[place - 1].endswith(_MARKS):
+            begin = place
+        elif _begins_clause(words, begin, place):
+            raw[place - 1] += ","
+            begin, changed = place, True
+    return " ".join(raw) if changed else text
+
+
+def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
+    """Returns whether a clause begins at a place of the words, behind the one that began at `begin`."""
+    breaks = _breaks()
+    answer = breaks.answers.longest(words, begin)
+    if answer is not None and answer.length == place - begin:
+        return _answered(words, begin, place)
+    found = breaks.starts.longest(words, place)
+    if found is None:
+        return False
+    if found.kind == "tag" and place + found.length < len(words):
+        return False
+    before = words[place - 1]
+    if before in breaks.joining or breaks.phrases.longest(words, place) is not None:
+        return False
+    head = words[begin:place]
+    if len(head) < 2 or all(word in _OPENS for word in head):
+        return False
+    if found.kind in ("order", "question") and not breaks.subordinate.isdisjoint(head):
+        return False
+    return not (words[place] in _PERSONAL and before in breaks.antecedents)
+
+
+def _answered(words: Sequence[str], begin: int, place: int) -> bool:
+    """Returns whether a clause of its own follows an answer or a sign: "no don't stop"."""
+    breaks = _breaks()
+    known = breaks.phrases.longest(words, begin)
+    if known is not None and known.length > place - begin:
+        return False
+    found = breaks.starts.longest(words, place)
+    return found is not None and found.kind != "tag"
