@@ -23,6 +23,7 @@ from dorothie_gym.dialogue.move_decision import (
     stand_apart,
 )
 from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
@@ -255,6 +256,8 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
             values.discard(ActionValue.LANE_FOLLOW)  # "don't turn" names a turn
         elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
             values -= set(parsed.denied)  # "don't turn, keep going"
+    if move is DialogueMove.REPLY_W and parsed.parse is not None and StepAction.STOP in parsed.parse.implied:
+        values.discard(ActionValue.STOP)  # "on the left": a side, where the question has named the action
     if move is DialogueMove.INSTRUCT and not parsed.landmarks:
         values.discard(GoalStatus.COMPLETE)  # "right, then left, done"
     # One goal is abandoned in favour of another.

@@ -43,6 +43,9 @@ _ROAD: Final = re.compile(
     r"\b(?:this|that) (?:whole )?road(?:'s| is| has| was| looks)\b"
     r"|\bthe road(?:'s| is| was| looks) (?:all |very |so |really )?(?:clear|wet|icy|bumpy|narrow|rough|slippery|dug)\b"
 )
+_KERB: Final = re.compile(r"^(?!.*\b(?:pavement|sidewalks?|side walk|path|see)\b).*\b(?:kerb|curb)")
+"""A kerb by which one stops, rather than one that is seen."""
+
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b.*(?<!your )(?<!the )(?<!my )(?<!our )(?<!a )\bleft(?= now| to do| then|$)"
 )
@@ -77,6 +80,8 @@ def _is_misled(value: SlotValue, spoken: str) -> bool:
         return inside is not None or _PEOPLE.search(spoken) is None
     if value is ObjectClass.VEHICLES:
         return _OTHER_VEHICLES.search(spoken) is None
+    if value is ObjectClass.SIDE_WALK:
+        return _KERB.search(spoken) is not None
     return False
 
 

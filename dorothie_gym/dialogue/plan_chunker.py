@@ -61,6 +61,11 @@ _STATES: Final = frozenset(
 )
 _BESIDE: Final = frozenset({"on", "at", "along", "down"})
 _DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
+_EDGES: Final = frozenset({"side", "kerb", "curb", "edge"})
+"""Nouns that make left and right a side of the street."""
+_BEING: Final = frozenset({"is", "are", "be", "over", "up"})
+_LANES: Final = frozenset({"lane", "lanes"})
+_LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
 _TURN_NOUNS: Final = frozenset({"turn", "turning", "one", "street", "road", "exit", "corner", "fork", "again", "turns"})
 _PRONOUNS: Final = frozenset({"it", "that", "those", "them", "this", "these", "him", "her"})
 _POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
@@ -83,18 +88,28 @@ _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
 
 
-def read_items(words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str]) -> list[Item]:
+def read_items(
+    words: Sequence[str],
+    names: Mapping[int, SlotValue],
+    lead: Mapping[int, str],
+    contracted: frozenset[int] = frozenset(),
+) -> list[Item]:
     """Returns the items of a sentence.
 
     Args:
         words: lower-case tokens with masked names and directions, see `nlu.understand`.
         names: values of the masked names by their token.
         lead: first words of names that say more than the name: "next" of "next lights".
+        contracted: tokens of the names that end in "'s".
     """
-    return _Reader(words, names, lead, route_grammar()).read()
+    reader = _Reader(words, names, lead, route_grammar())
+    reader.contracted = contracted
+    return reader.read()
 
 
 class _Reader(QuantityReader):
+    contracted: frozenset[int] = frozenset()
+
     def read(self) -> list[Item]:
         place = 0
         rules = (
@@ -184,20 +199,37 @@ class _Reader(QuantityReader):
         if changed or self.word_at(place) in ("lane", "lanes", "file") or self.word_at(begin - 1) in ("lane", "lanes"):
             self.items.append(LaneItem(direction))
             return place + (self.word_at(place) in ("lane", "lanes", "file"))
-        aside = self.word_at(place) in ("side", "kerb", "curb")
+        if self._is_other_lane(begin, place):
+            self.items.append(LaneItem(direction))
+            return place + (self.word_at(place) == "one")
+        pavement = self.names.get(place) is ObjectClass.SIDE_WALK
+        aside = self.word_at(place) in _EDGES or pavement or (preposition in ("to", "in") and self._stands_behind_stop())
         aside = aside or (hand and preposition not in ("to", "in") and self.word_at(place) not in _TURN_NOUNS)
         if aside:
-            place += self.word_at(place) in ("side", "kerb", "curb")
+            place += self.word_at(place) in _EDGES or pavement
             place = self._behind_street(place)
         elif self.word_at(place) in _TURN_NOUNS:
             place += 1
         turning = self.word_at(place - 1) in _TURN_NOUNS and preposition in ("down", "along")
         if not turning and (aside or (preposition or self.word_at(begin - 1)) in _BESIDE) and ordinal is None:
-            self.items.append(SideItem(direction))
+            stated = self.word_at(begin - 1).endswith("'s") or self.word_at(begin - 1) in _BEING
+            self.items.append(SideItem(direction, stated or begin - 1 in self.contracted))
         else:
             count = ordinal or 1 if several else 1
             self.items.append(TurnItem(direction, None if several else ordinal, min(count, 4)))
         return place
+
+    def _is_other_lane(self, begin: int, place: int) -> bool:
+        """Returns whether a side tells one of the lanes spoken of: "switch lanes, the right one", "the one on the right"."""
+        if _LANES.isdisjoint(self.words[:begin]):
+            return False
+        before = [word for word in self.words[max(begin - 4, 0) : begin] if word not in ("which", "that", "is", ",")]
+        return self.word_at(place) in ("one", "") and (self.word_at(place) == "one" or before[-1:] in _LANE_NOUNS)
+
+    def _stands_behind_stop(self) -> bool:
+        """Returns whether the last item is an order to stop: "stop to the right"."""
+        last = self.items[-1] if self.items else None
+        return isinstance(last, ActionItem) and last.kind == "stop"
 
     def _behind_street(self, place: int) -> int:
         """Returns the place behind "of the street"."""

@@ -119,6 +119,7 @@ class PlanState:
         self.frames: list[Frame] = []
         self.frame: Frame | None = None
         self.pending = Frame()  # parts that wait for their step
+        self.begun = 0  # number of steps before the sentence
         self.moods: list[ClauseMood] = []
         self.mood = ClauseMood.COMMAND
         self.fresh = True  # whether a boundary stands behind the last item

@@ -38,9 +38,10 @@ class LaneItem(NamedTuple):
 
 
 class SideItem(NamedTuple):
-    """Side of the street or of the car."""
+    """Side of the street or of the car; `stated` says whether a statement tells it: "the house is on the left"."""
 
     direction: Direction
+    stated: bool = False
 
 
 class ConditionItem(NamedTuple):

@@ -72,6 +72,7 @@ class PlanParse:
         cancelled: whether errands are given up.
         conditional: whether there is a condition of the world.
         bare: whether the steps of the plan are names without a verb.
+        turned: whether left, right or a verb names a turn, and no lane or side.
         forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
     """
 
@@ -89,6 +90,7 @@ class PlanParse:
     conditional: bool = False
     cancelled: bool = False
     bare: bool = False
+    turned: bool = False
 
 
 _ACTIONS: Final = {
@@ -110,6 +112,8 @@ _AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
 _DEGREES: Final = frozenset({"too", "less"})
 _HERE: Final = frozenset({"here", "here's"})
 _IT: Final = frozenset({"it", "that", "them", "those"})
+_TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "straight"})
+_WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
 _PAST: Final = frozenset({"shut", "went", "got", "closed", "ran", "came", "has", "looks"})
 
 
@@ -131,7 +135,7 @@ class _Builder(TurnReader, PlaceReader):
     def __init__(self) -> None:
         super().__init__()
         self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
-        self.begun = 0  # number of steps before the sentence
+        self.turned = False  # whether anything names a turn
         self._rules: dict[type, Callable[[Any], None]] = {
             ActionItem: self._action,
             VerbItem: self._verb,
@@ -157,8 +161,10 @@ class _Builder(TurnReader, PlaceReader):
         self.begun = len(self.frames)
         self.negation, self.correcting, self.contingent = None, False, False
         self._clause(0, new=True)
+        self.turned = self.turned or not _TURNS.isdisjoint(sentence.clauses.words)
         for item in sentence.items:
             counted = self.counting
+            self.turned = self.turned or isinstance(item, TurnItem)
             self._rules[type(item)](item)
             self.counting = self.counting and not counted
 
@@ -201,6 +207,7 @@ class _Builder(TurnReader, PlaceReader):
             waiting=waiting,
             person=self.person,
             forbidding=self.forbidding,
+            turned=self.turned,
             bare=all(frame.bare for frame in self.frames if frame.action is not None and frame.mood in ORDERED),
             implied=frozenset(frame.action for frame in self.frames if frame.implied and frame.action is not None),
         )
@@ -230,7 +237,7 @@ class _Builder(TurnReader, PlaceReader):
         ):
             self.open_step(StepAction.TURN).direction = self.pending.side  # "on the left", of the ways
             self.aside = False
-        elif self.pending.side is not None:
+        elif self.pending.side is not None and _WARNING.isdisjoint(self.clauses.words[:1]):
             self.open_step(StepAction.STOP).implied = True
         elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
             self.open_step(StepAction.SPEED)

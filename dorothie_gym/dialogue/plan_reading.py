@@ -96,4 +96,4 @@ def _sentence(text: str) -> Sentence | None:
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)
     clauses = ClauseReader(words=words, question=words[-1:] == ["?"], contracted=contracted)
-    return Sentence(clauses, read_items(words, names, lead))
+    return Sentence(clauses, read_items(words, names, lead, contracted))

@@ -19,6 +19,7 @@ class TurnReader(PlanState):
         """Begins without steps."""
         super().__init__()
         self.correcting = False  # whether the sentence holds a correction so far
+        self.last_place: PlaceReference | None = None
         self.aside = False  # whether left or right is a side of the street
 
     def read_turn(self, item: TurnItem) -> None:
@@ -127,28 +128,35 @@ class TurnReader(PlanState):
         used = len(directed) > turns or any(frame.direction is item.direction for frame in directed)
         self.aside = self.aside or not used
 
+    def _tells_place(self) -> bool:
+        """Returns whether the sentence tells where something is: "my house is the one on the right"."""
+        told = (frame for frame in self.frames[self.begun :] if frame.mood is ClauseMood.STATEMENT)
+        return any(frame.action is StepAction.VISIT and frame.place is not None for frame in told)
+
     def _place_side(self, item: SideItem) -> None:
         frame = self.replaced()
         if frame is not None and frame.side is not None:
             frame.side = item.direction
             return
         frame = self.frame
-        if frame is None and self.counting:
+        counting = self.counting and not self._tells_place()
+        if frame is None and counting:
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame is None:
             self.pending.side = item.direction
         elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
             frame.direction = item.direction
-        elif self.counting:
+        elif counting:
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame.action in (StepAction.STOP, StepAction.WAIT):
             frame.side = item.direction
         elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
             frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.VISIT and frame.place is not None:
-            frame.place = with_details(frame.place, side=item.direction)
-            if frame.mood is ClauseMood.STATEMENT:
+            if item.stated and frame.mood is ClauseMood.STATEMENT:
                 self.pending.side = item.direction  # "the house is on the left, stop there"
+            else:
+                frame.place = self.last_place = with_details(frame.place, side=item.direction)
         elif self.pending.ordinal is not None:
             opened = self.open_step(StepAction.TURN)
             opened.direction = item.direction
