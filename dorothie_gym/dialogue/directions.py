@@ -27,6 +27,9 @@ _SAYS = frozenset({"it's", "that's"})
 _ENDS = frozenset({"", ",", "then", "and", "at", "again"})
 """Words behind "it's left" where it is a direction."""
 
+_SIDED = frozenset({"lane", "hand", "turning", "side", "kerb", "curb"})
+"""Words behind "right" that make it a direction wherever it stands: "to that right lane"."""
+
 _LISTED = frozenset({"left", "right", "lefts", "rights"})
 """Words of which "right, then ..." needs one to begin a list of turns."""
 
@@ -103,6 +106,8 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
 
 
 def _right(before: str, after: str, following: str, place: int, lists: WordLists) -> str:
+    if after in _SIDED and following != "?":
+        return "right"
     if after == "?" and place > 0 and (before == "," or before not in lists.turning):
         return "#tag"
     if before in lists.right_not_after or after in lists.right_never_before or (place == 0 and after == ","):

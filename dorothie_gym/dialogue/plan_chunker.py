@@ -330,8 +330,10 @@ class _Reader(QuantityReader):
         if found is None:
             if self.word_at(end) not in _PRONOUNS or self.word_at(end - 1) in ("on", "at", "in"):
                 return end if match.length > 1 else place
-            self.items.append(ConditionItem(self._relation(match), None))
-            return end + 1
+            seen = next((each for each in _IN_VIEW if " ".join(self.words[end + 1 : end + 4]).startswith(each)), None)
+            relation = self._relation(match) if seen is None else ConditionRelation.SEEN
+            self.items.append(ConditionItem(relation, None))
+            return end + 1 + (0 if seen is None else len(seen.split()))
         relation = self._relation(match)
         rest = " ".join(self.words[behind : behind + 3])
         for phrase in _IN_VIEW:

@@ -17,7 +17,7 @@ _INITIAL: Final = frozenset(
 )
 """Verbs whose object can be an opportunity to turn: "take the second"."""
 
-FETCHING: Final = frozenset({"fetch", "fetching", "collect", "collecting", "pick", "picking", "after", "once"})
+FETCHING: Final = frozenset({"fetch", "fetching", "grab", "grabbing", "meet", "meeting", "collect", "collecting", "pick", "picking", "after", "once"})
 """First words of phrases by which somebody is fetched."""
 
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
@@ -180,6 +180,8 @@ class PlaceReader(PlanState):
                 frame.action, frame.place = StepAction.VISIT, place
             else:
                 frame.relation, frame.at = ConditionRelation.FROM, place
+        elif frame.word in ("grab", "grabbing", "hit") and _names_only_street(place):
+            frame.action, frame.place = StepAction.FOLLOW, place
         elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:

@@ -100,6 +100,9 @@ class QuantityReader:
         word, number, start = self.word_at(place), None, place
         if word in ("a", "an", "another"):
             place, word = place + 1, self.word_at(place + 1)
+        if word == "three" and self.word_at(place + 1) == "quarters":
+            place += 2 + (self.word_at(place + 2) == "of")
+            return 0.75, place + (self.word_at(place) in ("a", "an"))
         if word in ("half", "quarter"):
             place += 1 + (self.word_at(place + 1) == "of")
             place += self.word_at(place) in ("a", "an")

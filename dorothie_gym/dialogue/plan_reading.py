@@ -19,6 +19,9 @@ from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
 _CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
 _PERSON = "#person"
+_SEPARABLE = frozenset({"pick", "picking"})
+_APART = frozenset({",", "?", "and", "it", "the_pace", "speed", "pace", "up"})
+"""Words that do not stand between such a verb and its particle."""
 _LIGHTS = frozenset({"light", "lights"})
 _NONE: frozenset[str] = frozenset()
 _COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
@@ -79,6 +82,17 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
     return without_asides(kept, lists) if kept else words
 
 
+def _with_particles(words: list[str]) -> list[str]:
+    """Returns the words with the particle of a verb beside it: "pick my son up" as "pick up my son"."""
+    for place, word in enumerate(words):
+        if word not in _SEPARABLE:
+            continue
+        end = next((n for n in range(place + 2, min(place + 5, len(words))) if words[n] == "up"), None)
+        if end is not None and _APART.isdisjoint(words[place + 1 : end]):
+            return [*words[: place + 1], "up", *words[place + 1 : end], *words[end + 1 :]]
+    return words
+
+
 def _strangers(text: str) -> frozenset[str]:
     """Returns the words within a sentence that are written as names, and are none of the town's."""
     return frozenset(word.lower() for word in _CAPITALISED.findall(text)) - known_words()
@@ -86,7 +100,7 @@ def _strangers(text: str) -> frozenset[str]:
 
 def _sentence(text: str) -> Sentence | None:
     lists = word_lists()
-    said = with_plain_lights(_plain(split_words(text), lists))
+    said = _with_particles(with_plain_lights(_plain(split_words(text), lists)))
     if not said:
         return None
     mentions, masked = find_names(said, statuses=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, PlanState, with_details
@@ -10,6 +10,10 @@ from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, Step
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import LaneItem, SideItem, TurnItem
+
+
+_DOWN: Final = frozenset({"down", "up", "along", "go", "pop", "nip", "duck", "head"})
+"""First words of an action that goes along a road: "pop down that road on your left"."""
 
 
 class TurnReader(PlanState):
@@ -45,6 +49,8 @@ class TurnReader(PlanState):
                 return
             if frame.action is StepAction.U_TURN:
                 return
+            if frame.action is StepAction.STRAIGHT and frame.word in _DOWN and self.counting and frame.at is None:
+                frame.action = None  # "down the alley to the right"
             getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
             if getting or (frame.action is None and frame.verb == "get"):
                 frame.action, frame.direction = StepAction.LANE, item.direction
@@ -146,11 +152,13 @@ class TurnReader(PlanState):
             self.pending.side = item.direction
         elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
             frame.direction = item.direction
-        elif counting:
+        elif counting and frame.action is not StepAction.STRAIGHT:
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame.action in (StepAction.STOP, StepAction.WAIT):
             frame.side = item.direction
         elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
+            frame.action, frame.direction = StepAction.TURN, item.direction
+        elif frame.action is StepAction.STRAIGHT and frame.word in _DOWN and counting and frame.at is None:
             frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.VISIT and frame.place is not None:
             if item.stated and frame.mood is ClauseMood.STATEMENT:
