@@ -195,7 +195,7 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     parse = parsed.parse
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
-    named = named and parse is not None and len(parse.plan.steps) < 2
+    named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
     if after is None and move in _SIGNS_FIRST and _runs_on(parsed):

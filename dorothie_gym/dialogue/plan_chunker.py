@@ -63,6 +63,7 @@ _BESIDE: Final = frozenset({"on", "at", "along", "down"})
 _DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
 _EDGES: Final = frozenset({"side", "kerb", "curb", "edge"})
 """Nouns that make left and right a side of the street."""
+_WHERE: Final = frozenset({"there", "here", "to"})
 _BEING: Final = frozenset({"is", "are", "be", "over", "up"})
 _LANES: Final = frozenset({"lane", "lanes"})
 _LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
@@ -279,8 +280,16 @@ class _Reader(QuantityReader):
             self.items.append(VerbItem(self.words[place], end))
         else:
             kind = f"lights_{match.kind}" if match.group == "lights" else match.kind
+            if kind == "lane" and self.words[place] in ("get", "getting") and self.word_at(end) in _WHERE:
+                kind = "visit"  # "let's get over there"
+            if kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
+                kind = "stop"  # "that's where I get off", not "get off the highway"
             self.items.append(ActionItem(kind, place, end))
         return end
+
+    def _has_place(self, place: int) -> bool:
+        """Returns whether a noun phrase stands at a place."""
+        return place < len(self.words) and self._noun_phrase(place)[0] is not None
 
     def _cancelled(self, place: int) -> int:
         """Reads the giving up of an errand or a turn: "drop the KFC", "forget that left"."""
@@ -321,6 +330,11 @@ class _Reader(QuantityReader):
     def _condition(self, match: Match, place: int) -> int:
         """Reads a relation with its place: "just past the Shell", "when the Shell comes into view"."""
         end = place + match.length
+        if match.kind == "named":
+            self.items.append(ConditionItem(ConditionRelation.AT, None))  # "that's where you go right"
+            return end
+        if self.words[end - 1] in ("over", "up", "down", "along") and self.word_at(end) in ("there", "here"):
+            return place
         found, behind = self._noun_phrase(end)
         if found is None and match.kind == "across" and "straight" in self.words[place:end]:
             self.items.append(ActionItem("straight", place, end))

@@ -40,6 +40,7 @@ _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP
 
 _NEXT_JUNCTION: Final = PlaceReference(ordinal=1)
 _MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
+_STARTING: Final = frozenset({"go", "move", "drive"})
 _PREPOSITIONS: Final = frozenset({"down", "along", "via", "up", "by"})
 
 
@@ -55,6 +56,7 @@ class Frame:
         forbidden: whether it is forbidden: "don't turn".
         verb: verb without a meaning of its own, "take".
         word: first word of its action.
+        last: last word of its action.
         bare_number: number without a unit.
         bare: whether it is a name without a verb.
         borrowed: whether its condition comes from the clause before.
@@ -83,9 +85,16 @@ class Frame:
     borrowed: bool = False
     ends: bool = False
     word: str = ""
+    last: str = ""
     deferred: bool = False
     implied: bool = False
     contingent: bool = False
+
+    @property
+    def starts(self) -> bool:
+        """Whether a verb of moving off stands alone, or with what it waits for: "move", "go until the lights let you"."""
+        waits = self.relation is ConditionRelation.UNTIL or (self.ends and self.at is None)
+        return self.action is None and self.verb in _STARTING and self.place is None and waits
 
     def step(self) -> PlanStep | None:
         """Returns the finished step; None without an action or with parts that do not fit together."""
@@ -144,6 +153,8 @@ class PlanState:
         """Gives a step whose clause has ended the action that its parts tell."""
         if frame.action is None and frame.verb == "go" and frame.ends:
             frame.action = StepAction.GO
+        if frame.negated and frame.forbidden and (frame.action is StepAction.GO or frame.starts):
+            frame.action, frame.negated = StepAction.WAIT, False  # "don't go until the lights let you"
         if frame.action is StepAction.GO and (frame.distance is not None or frame.relation is ConditionRelation.UNTIL):
             frame.action = StepAction.STRAIGHT  # "drive on until you see the KFC"
         vague = frame.direction is None and frame.ordinal is None and frame.at is None and frame.distance is None

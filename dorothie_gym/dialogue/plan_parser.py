@@ -113,6 +113,10 @@ _DEGREES: Final = frozenset({"too", "less"})
 _HERE: Final = frozenset({"here", "here's"})
 _IT: Final = frozenset({"it", "that", "them", "those"})
 _TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "straight"})
+_WAYS: Final = frozenset({"to", "down", "up", "on", "over", "along", "straight"})
+_PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
+_FEW: Final = 6
+"""Words of a sentence that names nothing but a place to pass."""
 _WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
 _PAST: Final = frozenset({"shut", "went", "got", "closed", "ran", "came", "has", "looks"})
 
@@ -241,9 +245,19 @@ class _Builder(TurnReader, PlaceReader):
             self.open_step(StepAction.STOP).implied = True
         elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
             self.open_step(StepAction.SPEED)
+        elif self.pending.at and self.pending.relation in _PASSED and len(self.clauses.words) <= _FEW:
+            self._go_past(self.pending.at)
         elif self.pending.relation is ConditionRelation.AT and self.pending.at and self.pending.at.landmark:
             place, self.pending.at = self.pending.at, None
             self.open_step(StepAction.VISIT).place = place
+
+    def _go_past(self, place: PlaceReference) -> None:
+        """Orders to go on past a place, or along a street: "straight past the KFC", "by Hubbard"."""
+        if place.to_json().keys() == {"street"}:
+            self.pending.at = None
+            self.open_step(StepAction.FOLLOW).place = place
+        else:
+            self.open_step(StepAction.STRAIGHT)
 
     def _boundary(self, item: BoundaryItem) -> None:
         self.fresh = True
@@ -296,6 +310,8 @@ class _Builder(TurnReader, PlaceReader):
         if action is StepAction.SPEED and change is not None:
             self._change(change, item)
             return
+        if self._goes_on_to(action, item):
+            return
         if self.repairing:
             self.drop_last()
         frame = self.frame
@@ -303,7 +319,7 @@ class _Builder(TurnReader, PlaceReader):
             frame = self.open_step(action)
         elif frame.action in NEEDING_PLACE and action is StepAction.FOLLOW and self.negation is None:
             action = frame.action or action
-        frame.action, frame.word = action, self.clauses.words[item.place]
+        frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
         if action is StepAction.STOP and frame.at is None and not _HERE.isdisjoint(said):
@@ -315,6 +331,19 @@ class _Builder(TurnReader, PlaceReader):
         if item.kind == "leave":
             frame.verb, frame.implied = "leave", True
         frame.ends = self._ends(item.end)
+
+    def _goes_on_to(self, action: StepAction, item: ActionItem) -> bool:
+        """Returns whether an action only tells how far a street is followed: "take Fuller (all the way) down to"."""
+        frame, words = self.frame, self.clauses.words
+        if frame is None or self.fresh or frame.action is not StepAction.FOLLOW or frame.place is None:
+            return False
+        following = words[item.end] if item.end < len(words) else ""
+        if following in ("get", "reach", "go", "avoid", "be"):
+            return False
+        if action is StepAction.VISIT and words[item.end - 1] == "to" and words[item.place] in _WAYS:
+            self.reaching = frame
+            return True
+        return words[item.place] in ("all", "down", "up") and action in (StepAction.STRAIGHT, StepAction.FOLLOW)
 
     def _ends(self, place: int) -> bool:
         """Returns whether the clause ends at a token, apart from "now" and the like."""

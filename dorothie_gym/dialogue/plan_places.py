@@ -23,6 +23,9 @@ FETCHING: Final = frozenset({"fetch", "fetching", "grab", "grabbing", "meet", "m
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
 """Relations of an errand to another place than its own."""
 
+_ALONG: Final = frozenset({"on", "along", "up", "down"})
+"""Last words of an order to go on behind which a street is the one to go along."""
+
 _HAVING: Final = frozenset({"be", "have", "get", "want", "need"})
 """Verbs by which a place becomes an errand: "have a bite at the Panera"."""
 
@@ -34,6 +37,7 @@ class PlaceReader(PlanState):
         """Begins without places."""
         super().__init__()
         self.last_place: PlaceReference | None = None
+        self.reaching: Frame | None = None  # step that ends at the next place: "down to" of "take Fuller down to"
         self.person = False  # whether somebody is to be fetched
 
     def read_condition(self, item: ConditionItem) -> None:
@@ -41,13 +45,15 @@ class PlaceReader(PlanState):
         place = item.place.reference if item.place is not None else self.last_place
         if place is not None and place.reference is Anaphor.THERE and self.last_place is not None:
             place = self.last_place
+        if item.place is None and self.pending.at is not None and item.relation is ConditionRelation.AT:
+            return  # "just past the KFC, that's where you stop"
         if place is None:
             if item.place is not None and item.place.ordinal is not None:
                 self._counted(item.relation, item.place.ordinal)
             return
         if self._excludes(place):
             return
-        if place.reference is None:
+        if place.reference is None and not self._describes(place):
             self.last_place = place
         if self.repairing and (frame := self.replaced()) is not None and frame.at is not None:
             frame.relation, frame.at = item.relation, place
@@ -62,6 +68,13 @@ class PlaceReader(PlanState):
         elif self.mood is not ClauseMood.STATEMENT:
             self.stop_between()
             self.pending.relation, self.pending.at = item.relation, place
+
+    def _describes(self, place: PlaceReference) -> bool:
+        """Returns whether a place only tells where another one is: "the house after the bridge"."""
+        frame = self.frame
+        if frame is None or self.fresh or frame.place is None or frame.action is not StepAction.VISIT:
+            return False
+        return frame.place.landmark is not None and place.landmark is None
 
     def _excludes(self, place: PlaceReference) -> bool:
         """Returns whether a negated place is no condition: "not onto Beal, take Fuller", "not at the KFC"."""
@@ -151,6 +164,11 @@ class PlaceReader(PlanState):
             return
         if place.reference is None:
             self.last_place = place
+        if self.reaching is not None:
+            frame, self.reaching = self.reaching, None
+            if frame.at is None and not self.fresh:
+                frame.relation, frame.at = ConditionRelation.UNTIL, self._resolved(place)
+                return
         if self.negation == "cancel":
             self.negation = None
             if place.landmark is not None:
@@ -170,6 +188,9 @@ class PlaceReader(PlanState):
             self._object_of_verb(frame, place)
         elif frame.at is None and frame.action is not StepAction.SPEED:
             crossed = frame.action is StepAction.STRAIGHT
+            if crossed and _names_only_street(place) and frame.last in _ALONG:
+                frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
+                return
             frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
             frame.at = place
 

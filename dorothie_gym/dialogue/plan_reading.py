@@ -20,6 +20,10 @@ _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\
 _CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
 _PERSON = "#person"
 _SEPARABLE = frozenset({"pick", "picking"})
+_FETCHES = frozenset({"fetch", "fetching", "grab", "grabbing", "collect", "collecting", "meet"})
+_BEHIND_NAMES = frozenset({"from", "at", "by", "on", "outside", ",", "and", "then", "first", "please", "in", "off"})
+_AT_ONCE = frozenset({"turn", "left", "right", "go", "then"})
+"""Words behind which lights at the beginning are those of a junction."""
 _APART = frozenset({",", "?", "and", "it", "the_pace", "speed", "pace", "up"})
 """Words that do not stand between such a verb and its particle."""
 _LIGHTS = frozenset({"light", "lights"})
@@ -49,6 +53,8 @@ def with_plain_lights(words: Sequence[str]) -> list[str]:
 def _is_at_junction(words: Sequence[str], place: int, compounds: frozenset[str] = _COMPOUNDS) -> bool:
     """Returns whether the lights at a place are those of a junction: "at the next set of lights"."""
     grammar = route_grammar()
+    if place == 0 and not _AT_ONCE.isdisjoint(words[1:2]):
+        return True  # "lights, turn left"
     place -= 1
     if place >= 0 and words[place] in compounds:
         return False
@@ -93,6 +99,26 @@ def _with_particles(words: list[str]) -> list[str]:
     return words
 
 
+def _with_people(words: list[str]) -> list[str]:
+    """Returns the words with the name of somebody who is fetched masked: "grab dave from the house"."""
+    grammar = route_grammar()
+    for place in range(len(words) - 1):
+        verb = words[place] in _FETCHES or words[place : place + 2] == ["pick", "up"]
+        begin = place + 1 + (words[place] == "pick")
+        name = words[begin] if begin < len(words) else ""
+        following = words[begin + 1] if begin + 1 < len(words) else ","
+        known = name in grammar.modifiers or name in known_words() or grammar.terminals.longest([name], 0) is not None
+        if verb and name.isalpha() and not known and following in _BEHIND_NAMES:
+            words = [*words[:begin], _PERSON, *words[begin + 1 :]]
+        elif words[place] == "get" and "from" in words[place + 2 : place + 5] and _gets_people(words[place + 1 :]):
+            words = [*words[:place], "fetch", *words[place + 1 :]]
+    return words
+
+
+def _gets_people(words: Sequence[str]) -> bool:
+    return not route_grammar().people.isdisjoint(words[: list(words).index("from")])
+
+
 def _strangers(text: str) -> frozenset[str]:
     """Returns the words within a sentence that are written as names, and are none of the town's."""
     return frozenset(word.lower() for word in _CAPITALISED.findall(text)) - known_words()
@@ -105,7 +131,7 @@ def _sentence(text: str) -> Sentence | None:
         return None
     mentions, masked = find_names(said, statuses=False)
     strangers = _strangers(text)
-    words = [_PERSON if word in strangers else word for word in mask_directions(masked, lists)]
+    words = _with_people([_PERSON if word in strangers else word for word in mask_directions(masked, lists)])
     names = {mention.start: mention.value for mention in mentions}
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)
