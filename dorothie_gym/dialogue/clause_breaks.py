@@ -20,6 +20,19 @@ _MARKS: Final = (",", ".", "?", "!", ";", ":", "\u2026", "\u2014", "\u2013", "-"
 _OPENS: Final = frozenset({"and", "so", "but", "then", "now", "well", "oh", "okay", "ok", "please", "just", "yeah"})
 """Words that are no clause yet, however many of them open one."""
 
+_AGREED: Final = frozenset({"right", "correct"})
+"""Last words that ask whether a statement is right."""
+
+_TELLING: Final = frozenset(
+    {"it's", "that's", "you're", "we're", "this is", "that is", "it is", "you mean", "you meant", "you said", "you want"}
+)
+_DIRECTING: Final = frozenset(
+    {"the", "a", "next", "on", "your", "my", "our", "first", "second", "third", "to", "other", "hard", "then", "and", "turn"}
+)
+"""Words behind which "right" is a direction."""
+
+_REQUESTING: Final = frozenset({"would", "could", "can", "will", "won't"})
+
 _PERSONAL: Final = frozenset(
     {"i", "we", "you", "he", "she", "they", "i'm", "we're", "you're", "i've", "we've", "he's", "what's"}
 )
@@ -77,6 +90,10 @@ def with_breaks(text: str) -> str:
         elif _begins_clause(words, begin, place):
             raw[place - 1] += ","
             begin, changed = place, True
+    if raw[-1][-1] not in _MARKS and _asks_for_agreement(words):
+        raw[-2] = raw[-2] if words[-1] not in _AGREED or raw[-2].endswith(_MARKS) else f"{raw[-2]},"
+        raw[-1] += "?"
+        changed = True
     return " ".join(raw) if changed else text
 
 
@@ -87,6 +104,9 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if answer is not None and answer.length == place - begin:
         return _answered(words, begin, place)
     found = breaks.starts.longest(words, place)
+    if words[place] in ("just", "please") and place + 1 < len(words) and found is None:
+        found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
+        found = found if found is not None and found.kind == "order" else None
     if found is None:
         return False
     if found.kind == "tag" and place + found.length < len(words):
@@ -99,7 +119,22 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
         return False
     if found.kind in ("order", "question") and not breaks.subordinate.isdisjoint(head):
         return False
+    if found.kind == "subject" and head[0] == "if":
+        return False
     return not (words[place] in _PERSONAL and before in breaks.antecedents)
+
+
+def _asks_for_agreement(words: Sequence[str]) -> bool:
+    """Returns whether a statement ends in a tag: "you're going down Beal, aren't you", "this is Fuller, right"."""
+    if words[-1] in _AGREED:
+        if words[-2] in _DIRECTING:
+            return False
+        return words[0] in _TELLING or " ".join(words[:2]) in _TELLING
+    for place in (len(words) - 2, len(words) - 3):
+        found = _breaks().starts.longest(words, place) if place > 1 else None
+        if found is not None and found.kind == "tag" and place + found.length == len(words):
+            return words[place] not in _REQUESTING
+    return False
 
 
 def _answered(words: Sequence[str], begin: int, place: int) -> bool:

@@ -31,6 +31,9 @@ _SUBJECT_WORDS: Final = 6
 _MODALS: Final = frozenset({"could", "can", "would", "will"})
 _NO_SUBJECTS: Final = frozenset({"let's", "here's", "that's", "it's", "there's", "what's", "hour's"})
 _SUBORDINATING: Final = frozenset({"where", "when", "what", "which", "how"})
+_ENOUGH: Final = frozenset({"plenty", "enough", "ample", "tops", "max", "maximum", "sufficient"})
+"""Words by which a statement about a speed sets it: "thirty miles an hour is plenty"."""
+
 _RELATIVE: Final = (["i"], ["we"], ["you"], ["that"], ["who"])
 _ORDERING: Final = frozenset({"actions", "verbs", "lights", "relations", "negations"})
 """Groups of the grammar before which a finite verb must stand to make a statement."""
@@ -117,7 +120,7 @@ class ClauseReader:
             if word == "," or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
                 return False
             if self._is_finite(number, place):
-                return True
+                return words[number + 1] not in _ENOUGH if number + 1 < len(words) else True
             if word.startswith("#") and words[number + 1 : number + 2] in _RELATIVE:
                 return True  # "the person I have to meet is on Beal"
             match = grammar.terminals.longest(words, number)

@@ -24,6 +24,7 @@ from dorothie_gym.dialogue.move_decision import (
 )
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.routes import StepAction
+from dorothie_gym.dialogue.signs import behind_signs
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
@@ -110,6 +111,16 @@ _OVERRULED = frozenset(
 )
 """Moves of the cues that give way to a formula, besides those that formulas have."""
 
+_OF_SIGNS = frozenset(
+    {
+        DialogueMove.ACKNOWLEDGE,
+        DialogueMove.IRRELEVANT,
+        DialogueMove.REPLY_N,
+        DialogueMove.REPLY_Y,
+    }
+)
+"""Moves of interjections, apologies and answers."""
+
 _SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_Y})
 """Moves whose formulas ask with a question mark."""
 
@@ -181,6 +192,7 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
         move = formula
     elif formula is None:
         move = decide(parsed, move, after)
+        move = _behind_signs(parsed, move, after)
     if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in parsed.statuses and parsed.masked.startswith("#status"):
         move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" a statement
     elif move is DialogueMove.EXPLAIN and _is_bare_place(parsed):
@@ -193,6 +205,15 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
     if sign_of_hearing(parsed, move, after):
         move = DialogueMove.ACKNOWLEDGE
     return DialogueAct(move, _slots(parsed, move))
+
+
+def _behind_signs(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of what follows the signs at the beginning of a text; `move` if that tells nothing more."""
+    rest = behind_signs(parsed.text, after) if move in _OF_SIGNS else ""
+    if not rest:
+        return move
+    found = act_of(understand(rest), after).move
+    return move if found in _OF_SIGNS else found
 
 
 def _plain_words(text: str) -> list[str]:
@@ -256,7 +277,8 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
             values.discard(ActionValue.LANE_FOLLOW)  # "don't turn" names a turn
         elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
             values -= set(parsed.denied)  # "don't turn, keep going"
-    if move is DialogueMove.REPLY_W and parsed.parse is not None and StepAction.STOP in parsed.parse.implied:
+    implied = parsed.parse is not None and StepAction.STOP in parsed.parse.implied
+    if implied and move is DialogueMove.REPLY_W and not parsed.objects:
         values.discard(ActionValue.STOP)  # "on the left": a side, where the question has named the action
     if move is DialogueMove.INSTRUCT and not parsed.landmarks:
         values.discard(GoalStatus.COMPLETE)  # "right, then left, done"

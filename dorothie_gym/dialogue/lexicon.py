@@ -72,7 +72,7 @@ _CONTRACTED = {
     "youre": ("you're",), "theyre": ("they're",), "ive": ("i've",), "youve": ("you've",), "weve": ("we've",),
     "couldnt": ("couldn't",), "wouldnt": ("wouldn't",), "shouldnt": ("shouldn't",), "arent": ("aren't",),
     "wasnt": ("wasn't",), "havent": ("haven't",), "hasnt": ("hasn't",), "lets": ("let's",), "hes": ("he's",),
-    "shes": ("she's",),
+    "shes": ("she's",), "d'you": ("do", "you"), "d'ya": ("do", "you"),
 }  # fmt: skip
 """Contractions and words without apostrophe, as typed by people and emitted by speech recognisers."""
 _APOSTROPHES = str.maketrans({"\u2019": "'", "\u2018": "'"})

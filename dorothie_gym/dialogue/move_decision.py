@@ -30,6 +30,9 @@ _FILLER: Final = "Filler"
 _DECIDING: Final = frozenset({DialogueMove.CONFUSE.label, DialogueMove.CONFIRM.label})
 """Moves whose formulas decide for others beside them: "okay, will do"."""
 
+_SHORT_NO: Final = 8
+"""Letters of a "not yet" that answers."""
+
 _SHORT: Final = 4
 """Words of an utterance that can be a mere sign of hearing."""
 
@@ -39,6 +42,8 @@ _NEWS: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.CONFIRM, DialogueMo
 _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 """Moves that the cues give to an order of unknown form."""
 
+_REACTING: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_U})
+_COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
 _OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
 """Words by which the car offers what it asks: "would you like me to turn?"."""
@@ -50,7 +55,27 @@ _NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
 _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
-_OTHER: Final = ("other way", "the other way ,", "wrong way", "not that", "not this", "not the")
+_OTHER: Final = (
+    "other side",
+    "the other side",
+    "other kerb",
+    "wrong side",
+    "after it",
+    "before it",
+    "it's the other",
+    "that's the wrong",
+    "nobody said",
+    "who said",
+    "who asked",
+    "i never",
+    "i think you mis",
+    "you misunder",
+    "you misheard",
+    "you've stopped",
+    "you stopped",
+    "that was you",
+    "other way", "the other way ,", "wrong way", "not that", "not this", "not the",
+)
 _ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
 _MEANT: Final = (
     "i said",
@@ -62,6 +87,10 @@ _MEANT: Final = (
     "i told you",
     "that's not",
     "not what i",
+    "i told",
+    " we're after",
+    " i'm after",
+    "i never said",
 )
 _ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that yes and no answer."""
@@ -114,6 +143,14 @@ _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE,
 _OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
+_CHOICE: Final = re.compile(
+    r"\w or (?!not\b|what\b|something|anything|so\b|did|do\b|are\b|is\b|have|should|shall|was|can\b|will\b|two\b|three\b)"
+)
+"""A question for one of two answers."""
+
+_OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant) (?!$)")
+"""Words by which a speaker corrects, or explains, what he has just said himself."""
+
 _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
@@ -153,6 +190,8 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return DialogueMove.CLARIFY
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
+    if after is None and move is DialogueMove.REPLY_N and parsed.masked.startswith("not ") and len(parsed.masked) > _SHORT_NO:
+        return DialogueMove.INSTRUCT  # "not this one, the next"
     requested = ClauseMood.REQUEST in parse.moods
     ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)
     if ordered:
@@ -166,6 +205,8 @@ def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: 
         return DialogueMove.INSTRUCT
     if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
         return DialogueMove.QUERY_YN  # "can we make it by six"
+    if move is DialogueMove.QUERY_YN and _CHOICE.search(parsed.masked):
+        return DialogueMove.QUERY_W  # "on our side or across the road?"
     if move is DialogueMove.QUERY_W and not parsed.question and parsed.masked.startswith(_ALERTS):
         return DialogueMove.INSTRUCT
     if move is DialogueMove.IRRELEVANT and parsed.told is not None:
@@ -196,6 +237,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
     named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
+    if after is None and move in _REACTING and not parsed.question and not parsed.masked.startswith(_COMMA_ANSWERS):
+        return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
     if after is None and move in _SIGNS_FIRST and _runs_on(parsed):
@@ -220,7 +263,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         return DialogueMove.INSTRUCT  # "sorry, left"
     if move is DialogueMove.CLARIFY and after is DialogueMove.QUERY_W:
         return DialogueMove.REPLY_W
-    if move is DialogueMove.CLARIFY and parsed.parse is not None and parsed.parse.repaired and after is None:
+    own = _OWN_REPAIR.search(parsed.masked) is not None or (parsed.parse is not None and parsed.parse.repaired)
+    if move is DialogueMove.CLARIFY and own and after is None:
         return DialogueMove.INSTRUCT
     return move
 

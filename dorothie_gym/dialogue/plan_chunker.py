@@ -64,6 +64,8 @@ _DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "avail
 _EDGES: Final = frozenset({"side", "kerb", "curb", "edge"})
 """Nouns that make left and right a side of the street."""
 _WHERE: Final = frozenset({"there", "here", "to"})
+_PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
+_LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
 _BEING: Final = frozenset({"is", "are", "be", "over", "up"})
 _LANES: Final = frozenset({"lane", "lanes"})
 _LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
@@ -266,6 +268,9 @@ class _Reader(QuantityReader):
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
                 return end
+        if match.kind == "stop" and self.words[end - 1] in ("me", "us") and self.words[place] in _PRESENTING:
+            if self.word_at(end) not in _LAST:
+                return place  # "that's me sorted"
         noun = self.word_at(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
         noun = noun or (match.kind == "wait" and self.word_at(place - 1) in _WAITING)
         if noun and (match.kind == "wait" or self.words[place] in ("stop", "stops")):

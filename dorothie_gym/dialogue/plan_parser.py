@@ -72,7 +72,7 @@ class PlanParse:
         cancelled: whether errands are given up.
         conditional: whether there is a condition of the world.
         bare: whether the steps of the plan are names without a verb.
-        turned: whether left, right or a verb names a turn, and no lane or side.
+        turned: whether left and right, if there are any, name turns, rather than lanes and sides only.
         forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
     """
 
@@ -140,6 +140,7 @@ class _Builder(TurnReader, PlaceReader):
         super().__init__()
         self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
         self.turned = False  # whether anything names a turn
+        self.sided = False  # whether anything names a lane or a side
         self._rules: dict[type, Callable[[Any], None]] = {
             ActionItem: self._action,
             VerbItem: self._verb,
@@ -169,6 +170,7 @@ class _Builder(TurnReader, PlaceReader):
         for item in sentence.items:
             counted = self.counting
             self.turned = self.turned or isinstance(item, TurnItem)
+            self.sided = self.sided or isinstance(item, SideItem | LaneItem)
             self._rules[type(item)](item)
             self.counting = self.counting and not counted
 
@@ -211,7 +213,7 @@ class _Builder(TurnReader, PlaceReader):
             waiting=waiting,
             person=self.person,
             forbidding=self.forbidding,
-            turned=self.turned,
+            turned=self.turned or not self.sided,
             bare=all(frame.bare for frame in self.frames if frame.action is not None and frame.mood in ORDERED),
             implied=frozenset(frame.action for frame in self.frames if frame.implied and frame.action is not None),
         )
@@ -322,7 +324,8 @@ class _Builder(TurnReader, PlaceReader):
         frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
-        if action is StepAction.STOP and frame.at is None and not _HERE.isdisjoint(said):
+        here = not _HERE.isdisjoint(said) or said[0] in ("this", "this'll")
+        if action is StepAction.STOP and frame.at is None and here:
             frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
         if self.negation in NEGATING:
             frame.negated, frame.forbidden = True, self.negation == "forbid"

@@ -1,0 +1,55 @@
+"""Signs in front of what is said: interjections, calls, apologies, and the "yes" or "no" that answers nobody.
+
+"Oh look, stop here" is an order and "sorry, left" as well, though an "oh" or a "sorry" alone only shows that something
+was heard.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Final
+
+from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
+from dorothie_gym.dialogue.route_grammar import PhraseIndex
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+
+_FILE: Final = "signs.yaml"
+_LEAST: Final = 2
+"""Words that must be left."""
+
+_DETERMINING: Final = frozenset(
+    ["need", "more", "turning", "stopping", "parking", "faster", "quicker", "fast", "quick", "slower", "lights", "u", "idea"]
+)
+"""Words behind which "no" belongs to what follows."""
+
+
+@functools.cache
+def _signs() -> dict[str, PhraseIndex]:
+    data = read_data(_FILE)
+    return {
+        kind: PhraseIndex(
+            [(kind, kind, text) for text in strings(f"{_FILE}: {kind}", data.get(kind))], adverbs=False
+        )
+        for kind in ("always", "opening")
+    }
+
+
+def behind_signs(text: str, after: DialogueMove | None) -> str:
+    """Returns what follows the signs at the beginning of a text; "" if it has none, or little else.
+
+    Args:
+        text: words of an utterance.
+        after: move of the other speaker before it, to which a "yes" or "no" reacts.
+    """
+    words, place = split_words(text), 0
+    while place < len(words):
+        if words[place] == ",":
+            place += 1
+            continue
+        kinds = ("always", "opening") if after is None else ("always",)
+        lengths = [found.length for kind in kinds if (found := _signs()[kind].longest(words, place)) is not None]
+        following = words[place + 1 : place + 2]
+        if not lengths or (words[place] == "no" and max(lengths) == 1 and not _DETERMINING.isdisjoint(following)):
+            break
+        place += max(lengths)
+    return " ".join(words[place:]) if 0 < place <= len(words) - _LEAST else ""
