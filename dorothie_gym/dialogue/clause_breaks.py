@@ -31,6 +31,7 @@ _DIRECTING: Final = frozenset(
 )
 """Words behind which "right" is a direction."""
 
+_YES_AND_NO: Final = frozenset({"yes", "yeah", "yep", "yup", "aye", "no", "nope", "nah", "naw"})
 _REQUESTING: Final = frozenset({"would", "could", "can", "will", "won't"})
 
 _PERSONAL: Final = frozenset(
@@ -72,11 +73,12 @@ def _breaks() -> _Breaks:
 
 
 @functools.lru_cache(maxsize=4096)
-def with_breaks(text: str) -> str:
+def with_breaks(text: str, *, answering: bool = True) -> str:
     """Returns a text with commas between clauses that no mark separates; words and their number stay the same.
 
     Args:
         text: free English; may be empty.
+        answering: whether an initial "yes" or "no" can be an answer, and has a comma behind it.
     """
     raw = text.split()
     if len(raw) < 3:
@@ -87,7 +89,7 @@ def with_breaks(text: str) -> str:
     for place in range(1, len(raw)):
         if raw[place - 1].endswith(_MARKS):
             begin = place
-        elif _begins_clause(words, begin, place):
+        elif _begins_clause(words, begin, place) and (answering or begin or words[0] not in _YES_AND_NO):
             raw[place - 1] += ","
             begin, changed = place, True
     if raw[-1][-1] not in _MARKS and _asks_for_agreement(words):
@@ -127,7 +129,7 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
 def _asks_for_agreement(words: Sequence[str]) -> bool:
     """Returns whether a statement ends in a tag: "you're going down Beal, aren't you", "this is Fuller, right"."""
     if words[-1] in _AGREED:
-        if words[-2] in _DIRECTING:
+        if words[-2] in _DIRECTING or words[-2].endswith("ing"):
             return False
         return words[0] in _TELLING or " ".join(words[:2]) in _TELLING
     for place in (len(words) - 2, len(words) - 3):

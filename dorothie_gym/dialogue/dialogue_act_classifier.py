@@ -299,7 +299,7 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     Returns:
         Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
-    broken = with_breaks(text.strip())
+    broken = with_breaks(text.strip(), answering=after is not None)
     segments = [segment for sentence in _SENTENCE_END.split(broken) for segment in _segments(sentence)]
     spans: list[Span] = []
     words, place = text.split(), 0

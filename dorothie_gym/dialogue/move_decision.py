@@ -42,7 +42,6 @@ _NEWS: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.CONFIRM, DialogueMo
 _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 """Moves that the cues give to an order of unknown form."""
 
-_REACTING: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_U})
 _COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
 _OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
@@ -237,7 +236,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
     named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
-    if after is None and move in _REACTING and not parsed.question and not parsed.masked.startswith(_COMMA_ANSWERS):
+    alone = move is DialogueMove.REPLY_N or (move is DialogueMove.REPLY_U and requested)
+    if after is None and alone and not parsed.question and not parsed.masked.startswith(_COMMA_ANSWERS):
         return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT

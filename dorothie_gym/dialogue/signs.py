@@ -49,6 +49,9 @@ def behind_signs(text: str, after: DialogueMove | None) -> str:
         kinds = ("always", "opening") if after is None else ("always",)
         lengths = [found.length for kind in kinds if (found := _signs()[kind].longest(words, place)) is not None]
         following = words[place + 1 : place + 2]
+        answered = bool(lengths) and words[place + max(lengths) : place + max(lengths) + 1] == [","]
+        if answered and _signs()["always"].longest(words, place) is None:
+            break  # "no, don't stop" answers
         if not lengths or (words[place] == "no" and max(lengths) == 1 and not _DETERMINING.isdisjoint(following)):
             break
         place += max(lengths)
