@@ -61,13 +61,14 @@ _STATES: Final = frozenset(
 )
 _BESIDE: Final = frozenset({"on", "at", "along", "down"})
 _DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
-_EDGES: Final = frozenset({"side", "kerb", "curb", "edge"})
+_EDGES: Final = frozenset({"side", "side's", "kerb", "curb", "edge"})
 """Nouns that make left and right a side of the street."""
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
 _BEING: Final = frozenset({"is", "are", "be", "over", "up"})
 _LANES: Final = frozenset({"lane", "lanes"})
+_JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
 _LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
 _TURN_NOUNS: Final = frozenset({"turn", "turning", "one", "street", "road", "exit", "corner", "fork", "again", "turns"})
 _PRONOUNS: Final = frozenset({"it", "that", "those", "them", "this", "these", "him", "her"})
@@ -226,6 +227,8 @@ class _Reader(QuantityReader):
         """Returns whether a side tells one of the lanes spoken of: "switch lanes, the right one", "the one on the right"."""
         if _LANES.isdisjoint(self.words[:begin]):
             return False
+        if not _LANES.isdisjoint(self.words[max(begin - 2, 0) : begin]) and _JOINTS.isdisjoint(self.words[begin - 2 : begin]):
+            return True  # "one lane more to the right"
         before = [word for word in self.words[max(begin - 4, 0) : begin] if word not in ("which", "that", "is", ",")]
         return self.word_at(place) in ("one", "") and (self.word_at(place) == "one" or before[-1:] in _LANE_NOUNS)
 

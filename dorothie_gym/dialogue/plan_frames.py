@@ -300,8 +300,14 @@ def _errand_before(frame: Frame) -> PlanStep | None:
     return PlanStep(action=StepAction.VISIT, place=frame.at)
 
 
-def append_step(steps: list[PlanStep], step: PlanStep) -> None:
-    """Adds a step, unless it only says the last one again; with more detail it replaces that one."""
+def append_step(steps: list[PlanStep], step: PlanStep, *, named: bool = False) -> None:
+    """Adds a step, unless it only says the last one again; with more detail it replaces that one.
+
+    Args:
+        steps: the steps so far.
+        step: the step.
+        named: whether a verb names its action, so that a turn is no mere side of a lane.
+    """
     if steps and {steps[-1].action, step.action} == {StepAction.SPEED}:
         speed, change = steps[-1].speed or step.speed, steps[-1].change or step.change
         told = (steps[-1].speed is None or step.speed is None) and steps[-1].change in (
@@ -311,7 +317,7 @@ def append_step(steps: list[PlanStep], step: PlanStep) -> None:
         if told and steps[-1].condition is None and step.condition is None:
             steps[-1] = PlanStep(action=StepAction.SPEED, speed=speed, change=change)
             return
-    if steps and _is_side_of_lane(steps[-1], step):
+    if steps and not named and _is_side_of_lane(steps[-1], step):
         steps[-1] = step if step.action is StepAction.LANE else steps[-1]
         return
     if steps and steps[-1].action is step.action and step.action is not StepAction.TURN:

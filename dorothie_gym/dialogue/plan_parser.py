@@ -139,6 +139,7 @@ class _Builder(TurnReader, PlaceReader):
     def __init__(self) -> None:
         super().__init__()
         self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
+        self.last_speed: int | None = None  # speed named last [km/h]
         self.turned = False  # whether anything names a turn
         self.sided = False  # whether anything names a lane or a side
         self._rules: dict[type, Callable[[Any], None]] = {
@@ -199,7 +200,8 @@ class _Builder(TurnReader, PlaceReader):
             for step in self.steps_of(frame):
                 described.append(step)
                 if frame.mood in ORDERED:
-                    append_step(contingent if frame.contingent else ordered, step)
+                    named = bool(frame.word) and step.action is StepAction.TURN
+                    append_step(contingent if frame.contingent else ordered, step, named=named)
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
             described=tuple(described),
@@ -220,10 +222,15 @@ class _Builder(TurnReader, PlaceReader):
 
     def _drop_interjection(self) -> None:
         """Takes back a "wait" that only opens what is asked or ordered: "hang on, can you see the bridge?"."""
+        acting = [frame for frame in self.frames if frame.action is not None]
+        waits = [frame for frame in acting if frame.action is StepAction.WAIT and frame.ends and frame.at is None]
+        if self.repaired and len(acting) > len(waits):
+            for frame in waits:
+                frame.action = None  # "to the KFC, hang on, make that the Ikea"
         first = self.frames[0] if self.frames else None
         if first is None or first.action is not StepAction.WAIT or first.at is not None or not first.ends:
             return
-        if ClauseMood.QUESTION in self.moods or any(frame.action is not None for frame in self.frames[1:]):
+        if self.repaired or ClauseMood.QUESTION in self.moods or any(frame.action is not None for frame in self.frames[1:]):
             first.action = None
 
     def _leftovers(self) -> None:
@@ -243,6 +250,10 @@ class _Builder(TurnReader, PlaceReader):
         ):
             self.open_step(StepAction.TURN).direction = self.pending.side  # "on the left", of the ways
             self.aside = False
+        elif self.pending.side is not None and (self.opportunity or self._on_street()):
+            side, self.pending.side, self.aside = self.pending.side, None, False
+            turn = self.open_step(StepAction.TURN)  # "the turning we want is there on the left"
+            turn.direction = side
         elif self.pending.side is not None and _WARNING.isdisjoint(self.clauses.words[:1]):
             self.open_step(StepAction.STOP).implied = True
         elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
@@ -252,6 +263,14 @@ class _Builder(TurnReader, PlaceReader):
         elif self.pending.relation is ConditionRelation.AT and self.pending.at and self.pending.at.landmark:
             place, self.pending.at = self.pending.at, None
             self.open_step(StepAction.VISIT).place = place
+
+    def _on_street(self) -> bool:
+        """Returns whether only a street has been named: "Draper, on the right hand"."""
+        last = self.last_place
+        if last is None or last.to_json().keys() != {"street"}:
+            return False
+        self.pending.relation, self.pending.at = ConditionRelation.AT, last
+        return True
 
     def _go_past(self, place: PlaceReference) -> None:
         """Orders to go on past a place, or along a street: "straight past the KFC", "by Hubbard"."""
@@ -428,6 +447,9 @@ class _Builder(TurnReader, PlaceReader):
         if frame is not None and speeding and item.word == "less":  # "ten miles an hour less"
             frame.speed, frame.change = None, StepChange.SLOWER
             return
+        if frame is not None and speeding and item.word == "it" and frame.speed is None and frame.change is None:
+            frame.speed = self.last_speed  # "the limit is thirty, stick to it"
+            return
         if frame is not None and frame.word in ("cross", "pass") and item.word in _IT and not self.fresh:
             if self.last_place is not None and frame.at is None:
                 frame.relation, frame.at = ConditionRelation.PAST, self.last_place
@@ -443,6 +465,7 @@ class _Builder(TurnReader, PlaceReader):
                 frame.mood, frame.bare = ClauseMood.STATEMENT, False
 
     def _speed(self, item: SpeedItem) -> None:
+        self.last_speed = item.speed
         frame = self.replaced(StepAction.SPEED)
         if frame is None:
             frame = self.frame if self.frame is not None and not self.fresh else None

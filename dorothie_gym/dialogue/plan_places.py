@@ -38,6 +38,7 @@ class PlaceReader(PlanState):
         super().__init__()
         self.last_place: PlaceReference | None = None
         self.reaching: Frame | None = None  # step that ends at the next place: "down to" of "take Fuller down to"
+        self.opportunity = False  # whether a turning, a street or a junction has been mentioned
         self.person = False  # whether somebody is to be fetched
 
     def read_condition(self, item: ConditionItem) -> None:
@@ -267,6 +268,7 @@ class PlaceReader(PlanState):
 
     def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
         self.counting = True
+        self.opportunity = self.opportunity or not blocks
         if self.negation == "cancel" and ordinal is not None:
             self.open_step(StepAction.TURN)  # "skip the next turn"
             self.negation = None

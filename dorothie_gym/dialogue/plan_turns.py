@@ -113,6 +113,10 @@ class TurnReader(PlanState):
 
     def read_lane(self, item: LaneItem) -> None:
         """Reads a lane by its side."""
+        last = self.frames[-1] if self.frames else None
+        if last is not None and last.action is StepAction.LANE and last.direction is not None:
+            if self.negation in NEGATING and not last.negated:
+                return  # "the right lane, not the left"
         frame = self.replaced(StepAction.LANE, StepAction.TURN)
         if frame is None:
             frame = self.frame
