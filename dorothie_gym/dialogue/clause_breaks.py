@@ -32,6 +32,7 @@ _DIRECTING: Final = frozenset(
 """Words behind which "right" is a direction."""
 
 _YES_AND_NO: Final = frozenset({"yes", "yeah", "yep", "yup", "aye", "no", "nope", "nah", "naw"})
+_ALSO_PREPOSITIONS: Final = frozenset({"after", "before", "since", "until", "till", "as"})
 _REQUESTING: Final = frozenset({"would", "could", "can", "will", "won't"})
 
 _PERSONAL: Final = frozenset(
@@ -119,11 +120,17 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     head = words[begin:place]
     if len(head) < 2 or all(word in _OPENS for word in head):
         return False
-    if found.kind in ("order", "question") and not breaks.subordinate.isdisjoint(head):
+    if found.kind in ("order", "question") and _is_subordinate(head):
         return False
     if found.kind == "subject" and head[0] == "if":
         return False
     return not (words[place] in _PERSONAL and before in breaks.antecedents)
+
+
+def _is_subordinate(head: Sequence[str]) -> bool:
+    """Returns whether a clause depends on the one to come: "when you see the KFC", but not "the house after the bridge"."""
+    subordinate = _breaks().subordinate
+    return not subordinate.isdisjoint(head[:2]) or not (subordinate - _ALSO_PREPOSITIONS).isdisjoint(head)
 
 
 def _asks_for_agreement(words: Sequence[str]) -> bool:

@@ -239,7 +239,9 @@ class _Builder(TurnReader, PlaceReader):
         if self.pending.ordinal is not None and acting and acting[-1].action is StepAction.TURN and acting[-1].negated:
             self.open_step(StepAction.TURN)  # "not the next right, the third"
             return
-        if acting or not ORDERED.issuperset(self.moods):
+        sided = self.pending.side is not None and self.moods[:1] != [ClauseMood.STATEMENT]
+        told = sided and ClauseMood.QUESTION not in self.moods  # "left side please, he's asleep"
+        if acting or not (told or ORDERED.issuperset(self.moods)):
             return
         if self.pending.ordinal is not None and self.negation is None and len(self.moods) > 1:
             self.open_step(StepAction.TURN)
@@ -331,7 +333,8 @@ class _Builder(TurnReader, PlaceReader):
         if action is StepAction.SPEED and change is not None:
             self._change(change, item)
             return
-        if self._goes_on_to(action, item):
+        named = self.frame is not None and self.frame.bare and not self.fresh
+        if self._goes_on_to(action, item) or (action is StepAction.GO and named):
             return
         if self.repairing:
             self.drop_last()
@@ -376,6 +379,8 @@ class _Builder(TurnReader, PlaceReader):
         """Returns whether another action begins a step of its own behind the current one."""
         if self.fresh:
             return True
+        if frame.action is None and frame.verb and frame.relation is ConditionRelation.UNTIL:
+            return action is not StepAction.STOP  # "go until the KFC turn left"
         if frame.action in (StepAction.GO, StepAction.U_TURN) and action is StepAction.VISIT:
             return False  # "let's go to the KFC"
         if frame.action is StepAction.STRAIGHT and action is StepAction.FOLLOW:

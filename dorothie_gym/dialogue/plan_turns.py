@@ -49,6 +49,10 @@ class TurnReader(PlanState):
                 return
             if frame.action is StepAction.U_TURN:
                 return
+            if frame.action is None and frame.verb and frame.relation is ConditionRelation.UNTIL:
+                self.close()
+                frame = None  # "go until the KFC left"
+        if frame is not None and not self.fresh:
             if frame.action is StepAction.STRAIGHT and frame.word in _DOWN and self.counting and frame.at is None:
                 frame.action = None  # "down the alley to the right"
             getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
