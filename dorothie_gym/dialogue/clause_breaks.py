@@ -33,6 +33,13 @@ _DIRECTING: Final = frozenset(
 
 _YES_AND_NO: Final = frozenset({"yes", "yeah", "yep", "yup", "aye", "no", "nope", "nah", "naw"})
 _ALSO_PREPOSITIONS: Final = frozenset({"after", "before", "since", "until", "till", "as"})
+_BEFORE_ORDERS: Final = {
+    "just": ("order",),
+    "please": ("order",),
+    "so": ("order", "question"),
+}
+"""Words in front of an order that belong to it, with the kinds of starts behind them."""
+
 _REQUESTING: Final = frozenset({"would", "could", "can", "will", "won't"})
 
 _PERSONAL: Final = frozenset(
@@ -107,9 +114,9 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if answer is not None and answer.length == place - begin:
         return _answered(words, begin, place)
     found = breaks.starts.longest(words, place)
-    if words[place] in ("just", "please") and place + 1 < len(words) and found is None:
+    if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
         found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
-        found = found if found is not None and found.kind == "order" else None
+        found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None
     if found is None:
         return False
     if found.kind == "tag" and place + found.length < len(words):

@@ -353,6 +353,8 @@ def _is_boundary(head: str, rest: str) -> bool:
         return first.move in _BEFORE_QUESTIONS and _STARTS_QUESTION.match(rest.lower()) is not None
     if second.move is DialogueMove.EXPLAIN:
         return _starts_statement(head, rest, first, second)
+    if second.move is DialogueMove.REPLY_W and first.move in (DialogueMove.REPLY_N, DialogueMove.REPLY_Y):
+        return not first.slots and not second.slots - {ActionValue.J_TURN} and bool(second.slots)  # "nope, right"
     return False
 
 

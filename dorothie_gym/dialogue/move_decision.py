@@ -70,6 +70,8 @@ _OTHER: Final = (
     "i think you mis",
     "you misunder",
     "you misheard",
+    "you've got the wrong",
+    "you got the wrong",
     "you've stopped",
     "you stopped",
     "that was you",
@@ -147,6 +149,13 @@ _CHOICE: Final = re.compile(
 )
 """A question for one of two answers."""
 
+_STATE: Final = re.compile(
+    r"\b(?:i'm|i am|i feel|i'm feeling|we're|we are|he's|she's|they're|my \w+(?:'s| is| are| feels?)?|the \w+(?:'s| is| are)"
+    r"|kids are|baby's) (?:\w+ ){0,3}(?:sick|faint|dizzy|poorly|starving|freezing|boiling|asleep|sleeping|bursting|nervous"
+    r"|scared|unwell|killing me|aching|hurting|crying|late for|nauseous|carsick|exhausted)\b"
+)
+"""State of somebody in the car."""
+
 _OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant) (?!$)")
 """Words by which a speaker corrects, or explains, what he has just said himself."""
 
@@ -208,7 +217,7 @@ def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: 
         return DialogueMove.QUERY_W  # "on our side or across the road?"
     if move is DialogueMove.QUERY_W and not parsed.question and parsed.masked.startswith(_ALERTS):
         return DialogueMove.INSTRUCT
-    if move is DialogueMove.IRRELEVANT and parsed.told is not None:
+    if move is DialogueMove.IRRELEVANT and (parsed.told is not None or _STATE.search(parsed.masked)):
         return DialogueMove.EXPLAIN
     return _stated(parsed, parse, move, after)
 

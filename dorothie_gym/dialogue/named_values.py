@@ -46,6 +46,7 @@ _ROAD: Final = re.compile(
 _KERB: Final = re.compile(r"^(?!.*\b(?:pavement|sidewalks?|side walk|path|see)\b).*\b(?:kerb|curb)")
 """A kerb by which one stops, rather than one that is seen."""
 
+_WITHDRAWN: Final = re.compile(r"(?:scratch|strike|forget|never mind|cancel) (?:that|it) ,")
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b.*(?<!your )(?<!the )(?<!my )(?<!our )(?<!a )\bleft(?= now| to do| then|$)"
 )
@@ -97,6 +98,8 @@ def _with_status(
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)
     if parse.repaired or (driving and not landmarks):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, Bishop"
+    if landmarks and not parse.cancelled and _WITHDRAWN.match(spoken):
+        found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, make it the KFC"
     if driving and not landmarks:
         found = [value for value in found if value is not GoalStatus.PENDING]  # "later on a left"
     if landmarks and not actions and _LEFT_OVER.search(spoken) and GoalStatus.PENDING not in found:

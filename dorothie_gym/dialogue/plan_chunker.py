@@ -66,6 +66,10 @@ _EDGES: Final = frozenset({"side", "side's", "kerb", "curb", "edge"})
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
+_CHANCES: Final = frozenset({"chance", "moment", "minute", "second", "opportunity"})
+_COMPARED: Final = frozenset({"quicker", "faster", "slower", "quick", "fast", "slow"})
+_STATED: Final = frozenset({"it's", "that's", "is", "are", "was", "it'd", "gets", "looks", "there's"})
+_TELLING: Final = frozenset({"to", "if", "than", "down", "via", "along", "through", "on", "that", "going", "by", "way"})
 _BEING: Final = frozenset({"is", "are", "be", "over", "up"})
 _LANES: Final = frozenset({"lane", "lanes"})
 _JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
@@ -165,13 +169,22 @@ class _Reader(QuantityReader):
         """Skips a condition of the world, unless it is a relation to a place: "once we've passed the KFC"."""
         found = find_contingency(self.words, place, self.grammar)
         if found is None:
-            return place
+            return self._polite(place)
         match = self.grammar.terminals.longest(self.words, place)
         if match is not None and match.group == "relations" and self._noun_phrase(place + match.length)[0] is not None:
             if self.words[place] not in ("if", "unless") or match.length > 1:
                 return place
         self.items.append(ContingencyItem(found.end, found.leading))
         return found.end
+
+    def _polite(self, place: int) -> int:
+        """Skips politeness that looks like a condition: "whenever you get a chance", "as long as you can"."""
+        match = self.grammar.contingencies.longest(self.words, place)
+        if match is None or match.kind != "polite":
+            return place
+        end = place + match.length
+        end += self.word_at(end) in _CHANCES
+        return end if self.word_at(end) in ("", ",", "?", "please", "and", "then") else place
 
     # --- left and right ---------------------------------------------------------------------------------------------
 
@@ -192,6 +205,8 @@ class _Reader(QuantityReader):
             return begin
         several = self.word_at(place) in ("lefts", "rights")
         place += 1
+        while self.word_at(place) == self.word_at(place - 1) and self.word_at(place) in ("left", "right"):
+            place += 1  # "left left left"
         hand = self.word_at(place) in ("hand", "handed")
         place += hand
         if self.word_at(place) == "most":
@@ -203,6 +218,8 @@ class _Reader(QuantityReader):
         if changed or self.word_at(place) in ("lane", "lanes", "file") or self.word_at(begin - 1) in ("lane", "lanes"):
             self.items.append(LaneItem(direction))
             return place + (self.word_at(place) in ("lane", "lanes", "file"))
+        if self.word_at(begin - 1) == "of" and self.word_at(begin - 2) == "out" and self.word_at(place) in _LANES:
+            return place + 1  # "out of the right lane"
         if self._is_other_lane(begin, place):
             self.items.append(LaneItem(direction))
             return place + (self.word_at(place) == "one")
@@ -227,7 +244,8 @@ class _Reader(QuantityReader):
         """Returns whether a side tells one of the lanes spoken of: "switch lanes, the right one", "the one on the right"."""
         if _LANES.isdisjoint(self.words[:begin]):
             return False
-        if not _LANES.isdisjoint(self.words[max(begin - 2, 0) : begin]) and _JOINTS.isdisjoint(self.words[begin - 2 : begin]):
+        near = self.words[max(begin - 3, 0) : begin]
+        if not _LANES.isdisjoint(near) and _JOINTS.isdisjoint(near):
             return True  # "one lane more to the right"
         before = [word for word in self.words[max(begin - 4, 0) : begin] if word not in ("which", "that", "is", ",")]
         return self.word_at(place) in ("one", "") and (self.word_at(place) == "one" or before[-1:] in _LANE_NOUNS)
@@ -249,7 +267,7 @@ class _Reader(QuantityReader):
         start = place
         while self.word_at(place) in self.grammar.determiners or self.word_at(place) == "very":
             place += 1
-        word = self.word_at(place)
+        word = self.word_at(place).removesuffix("'s")
         number = read_ordinal(word)
         if number is None and (counts := read_cardinals([word])) and 2 <= counts[0] <= 9:
             number = counts[0]
@@ -288,12 +306,29 @@ class _Reader(QuantityReader):
             self.items.append(VerbItem(self.words[place], end))
         else:
             kind = f"lights_{match.kind}" if match.group == "lights" else match.kind
-            if kind == "lane" and self.words[place] in ("get", "getting") and self.word_at(end) in _WHERE:
+            if kind == "lane" and self._visits(place, end):
                 kind = "visit"  # "let's get over there"
+            if kind in ("faster", "slower") and self._compares(place, end):
+                return end
             if kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
                 kind = "stop"  # "that's where I get off", not "get off the highway"
             self.items.append(ActionItem(kind, place, end))
         return end
+
+    def _visits(self, place: int, end: int) -> bool:
+        """Returns whether words of changing lanes mean an errand: "get over there", "squeeze in the KFC"."""
+        if self.words[place] in ("get", "getting"):
+            return self.word_at(end) in _WHERE
+        behind = end + (self.word_at(end) in self.grammar.determiners)
+        return self.words[place].startswith("squeez") and isinstance(self.names.get(behind), LandmarkName)
+
+    def _compares(self, place: int, end: int) -> bool:
+        """Returns whether a comparative tells of a way rather than orders a speed: "Hubbard's quicker"."""
+        if self.words[end - 1] not in _COMPARED:
+            return False
+        before = self.word_at(place - 1)
+        told = end == place + 1 and (before in _STATED or place - 1 in self.contracted)
+        return told or (self.words[place] == "be" and self.word_at(end) in _TELLING)
 
     def _has_place(self, place: int) -> bool:
         """Returns whether a noun phrase stands at a place."""

@@ -280,6 +280,10 @@ class PlanState:
                 self.cancelled.add(frame.place.landmark)  # "we don't need the KFC any more"
             frame.action = StepAction.AVOID
             return frame.place.street is not None and frame.place.landmark is None
+        street = frame.at is not None and frame.at.to_json().keys() == {"street"}
+        if frame.action is StepAction.TURN and frame.direction is None and frame.forbidden and street:
+            frame.action, frame.place, frame.at = StepAction.AVOID, frame.at, None  # "don't turn into Draper"
+            return True
         if frame.action is StepAction.STOP or frame.action in TURNING:
             alone = sum(other.action is not None for other in self.frames) == 1
             frame.action, frame.direction, frame.ordinal = StepAction.STRAIGHT, None, None

@@ -94,6 +94,7 @@ class PlanParse:
 
 
 _ACTIONS: Final = {
+    "after_that": StepAction.VISIT,
     "faster": StepAction.SPEED,
     "slower": StepAction.SPEED,
     "leave": StepAction.TURN,
@@ -325,6 +326,8 @@ class _Builder(TurnReader, PlaceReader):
         if item.kind in ("accept", "defer"):
             (self._accept if item.kind == "accept" else self._defer)()
             return
+        if item.kind == "after_that":
+            self._defer()
         action = _ACTIONS.get(item.kind) or StepAction(item.kind)
         change = _CHANGES.get(item.kind)
         if action is StepAction.GO and not self._ends(item.end):
@@ -342,7 +345,7 @@ class _Builder(TurnReader, PlaceReader):
         if frame is None or self._is_complete(frame, action):
             frame = self.open_step(action)
         elif frame.action in NEEDING_PLACE and action is StepAction.FOLLOW and self.negation is None:
-            action = frame.action or action
+            action = frame.action if frame.action is not None and frame.word != "to" else action
         frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]

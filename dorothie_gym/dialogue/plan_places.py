@@ -189,6 +189,8 @@ class PlaceReader(PlanState):
             self._object_of_verb(frame, place)
         elif frame.at is None and frame.action is not StepAction.SPEED:
             crossed = frame.action is StepAction.STRAIGHT
+            if crossed and place.reference is Anaphor.HERE:
+                return  # "straight along here"
             if crossed and _names_only_street(place) and frame.last in _ALONG:
                 frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
                 return

@@ -121,6 +121,9 @@ class QuantityReader:
             if length:
                 number = float(read_cardinals([*self.words[place : place + length]])[0])
                 place += length
+                if self.word_at(place) == "point" and (digit := self._run(place + 1)):
+                    number += read_cardinals([*self.words[place + 1 : place + 1 + digit]])[0] / 10.0
+                    place += 1 + digit
         if number == 100.0 and self.word_at(place) == "and" and (more := self._run(place + 1)):
             number, place = number + read_cardinals(list(self.words[place + 1 : place + 1 + more]))[0], place + 1 + more
         return (None, start) if number is None else (number, place)

@@ -89,7 +89,14 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
 
 
 def _with_particles(words: list[str]) -> list[str]:
-    """Returns the words with the particle of a verb beside it: "pick my son up" as "pick up my son"."""
+    """Returns the words with the particle of a verb beside it: "pick my son up" as "pick up my son".
+
+    Units that are spelt out are joined: "k p h".
+    """
+    for place in range(len(words) - 2):
+        if words[place] in ("k", "m") and words[place + 1 : place + 3] == ["p", "h"]:
+            words = [*words[:place], f"{words[place]}ph", *words[place + 3 :]]
+            break
     for place, word in enumerate(words):
         if word not in _SEPARABLE:
             continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, PlanState, with_details
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, Frame, PlanState, with_details
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, StepAction
 
 if TYPE_CHECKING:
@@ -38,9 +38,12 @@ class TurnReader(PlanState):
             return
         if self._says_again(item):
             return
-        frame = self.frame
+        frame = self._undirected()
         if frame is not None and frame.action is StepAction.LANE and frame.direction is None:
             frame.direction = item.direction  # "switch lanes, left"
+            return
+        if frame is not None and frame is not self.frame:
+            frame.direction = item.direction  # "turn where the KFC is. It's a right."
             return
         if frame is not None and not self.fresh:
             if frame.action is StepAction.TURN and frame.direction is None:
@@ -72,6 +75,14 @@ class TurnReader(PlanState):
         if named is not None and frame.at is None:
             frame.relation, frame.at = ConditionRelation.AT, named
         self._repeat(item)
+
+    def _undirected(self) -> Frame | None:
+        """Returns the current step, or the last one if a new sentence only adds its side: "Switch lanes. Right one."."""
+        last = self.frames[-1] if self.frames else None
+        if self.frame is None and last is not None and last.direction is None and len(self.frames) == self.begun:
+            if last.action is StepAction.LANE or (last.action is StepAction.TURN and last.at is not None):
+                return last
+        return self.frame
 
     def _denies_side(self) -> bool:
         """Returns whether a direction is a side that is not meant: "stop on the right, not the left"."""
