@@ -24,10 +24,39 @@ _AGREED: Final = frozenset({"right", "correct"})
 """Last words that ask whether a statement is right."""
 
 _TELLING: Final = frozenset(
-    {"it's", "that's", "you're", "we're", "this is", "that is", "it is", "you mean", "you meant", "you said", "you want"}
+    {
+        "it's",
+        "that's",
+        "you're",
+        "we're",
+        "this is",
+        "that is",
+        "it is",
+        "you mean",
+        "you meant",
+        "you said",
+        "you want",
+    }
 )
 _DIRECTING: Final = frozenset(
-    {"the", "a", "next", "on", "your", "my", "our", "first", "second", "third", "to", "other", "hard", "then", "and", "turn"}
+    {
+        "the",
+        "a",
+        "next",
+        "on",
+        "your",
+        "my",
+        "our",
+        "first",
+        "second",
+        "third",
+        "to",
+        "other",
+        "hard",
+        "then",
+        "and",
+        "turn",
+    }
 )
 """Words behind which "right" is a direction."""
 
@@ -68,9 +97,7 @@ def _breaks() -> _Breaks:
         for text in strings(f"{_FILE}: starts.{kind}", phrases)
     ]
     indexes = {
-        name: PhraseIndex(
-            [(name, name, text) for text in strings(f"{_FILE}: {name}", data.get(name))], adverbs=False
-        )
+        name: PhraseIndex([(name, name, text) for text in strings(f"{_FILE}: {name}", data.get(name))], adverbs=False)
         for name in ("answers", "phrases")
     }
     words = {

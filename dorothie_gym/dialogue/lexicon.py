@@ -76,7 +76,7 @@ _CONTRACTED = {
 }  # fmt: skip
 """Contractions and words without apostrophe, as typed by people and emitted by speech recognisers."""
 _APOSTROPHES = str.maketrans({"\u2019": "'", "\u2018": "'"})
-_EDGES = ".,;:!?\u2014\u2013\u2026\"()-"
+_EDGES = '.,;:!?\u2014\u2013\u2026"()-'
 _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
 _WORD = re.compile(r"[a-z0-9']+|\?|,")
 

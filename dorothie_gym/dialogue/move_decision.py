@@ -75,7 +75,12 @@ _OTHER: Final = (
     "you've stopped",
     "you stopped",
     "that was you",
-    "other way", "the other way ,", "wrong way", "not that", "not this", "not the",
+    "other way",
+    "the other way ,",
+    "wrong way",
+    "not that",
+    "not this",
+    "not the",
 )
 _ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
 _MEANT: Final = (
@@ -198,7 +203,12 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return DialogueMove.CLARIFY
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
-    if after is None and move is DialogueMove.REPLY_N and parsed.masked.startswith("not ") and len(parsed.masked) > _SHORT_NO:
+    if (
+        after is None
+        and move is DialogueMove.REPLY_N
+        and parsed.masked.startswith("not ")
+        and len(parsed.masked) > _SHORT_NO
+    ):
         return DialogueMove.INSTRUCT  # "not this one, the next"
     requested = ClauseMood.REQUEST in parse.moods
     ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)

@@ -31,7 +31,9 @@ _PEOPLE: Final = re.compile(
 )
 """Words of people outside the car."""
 
-_INSIDE: Final = re.compile(r"\b(back here|in here|in the (?:back|car)|with us|with me|my mother|out(?:side)? (?:at|by))\b")
+_INSIDE: Final = re.compile(
+    r"\b(back here|in here|in the (?:back|car)|with us|with me|my mother|out(?:side)? (?:at|by))\b"
+)
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
     r"\b(cars?|vehicles?|trucks?|lorry|vans?|bus|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?|motorbikes?|scooter"

@@ -191,7 +191,9 @@ def understand(text: str) -> ParsedText:
     """
     lists = word_lists()
     parse = read_plan(text)
-    said = without_asides(with_plain_lights(without_vocative(split_words(with_breaks(text)), lists)), lists, machines=True)
+    said = without_asides(
+        with_plain_lights(without_vocative(split_words(with_breaks(text)), lists)), lists, machines=True
+    )
     spoken = " ".join(said)
     mentions, words = find_names(said)
     words = mask_directions(words, lists)

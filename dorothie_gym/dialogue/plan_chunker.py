@@ -224,7 +224,9 @@ class _Reader(QuantityReader):
             self.items.append(LaneItem(direction))
             return place + (self.word_at(place) == "one")
         pavement = self.names.get(place) is ObjectClass.SIDE_WALK
-        aside = self.word_at(place) in _EDGES or pavement or (preposition in ("to", "in") and self._stands_behind_stop())
+        aside = (
+            self.word_at(place) in _EDGES or pavement or (preposition in ("to", "in") and self._stands_behind_stop())
+        )
         aside = aside or (hand and preposition not in ("to", "in") and self.word_at(place) not in _TURN_NOUNS)
         if aside:
             place += self.word_at(place) in _EDGES or pavement

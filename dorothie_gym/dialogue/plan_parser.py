@@ -231,7 +231,11 @@ class _Builder(TurnReader, PlaceReader):
         first = self.frames[0] if self.frames else None
         if first is None or first.action is not StepAction.WAIT or first.at is not None or not first.ends:
             return
-        if self.repaired or ClauseMood.QUESTION in self.moods or any(frame.action is not None for frame in self.frames[1:]):
+        if (
+            self.repaired
+            or ClauseMood.QUESTION in self.moods
+            or any(frame.action is not None for frame in self.frames[1:])
+        ):
             first.action = None
 
     def _leftovers(self) -> None:

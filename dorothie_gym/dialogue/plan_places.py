@@ -17,7 +17,22 @@ _INITIAL: Final = frozenset(
 )
 """Verbs whose object can be an opportunity to turn: "take the second"."""
 
-FETCHING: Final = frozenset({"fetch", "fetching", "grab", "grabbing", "meet", "meeting", "collect", "collecting", "pick", "picking", "after", "once"})
+FETCHING: Final = frozenset(
+    {
+        "fetch",
+        "fetching",
+        "grab",
+        "grabbing",
+        "meet",
+        "meeting",
+        "collect",
+        "collecting",
+        "pick",
+        "picking",
+        "after",
+        "once",
+    }
+)
 """First words of phrases by which somebody is fetched."""
 
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})

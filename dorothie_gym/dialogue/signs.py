@@ -18,7 +18,21 @@ _LEAST: Final = 2
 """Words that must be left."""
 
 _DETERMINING: Final = frozenset(
-    ["need", "more", "turning", "stopping", "parking", "faster", "quicker", "fast", "quick", "slower", "lights", "u", "idea"]
+    [
+        "need",
+        "more",
+        "turning",
+        "stopping",
+        "parking",
+        "faster",
+        "quicker",
+        "fast",
+        "quick",
+        "slower",
+        "lights",
+        "u",
+        "idea",
+    ]
 )
 """Words behind which "no" belongs to what follows."""
 
@@ -27,9 +41,7 @@ _DETERMINING: Final = frozenset(
 def _signs() -> dict[str, PhraseIndex]:
     data = read_data(_FILE)
     return {
-        kind: PhraseIndex(
-            [(kind, kind, text) for text in strings(f"{_FILE}: {kind}", data.get(kind))], adverbs=False
-        )
+        kind: PhraseIndex([(kind, kind, text) for text in strings(f"{_FILE}: {kind}", data.get(kind))], adverbs=False)
         for kind in ("always", "opening")
     }
 
