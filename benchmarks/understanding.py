@@ -109,9 +109,10 @@ def measure(
         progress: callback for the progress.
 
     Returns:
-        `written`, `misheard` (with WORD_ERRORS) and `hypotheses` (the same, by all hypotheses), each with `kinds` and `all`: `sentences`, `first_move`, `moves`
-        (the whole sequence), `first_move_and_slots`, `slots_precision`, `slots_recall`, `slots_f1`, `plan` (all steps
-        equal) and `steps_f1`; `milliseconds`: median processor time of `guess_spans` and `understand`.
+        `written`, `misheard` (with WORD_ERRORS) and `hypotheses` (the same, read by all hypotheses), each with `kinds`
+        and `all`: `sentences`, `first_move`, `moves` (the whole sequence), `first_move_and_slots`, `slots_precision`,
+        `slots_recall`, `slots_f1`, `plan` (all steps equal) and `steps_f1`; `milliseconds`: median processor time of
+        `guess_spans` and `understand`.
 
     Raises:
         SettingsError: there are no such sentences.

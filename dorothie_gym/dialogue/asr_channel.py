@@ -294,8 +294,8 @@ class Recogniser:
     """Recogniser of the utterances of a session, with the errors of an `AsrChannel`.
 
     Of several hypotheses, the one that makes most sense is the transcript; names of which the recogniser is unsure are
-    left out of it, so that the listener asks for them (`hypotheses`). Correctly recognised spans keep their act. The act
-    of a misrecognised span is classified from the transcript, so that the act does not reveal the spoken words.
+    left out of it, so that the listener asks for them (`hypotheses`). Correctly recognised spans keep their act. The
+    act of a misrecognised span is classified from the transcript, so that the act does not reveal the spoken words.
     """
 
     def __init__(self, channel: AsrChannel, rng: np.random.Generator, *, classify: bool = True) -> None:

@@ -1,8 +1,8 @@
 """Boundaries of clauses in speech without marks, as recognisers and hurried writers leave it.
 
-"turn left here it's the second house" has two clauses. A comma is put where a clause begins by its form: a subject with
-its finite verb, an imperative with what belongs to it, a verb before its subject, or words that take something back. The
-other readers of this package then see the same boundaries as in punctuated text.
+"turn left here it's the second house" has two clauses. A comma is put where a clause begins by its form: a subject
+with its finite verb, an imperative with what belongs to it, a verb before its subject, or words that take something
+back. The other readers of this package then see the same boundaries as in punctuated text.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.dialogue.lexicon import plain_word, read_data, strings
+from dorothie_gym.dialogue.lexicon import YamlMapping, plain_word, read_data, strings
 from dorothie_gym.dialogue.route_grammar import PhraseIndex
 
 _FILE: Final = "clause_breaks.yaml"
@@ -96,15 +96,23 @@ def _breaks() -> _Breaks:
         for kind, phrases in data.get("starts", {}).items()
         for text in strings(f"{_FILE}: starts.{kind}", phrases)
     ]
-    indexes = {
-        name: PhraseIndex([(name, name, text) for text in strings(f"{_FILE}: {name}", data.get(name))], adverbs=False)
-        for name in ("answers", "phrases")
-    }
-    words = {
-        name: frozenset(strings(f"{_FILE}: {name}", data.get(name)))
-        for name in ("joining", "antecedents", "subordinate")
-    }
-    return _Breaks(PhraseIndex(starts, adverbs=False), **indexes, **words)
+    return _Breaks(
+        starts=PhraseIndex(starts, adverbs=False),
+        answers=_index(data, "answers"),
+        phrases=_index(data, "phrases"),
+        joining=_words(data, "joining"),
+        antecedents=_words(data, "antecedents"),
+        subordinate=_words(data, "subordinate"),
+    )
+
+
+def _index(data: YamlMapping, name: str) -> PhraseIndex:
+    phrases = strings(f"{_FILE}: {name}", data.get(name))
+    return PhraseIndex([(name, name, text) for text in phrases], adverbs=False)
+
+
+def _words(data: YamlMapping, name: str) -> frozenset[str]:
+    return frozenset(strings(f"{_FILE}: {name}", data.get(name)))
 
 
 @functools.lru_cache(maxsize=4096)
@@ -162,7 +170,7 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
 
 
 def _is_subordinate(head: Sequence[str]) -> bool:
-    """Returns whether a clause depends on the one to come: "when you see the KFC", but not "the house after the bridge"."""
+    """Returns whether a clause depends on the one to come: "when you see the KFC"."""
     subordinate = _breaks().subordinate
     return not subordinate.isdisjoint(head[:2]) or not (subordinate - _ALSO_PREPOSITIONS).isdisjoint(head)
 

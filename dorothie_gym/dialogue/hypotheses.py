@@ -13,7 +13,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from dorothie_gym.dialogue.conversation import INAUDIBLE, Span
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
@@ -22,9 +22,11 @@ from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.routes import DrivingPlan
 from dorothie_gym.dialogue.word_pairs import unusual_pairs
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import Slot, SlotValue
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
 
 MOST: Final = 5
 """Number of hypotheses that are compared."""
@@ -36,9 +38,9 @@ _UNUSUAL: Final = 1.3
 _VALUE: Final = 0.7
 _PLAN: Final = 0.8
 _DETAIL: Final = 0.2
-"""Weights of unusual pairs of words, named values, having a plan at all, and the fields of its steps, against the logarithm of a
-hypothesis's weight. They are those of a softmax regression on 720 sentences of invented passengers, with 20 % word
-errors, that are in none of the tests."""
+"""Weights of unusual pairs of words, named values, having a plan at all, and the fields of its steps, against the
+logarithm of a hypothesis's weight. They are those of a softmax regression on 720 sentences of invented passengers,
+with 20 % word errors, that are in none of the tests."""
 
 _FORBIDDEN: Final = 4.0
 """Loss of a plan that the map does not allow."""

@@ -150,14 +150,16 @@ _OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
 _CHOICE: Final = re.compile(
-    r"\w or (?!not\b|what\b|something|anything|so\b|did|do\b|are\b|is\b|have|should|shall|was|can\b|will\b|two\b|three\b)"
+    r"\w or (?!not\b|what\b|something|anything|so\b|did|do\b|are\b|is\b|have|should|shall|was|can\b|will\b|two\b"
+    r"|three\b)"
 )
 """A question for one of two answers."""
 
 _STATE: Final = re.compile(
-    r"\b(?:i'm|i am|i feel|i'm feeling|we're|we are|he's|she's|they're|my \w+(?:'s| is| are| feels?)?|the \w+(?:'s| is| are)"
-    r"|kids are|baby's) (?:\w+ ){0,3}(?:sick|faint|dizzy|poorly|starving|freezing|boiling|asleep|sleeping|bursting|nervous"
-    r"|scared|unwell|killing me|aching|hurting|crying|late for|nauseous|carsick|exhausted)\b"
+    r"\b(?:i'm|i am|i feel|i'm feeling|we're|we are|he's|she's|they're|my \w+(?:'s| is| are| feels?)?"
+    r"|the \w+(?:'s| is| are)|kids are|baby's) (?:\w+ ){0,3}"
+    r"(?:sick|faint|dizzy|poorly|starving|freezing|boiling|asleep|sleeping|bursting"
+    r"|nervous|scared|unwell|killing me|aching|hurting|crying|late for|nauseous|carsick|exhausted)\b"
 )
 """State of somebody in the car."""
 

@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 _VAGUE: Final = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quick|important|like)\b")
 _TICKED: Final = re.compile(r"\b(tick|check|cross) (?:\w+ ){0,4}off\b")
 _PEOPLE: Final = re.compile(
-    r"\b(pedestrians?|walkers?|joggers?|runners?|crowd|on foot|crossing|crosses|crossed|cross|street|road|roads|sidewalk"
-    r"|pavement|walk\w*|running|runs|run out|steps?|stepping|standing|stood|stands|waving|waves|playing|in front|ahead"
-    r"|over there|about|ladder|kerb|curb|corner|watch|mind|look|see|that (?:guy|man|woman|lady|boy|girl|kid)"
-    r"|those (?:people|kids|children)|there's|there are|there is|bus stop|waiting|across|past us|pushchair|pram|in the way)\b"
+    r"\b(pedestrians?|walkers?|joggers?|runners?|crowd|on foot|crossing|crosses|crossed|cross|street|road|roads"
+    r"|sidewalk|pavement|walk\w*|running|runs|run out|steps?|stepping|standing|stood|stands|waving|waves|playing"
+    r"|in front|ahead|over there|about|ladder|kerb|curb|corner|watch|mind|look|see|that (?:guy|man|woman|lady|boy|girl|kid)"
+    r"|those (?:people|kids|children)|there's|there are|there is|bus stop|waiting|across"
+    r"|past us|pushchair|pram|in the way)\b"
 )
 """Words of people outside the car."""
 
@@ -36,10 +37,10 @@ _INSIDE: Final = re.compile(
 )
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
-    r"\b(cars?|vehicles?|trucks?|lorry|vans?|bus|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?|motorbikes?|scooter"
-    r"|suv|pickup|ambulance|bicyclist|much traffic|heavy traffic|bunch of traffic|lots of traffic|lot of traffic"
-    r"|traffic jam|traffic ahead|so much traffic|too much traffic|the traffic (?:ahead|in front)|any traffic|traffic like"
-    r"|how's the traffic|oncoming traffic)\b"
+    r"\b(cars?|vehicles?|trucks?|lorry|vans?|bus|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?|motorbikes?"
+    r"|scooter|suv|pickup|ambulance|bicyclist|much traffic|heavy traffic|bunch of traffic|lots of traffic"
+    r"|lot of traffic|traffic jam|traffic ahead|so much traffic|too much traffic|the traffic (?:ahead|in front)|any traffic"
+    r"|traffic like|how's the traffic|oncoming traffic)\b"
 )
 _ROAD: Final = re.compile(
     r"\b(?:this|that) (?:whole )?road(?:'s| is| has| was| looks)\b"
@@ -50,7 +51,8 @@ _KERB: Final = re.compile(r"^(?!.*\b(?:pavement|sidewalks?|side walk|path|see)\b
 
 _WITHDRAWN: Final = re.compile(r"(?:scratch|strike|forget|never mind|cancel) (?:that|it) ,")
 _LEFT_OVER: Final = re.compile(
-    r"\b(?:still|only|just|got|there's|what's|is|are|have)\b.*(?<!your )(?<!the )(?<!my )(?<!our )(?<!a )\bleft(?= now| to do| then|$)"
+    r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
+    r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!a )\bleft(?= now| to do| then|$)"
 )
 
 

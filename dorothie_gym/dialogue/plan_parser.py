@@ -350,6 +350,10 @@ class _Builder(TurnReader, PlaceReader):
             frame = self.open_step(action)
         elif frame.action in NEEDING_PLACE and action is StepAction.FOLLOW and self.negation is None:
             action = frame.action if frame.action is not None and frame.word != "to" else action
+        self._begin(frame, action, item)
+
+    def _begin(self, frame: Frame, action: StepAction, item: ActionItem) -> None:
+        """Gives a step its action, with what the words of the action tell beside it."""
         frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
@@ -358,8 +362,7 @@ class _Builder(TurnReader, PlaceReader):
             frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
         if self.negation in NEGATING:
             frame.negated, frame.forbidden = True, self.negation == "forbid"
-        if change is not None:
-            frame.change = change
+        frame.change = _CHANGES.get(item.kind, frame.change)
         if item.kind == "leave":
             frame.verb, frame.implied = "leave", True
         frame.ends = self._ends(item.end)

@@ -180,19 +180,7 @@ class PlaceReader(PlanState):
             return
         if place.reference is None:
             self.last_place = place
-        if self.reaching is not None:
-            frame, self.reaching = self.reaching, None
-            if frame.at is None and not self.fresh:
-                frame.relation, frame.at = ConditionRelation.UNTIL, self._resolved(place)
-                return
-        if self.negation == "cancel":
-            self.negation = None
-            if place.landmark is not None:
-                self.cancelled.add(place.landmark)
-            elif place.street is not None:
-                self.open_step(StepAction.AVOID).place = place
-            return
-        if self.repairing and self._corrected(place):
+        if self._ends_stretch(place) or self._cancels(place) or (self.repairing and self._corrected(place)):
             return
         place = self._resolved(place)
         frame = self.frame
@@ -203,14 +191,37 @@ class PlaceReader(PlanState):
         elif frame.action is None:
             self._object_of_verb(frame, place)
         elif frame.at is None and frame.action is not StepAction.SPEED:
-            crossed = frame.action is StepAction.STRAIGHT
-            if crossed and place.reference is Anaphor.HERE:
-                return  # "straight along here"
-            if crossed and _names_only_street(place) and frame.last in _ALONG:
-                frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
-                return
-            frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
-            frame.at = place
+            self._object_of_action(frame, place)
+
+    def _ends_stretch(self, place: PlaceReference) -> bool:
+        """Returns whether a place ends the stretch of a street that is followed: "Fuller down to the bridge"."""
+        frame, self.reaching = self.reaching, None
+        if frame is None or frame.at is not None or self.fresh:
+            return False
+        frame.relation, frame.at = ConditionRelation.UNTIL, self._resolved(place)
+        return True
+
+    def _cancels(self, place: PlaceReference) -> bool:
+        """Returns whether a place is given up: "skip the KFC"."""
+        if self.negation != "cancel":
+            return False
+        self.negation = None
+        if place.landmark is not None:
+            self.cancelled.add(place.landmark)
+        elif place.street is not None:
+            self.open_step(StepAction.AVOID).place = place
+        return True
+
+    def _object_of_action(self, frame: Frame, place: PlaceReference) -> None:
+        """Puts a place behind an action into its step: "turn right the KFC"."""
+        crossed = frame.action is StepAction.STRAIGHT
+        if crossed and place.reference is Anaphor.HERE:
+            return  # "straight along here"
+        if crossed and _names_only_street(place) and frame.last in _ALONG:
+            frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
+            return
+        frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
+        frame.at = place
 
     def _target(self, frame: Frame, place: PlaceReference) -> None:
         """Completes "take me to", "follow", "avoid" with a place."""

@@ -38,36 +38,8 @@ class TurnReader(PlanState):
             return
         if self._says_again(item):
             return
-        frame = self._undirected()
-        if frame is not None and frame.action is StepAction.LANE and frame.direction is None:
-            frame.direction = item.direction  # "switch lanes, left"
+        if self._directs(item):
             return
-        if frame is not None and frame is not self.frame:
-            frame.direction = item.direction  # "turn where the KFC is. It's a right."
-            return
-        if frame is not None and not self.fresh:
-            if frame.action is StepAction.TURN and frame.direction is None:
-                frame.direction = item.direction
-                frame.ordinal = frame.ordinal or item.ordinal
-                return
-            if frame.action is StepAction.U_TURN:
-                return
-            if frame.action is None and frame.verb and frame.relation is ConditionRelation.UNTIL:
-                self.close()
-                frame = None  # "go until the KFC left"
-        if frame is not None and not self.fresh:
-            if frame.action is StepAction.STRAIGHT and frame.word in _DOWN and self.counting and frame.at is None:
-                frame.action = None  # "down the alley to the right"
-            getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
-            if getting or (frame.action is None and frame.verb == "get"):
-                frame.action, frame.direction = StepAction.LANE, item.direction
-                return
-            if frame.action is None or (frame.action in NEEDING_PLACE and frame.place is None):
-                avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
-                frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
-                frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
-                self._repeat(item)
-                return
         named = self._bare_street()
         frame = self.open_step(StepAction.TURN)
         frame.direction = item.direction
@@ -76,8 +48,45 @@ class TurnReader(PlanState):
             frame.relation, frame.at = ConditionRelation.AT, named
         self._repeat(item)
 
+    def _directs(self, item: TurnItem) -> bool:
+        """Returns whether a direction belongs to a step that has been named: "turn at the KFC, that's a right"."""
+        frame = self._undirected()
+        if frame is None:
+            return False
+        if frame is not self.frame or (frame.action is StepAction.LANE and frame.direction is None):
+            frame.direction = item.direction  # "switch lanes, left"
+            return True
+        if self.fresh:
+            return False
+        if frame.action is StepAction.TURN and frame.direction is None:
+            frame.direction = item.direction
+            frame.ordinal = frame.ordinal or item.ordinal
+            return True
+        if frame.action is StepAction.U_TURN:
+            return True
+        if frame.action is None and frame.verb and frame.relation is ConditionRelation.UNTIL:
+            self.close()  # "go until the KFC left"
+            return False
+        return self._turns(frame, item)
+
+    def _turns(self, frame: Frame, item: TurnItem) -> bool:
+        """Returns whether a direction makes a turn, or a change of lane, of the current step."""
+        if frame.action is StepAction.STRAIGHT and frame.word in _DOWN and self.counting and frame.at is None:
+            frame.action = None  # "down the alley to the right"
+        getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
+        if getting or (frame.action is None and frame.verb == "get"):
+            frame.action, frame.direction = StepAction.LANE, item.direction
+            return True
+        if frame.action is not None and (frame.action not in NEEDING_PLACE or frame.place is not None):
+            return False
+        avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
+        frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
+        frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
+        self._repeat(item)
+        return True
+
     def _undirected(self) -> Frame | None:
-        """Returns the current step, or the last one if a new sentence only adds its side: "Switch lanes. Right one."."""
+        """Returns the current step, or the last one if a new sentence only adds its side: "Switch lanes. Right."."""
         last = self.frames[-1] if self.frames else None
         if self.frame is None and last is not None and last.direction is None and len(self.frames) == self.begun:
             if last.action is StepAction.LANE or (last.action is StepAction.TURN and last.at is not None):

@@ -7,11 +7,13 @@ was heard.
 from __future__ import annotations
 
 import functools
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
 from dorothie_gym.dialogue.route_grammar import PhraseIndex
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
 
 _FILE: Final = "signs.yaml"
 _LEAST: Final = 2

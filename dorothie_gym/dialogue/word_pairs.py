@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Sequence
 
@@ -25,21 +26,14 @@ def unusual_pairs(text: str) -> int:
     """Returns the number of pairs of neighbouring words of a text that no phrase of the talk files has."""
     words = _masked(text)
     known = _known_pairs()
-    return sum(pair not in known for pair in zip(words, words[1:], strict=False))
+    return sum(pair not in known for pair in itertools.pairwise(words))
 
 
 @functools.cache
 def _known_pairs() -> frozenset[tuple[str, str]]:
-    phrases = {
-        phrase.strip() for text in read_talk_files().values() for phrase in _ALTERNATIVES.split(words_of_grammar(text))
-    }
-    return frozenset(
-        pair
-        for phrase in phrases
-        if phrase
-        for words in [_masked(phrase)]
-        for pair in zip(words, words[1:], strict=False)
-    )
+    texts = (words_of_grammar(text) for text in read_talk_files().values())
+    phrases = {phrase.strip() for text in texts for phrase in _ALTERNATIVES.split(text)} - {""}
+    return frozenset(pair for phrase in phrases for pair in itertools.pairwise(_masked(phrase)))
 
 
 def _masked(text: str) -> Sequence[str]:
