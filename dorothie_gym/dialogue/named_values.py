@@ -25,8 +25,8 @@ _VAGUE: Final = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quic
 _TICKED: Final = re.compile(r"\b(tick|check|cross) (?:\w+ ){0,4}off\b")
 _PEOPLE: Final = re.compile(
     r"\b(pedestrians?|walkers?|joggers?|runners?|crowd|on foot|crossing|crosses|crossed|cross|street|road|roads"
-    r"|sidewalk|pavement|walk\w*|running|runs|run out|steps?|stepping|standing|stood|stands|waving|waves|playing"
-    r"|in front|ahead|over there|about|ladder|kerb|curb|corner|watch|mind|look|see|that (?:guy|man|woman|lady|boy|girl|kid)"
+    r"|sidewalk|pavement|walk\w*|running|runs|run out|steps?|stepping|standing|stood|stands|waving|waves"
+    r"|playing|in front|ahead|over there|about|ladder|kerb|curb|corner|watch|mind|look|see|that (?:guy|man|woman|lady|boy|girl|kid)"
     r"|those (?:people|kids|children)|there's|there are|there is|bus stop|waiting|across"
     r"|past us|pushchair|pram|in the way)\b"
 )
@@ -38,8 +38,8 @@ _INSIDE: Final = re.compile(
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
     r"\b(cars?|vehicles?|trucks?|lorry|vans?|bus|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?|motorbikes?"
-    r"|scooter|suv|pickup|ambulance|bicyclist|much traffic|heavy traffic|bunch of traffic|lots of traffic"
-    r"|lot of traffic|traffic jam|traffic ahead|so much traffic|too much traffic|the traffic (?:ahead|in front)|any traffic"
+    r"|scooter|suv|pickup|ambulance|bicyclist|much traffic|heavy traffic|bunch of traffic"
+    r"|lots of traffic|lot of traffic|traffic jam|traffic ahead|so much traffic|too much traffic|the traffic (?:ahead|in front)|any traffic"
     r"|traffic like|how's the traffic|oncoming traffic)\b"
 )
 _ROAD: Final = re.compile(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.numerals import read_cardinals, read_ordinal
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals, read_ordinal
 from dorothie_gym.dialogue.plan_items import NounPhrase
 from dorothie_gym.dialogue.plan_quantities import QuantityReader
 from dorothie_gym.dialogue.realization_context import Direction
@@ -40,8 +40,9 @@ class NounReader(QuantityReader):
             place += 1
         word = self.word_at(place).removesuffix("'s")
         number = read_ordinal(word)
-        if number is None and (counts := read_cardinals([word])) and 2 <= counts[0] <= 9:
-            number = counts[0]
+        if number is None and (word in NUMBER_WORDS or word[:1].isdigit()):
+            counts = read_cardinals([word])
+            number = counts[0] if counts and 2 <= counts[0] <= 9 else None
         return (None, start) if number is None else (number, place + 1)
 
     def noun_phrase(self, place: int) -> tuple[NounPhrase | None, int]:
