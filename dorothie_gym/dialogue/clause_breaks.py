@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from dorothie_gym.dialogue.lexicon import YamlMapping, plain_word, read_data, strings
-from dorothie_gym.dialogue.route_grammar import PhraseIndex
+from dorothie_gym.dialogue.route_grammar import Match, PhraseIndex, route_grammar
 
 _FILE: Final = "clause_breaks.yaml"
 _MARKS: Final = (",", ".", "?", "!", ";", ":", "\u2026", "\u2014", "\u2013", "-")
@@ -62,6 +62,29 @@ _DIRECTING: Final = frozenset(
 
 _YES_AND_NO: Final = frozenset({"yes", "yeah", "yep", "yup", "aye", "no", "nope", "nah", "naw"})
 _ALSO_PREPOSITIONS: Final = frozenset({"after", "before", "since", "until", "till", "as"})
+_POSSESSIVE: Final = frozenset({"my", "our", "his", "her", "their"})
+_PREDICATES: Final = frozenset(
+    {
+        "a",
+        "not",
+        "so",
+        "very",
+        "on",
+        "in",
+        "at",
+        "here",
+        "there",
+        "late",
+        "sick",
+        "asleep",
+        "just",
+        "still",
+        "gone",
+        "too",
+    }
+)
+"""Words behind a subject with a contracted "is"."""
+
 _BEFORE_ORDERS: Final = {
     "just": ("order",),
     "please": ("order",),
@@ -149,6 +172,8 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if answer is not None and answer.length == place - begin:
         return _answered(words, begin, place)
     found = breaks.starts.longest(words, place)
+    if found is None and _has_subject(words, place):
+        found = Match("starts", "subject", 1)
     if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
         found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
         found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None
@@ -167,6 +192,17 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if found.kind == "subject" and head[0] == "if":
         return False
     return not (words[place] in _PERSONAL and before in breaks.antecedents)
+
+
+def _has_subject(words: Sequence[str], place: int) -> bool:
+    """Returns whether somebody or something of the speaker's does something: "my mum's waiting"."""
+    if words[place] not in _POSSESSIVE:
+        return False
+    noun, verb = words[place + 1 : place + 2], words[place + 2 : place + 3]
+    if verb and verb[0] in route_grammar().finite:
+        return True
+    contracted = bool(noun) and noun[0].endswith("'s")
+    return contracted and bool(verb) and (verb[0].endswith("ing") or verb[0] in _PREDICATES)
 
 
 def _is_subordinate(head: Sequence[str]) -> bool:

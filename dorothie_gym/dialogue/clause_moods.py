@@ -133,7 +133,7 @@ class ClauseReader:
             if word == "," or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
                 return False
             if self._is_finite(number, place):
-                return words[number + 1] not in _ENOUGH if number + 1 < len(words) else True
+                return _ENOUGH.isdisjoint(words[number + 1 : number + 3])
             if word.startswith("#") and words[number + 1 : number + 2] in _RELATIVE:
                 return True  # "the person I have to meet is on Beal"
             match = grammar.terminals.longest(words, number)

@@ -124,6 +124,9 @@ _OF_SIGNS = frozenset(
 _SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_Y})
 """Moves whose formulas ask with a question mark."""
 
+_IN_FAVOUR = re.compile(r"\b(instead|rather than|not)\b")
+"""Words by which one errand takes the place of another."""
+
 _ROADS = frozenset({"lane", "lanes", "road", "junction", "traffic", "jam", "turning"})
 """Words that no small talk holds."""
 
@@ -283,7 +286,7 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
     if move is DialogueMove.INSTRUCT and not parsed.landmarks:
         values.discard(GoalStatus.COMPLETE)  # "right, then left, done"
     # One goal is abandoned in favour of another.
-    if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1:
+    if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1 and _IN_FAVOUR.search(parsed.text.lower()):
         values.add(GoalStatus.ONGOING)
     return frozenset(values)
 

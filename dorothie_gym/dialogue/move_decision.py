@@ -18,6 +18,7 @@ from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_reading import read_plan
 from dorothie_gym.dialogue.route_grammar import PhraseIndex, route_grammar
 from dorothie_gym.dialogue.routes import StepAction
+from dorothie_gym.dialogue.signs import is_mere_sign
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus
@@ -43,6 +44,7 @@ _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 """Moves that the cues give to an order of unknown form."""
 
 _COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
+_WHAT_TO_DO: Final = ("what you", "what we", "okay so what you", "so what you", "right so what you", "all you")
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
 _OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
 """Words by which the car offers what it asks: "would you like me to turn?"."""
@@ -120,6 +122,7 @@ _PAST: Final = frozenset(
     }
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
+_CALLS: Final = frozenset({"oh", "ooh", "hey", "oi", "look", "listen"})
 _REPAIRING: Final = frozenset(
     {
         "no",
@@ -272,7 +275,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
         offered = offered or (mine and not all(step.action in _FOR_PASSENGERS for step in parsed.plan))
         return move if offered else DialogueMove.INSTRUCT
-    if move is DialogueMove.CHECK and not parsed.question:
+    told = move is DialogueMove.QUERY_W and parsed.masked.startswith(_WHAT_TO_DO)
+    if (move is DialogueMove.CHECK or told) and not parsed.question:
         return DialogueMove.INSTRUCT
     if (
         move is DialogueMove.REPLY_N
@@ -418,6 +422,8 @@ def joined(segments: Sequence[str], after: DialogueMove | None) -> list[tuple[st
 
 def _is_noise(segment: str) -> bool:
     words = [word for word in split_words(segment) if word != ","]
+    if len(words) > 1 and words[0] in _CALLS and is_mere_sign(segment):
+        return True  # "oh look, ..."
     return bool(words) and all(word in _HESITATIONS or word in NUMBER_WORDS for word in words)
 
 

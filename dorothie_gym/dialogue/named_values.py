@@ -26,7 +26,8 @@ _TICKED: Final = re.compile(r"\b(tick|check|cross) (?:\w+ ){0,4}off\b")
 _PEOPLE: Final = re.compile(
     r"\b(pedestrians?|walkers?|joggers?|runners?|crowd|on foot|crossing|crosses|crossed|cross|street|road|roads"
     r"|sidewalk|pavement|walk\w*|running|runs|run out|steps?|stepping|standing|stood|stands|waving|waves"
-    r"|playing|in front|ahead|over there|about|ladder|kerb|curb|corner|watch|mind|look|see|that (?:guy|man|woman|lady|boy|girl|kid)"
+    r"|playing|in front|ahead|over there|about|ladder|kerb|curb|corner|watch|mind|look|see"
+    r"|that (?:guy|man|woman|lady|boy|girl|kid)"
     r"|those (?:people|kids|children)|there's|there are|there is|bus stop|waiting|across"
     r"|past us|pushchair|pram|in the way)\b"
 )
@@ -38,9 +39,8 @@ _INSIDE: Final = re.compile(
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
     r"\b(cars?|vehicles?|trucks?|lorry|vans?|bus|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?|motorbikes?"
-    r"|scooter|suv|pickup|ambulance|bicyclist|much traffic|heavy traffic|bunch of traffic"
-    r"|lots of traffic|lot of traffic|traffic jam|traffic ahead|so much traffic|too much traffic|the traffic (?:ahead|in front)|any traffic"
-    r"|traffic like|how's the traffic|oncoming traffic)\b"
+    r"|scooter|suv|pickup|ambulance|bicyclist|(?:much|heavy|any|oncoming|bunch of|lots of|lot of) traffic"
+    r"|traffic (?:jam|ahead|like)|the traffic (?:ahead|in front)|how's the traffic)\b"
 )
 _ROAD: Final = re.compile(
     r"\b(?:this|that) (?:whole )?road(?:'s| is| has| was| looks)\b"

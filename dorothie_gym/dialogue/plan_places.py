@@ -234,6 +234,8 @@ class PlaceReader(PlanState):
             frame.action, frame.place = StepAction.FOLLOW, place
         elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
+        elif frame.action is StepAction.VISIT and place.object is not None and frame.word in ("stop", "stopping"):
+            frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
             frame.action, frame.relation, frame.at = StepAction.STRAIGHT, ConditionRelation.UNTIL, place
         elif frame.action is StepAction.FOLLOW and place.landmark is not None:

@@ -48,6 +48,17 @@ def _signs() -> dict[str, PhraseIndex]:
     }
 
 
+def is_mere_sign(text: str) -> bool:
+    """Returns whether a text consists of interjections and calls for attention only: "oh look"."""
+    words, place = [word for word in split_words(text) if word != ","], 0
+    while place < len(words):
+        found = _signs()["always"].longest(words, place)
+        if found is None:
+            return False
+        place += found.length
+    return bool(words)
+
+
 def behind_signs(text: str, after: DialogueMove | None) -> str:
     """Returns what follows the signs at the beginning of a text; "" if it has none, or little else.
 
