@@ -85,6 +85,9 @@ _PREDICATES: Final = frozenset(
 )
 """Words behind a subject with a contracted "is"."""
 
+_ENDS: Final = {"subject": ("please",), "repair": ("second", "moment"), "order": ("second", "minute", "moment")}
+"""Words that join most clauses to what stands before, but none of a kind: "stop please, I feel sick"."""
+
 _BEFORE_ORDERS: Final = {
     "just": ("order",),
     "please": ("order",),
@@ -104,6 +107,7 @@ class _Breaks:
     """Contents of data/clause_breaks.yaml; that file explains each list."""
 
     starts: PhraseIndex
+    tags: PhraseIndex
     answers: PhraseIndex
     phrases: PhraseIndex
     joining: frozenset[str]
@@ -121,6 +125,7 @@ def _breaks() -> _Breaks:
     ]
     return _Breaks(
         starts=PhraseIndex(starts, adverbs=False),
+        tags=_index(data, "tags"),
         answers=_index(data, "answers"),
         phrases=_index(data, "phrases"),
         joining=_words(data, "joining"),
@@ -177,16 +182,17 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
         found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
         found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None
-    if found is None:
-        return False
-    if found.kind == "tag" and place + found.length < len(words):
+    if found is None and not _ends_in_tag(words, place):
         return False
     before = words[place - 1]
-    if before in breaks.joining or breaks.phrases.longest(words, place) is not None:
+    joined = before in breaks.joining and (found is None or before not in _ENDS.get(found.kind, ()))
+    if joined or breaks.phrases.longest(words, place) is not None:
         return False
     head = words[begin:place]
     if len(head) < 2 or all(word in _OPENS for word in head):
         return False
+    if found is None:
+        return True
     if found.kind in ("order", "question") and _is_subordinate(head):
         return False
     if found.kind == "subject" and head[0] == "if":
@@ -217,11 +223,16 @@ def _asks_for_agreement(words: Sequence[str]) -> bool:
         if words[-2] in _DIRECTING or words[-2].endswith("ing"):
             return False
         return words[0] in _TELLING or " ".join(words[:2]) in _TELLING
-    for place in (len(words) - 2, len(words) - 3):
-        found = _breaks().starts.longest(words, place) if place > 1 else None
-        if found is not None and found.kind == "tag" and place + found.length == len(words):
-            return words[place] not in _REQUESTING
-    return False
+    places = (place for place in (len(words) - 2, len(words) - 3) if place > 1 and _ends_in_tag(words, place))
+    return any(words[place] not in _REQUESTING for place in places)
+
+
+def _ends_in_tag(words: Sequence[str], place: int) -> bool:
+    """Returns whether nothing but a tag stands at a place: "aren't you"."""
+    found = _breaks().tags.longest(words, place)
+    if words[place - 1] in ("that", "this", "what", "where", "it", "here", "there") and words[place] == "is":
+        return False  # "that is it"
+    return found is not None and place + found.length == len(words)
 
 
 def _answered(words: Sequence[str], begin: int, place: int) -> bool:
@@ -231,4 +242,4 @@ def _answered(words: Sequence[str], begin: int, place: int) -> bool:
     if known is not None and known.length > place - begin:
         return False
     found = breaks.starts.longest(words, place)
-    return found is not None and found.kind != "tag"
+    return found is not None

@@ -185,9 +185,12 @@ def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
 
 def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct:
     """Returns the dialogue act of a parsed text; see `guess_act`."""
-    formula = formula_move(_plain_words(parsed.text))
+    words = _plain_words(parsed.text)
+    formula = formula_move(words)
     if parsed.question and formula in _SIGNS:
         formula = None  # "got it?"
+    if formula is DialogueMove.ALIGN and not parsed.question and len(split_words(parsed.text)) > len(words):
+        formula = DialogueMove.IRRELEVANT  # "hello, car" greets
     if after is None and parsed.masked.strip(" ,") in _HUMS:
         formula = DialogueMove.REPLY_Y
     move = _move_of(parsed)

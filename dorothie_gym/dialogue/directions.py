@@ -100,9 +100,16 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
             masked[place] = "right" if listed else _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):
             masked[place] = "#left"
+        elif word == "left" and (list(words[place + 1 : place + 3]) == ["to", "do"] or _remains(words, place)):
+            masked[place] = "#left"
         elif word == "straight" and after == "away":
             masked[place] = "#ok"
     return masked
+
+
+def _remains(words: Sequence[str], place: int) -> bool:
+    """Returns whether something is left over: "there's still the KFC left"."""
+    return place == len(words) - 1 and "still" in words[:place]
 
 
 def _right(before: str, after: str, following: str, place: int, lists: WordLists) -> str:

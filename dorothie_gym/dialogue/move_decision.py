@@ -77,6 +77,9 @@ _OTHER: Final = (
     "you've stopped",
     "you stopped",
     "that was you",
+    "this isn't it",
+    "that isn't",
+    "this is not",
     "other way",
     "the other way ,",
     "wrong way",
@@ -122,7 +125,9 @@ _PAST: Final = frozenset(
     }
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
-_CALLS: Final = frozenset({"oh", "ooh", "hey", "oi", "look", "listen"})
+_CALLS: Final = frozenset(
+    {"oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
+)
 _REPAIRING: Final = frozenset(
     {
         "no",
@@ -422,7 +427,7 @@ def joined(segments: Sequence[str], after: DialogueMove | None) -> list[tuple[st
 
 def _is_noise(segment: str) -> bool:
     words = [word for word in split_words(segment) if word != ","]
-    if len(words) > 1 and words[0] in _CALLS and is_mere_sign(segment):
+    if words and words[0] in _CALLS and is_mere_sign(segment):
         return True  # "oh look, ..."
     return bool(words) and all(word in _HESITATIONS or word in NUMBER_WORDS for word in words)
 

@@ -52,7 +52,7 @@ _KERB: Final = re.compile(r"^(?!.*\b(?:pavement|sidewalks?|side walk|path|see)\b
 _WITHDRAWN: Final = re.compile(r"(?:scratch|strike|forget|never mind|cancel) (?:that|it) ,")
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
-    r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!a )\bleft(?= now| to do| then|$)"
+    r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!\ba )\bleft(?= now| to do| then|$)"
 )
 
 

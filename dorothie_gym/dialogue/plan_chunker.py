@@ -16,6 +16,7 @@ from dorothie_gym.dialogue.plan_items import (
     NegationItem,
     NounPhrase,
     RepairItem,
+    SpeedItem,
     UnitItem,
     VerbItem,
     WordItem,
@@ -204,11 +205,18 @@ class _Reader(DirectionReader):
     def _kind(self, match: Match, place: int) -> str:
         """Returns the kind of an action, which what follows may change."""
         end = place + match.length
+        if match.kind == "straight" and self._keeps_speed(place, end):
+            return "speed"  # "the limit is thirty, stick to it"
         if match.kind == "lane" and self._visits(place, end):
             return "visit"  # "let's get over there"
         if match.kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
             return "stop"  # "that's where I get off", not "get off the highway"
         return f"lights_{match.kind}" if match.group == "lights" else match.kind
+
+    def _keeps_speed(self, place: int, end: int) -> bool:
+        """Returns whether "keep to it" is about a speed that has been named."""
+        told = self.words[place + 1 : end] in (["to", "it"], ["to", "that"], ["at", "it"])
+        return told and any(isinstance(item, SpeedItem) for item in self.items)
 
     def _visits(self, place: int, end: int) -> bool:
         """Returns whether words of changing lanes mean an errand: "get over there", "squeeze in the KFC"."""

@@ -363,6 +363,8 @@ class _Builder(TurnReader, PlaceReader):
         if self.negation in NEGATING:
             frame.negated, frame.forbidden = True, self.negation == "forbid"
         frame.change = _CHANGES.get(item.kind, frame.change)
+        if action is StepAction.SPEED and said[-1] in _IT and frame.speed is None:
+            frame.speed = self.last_speed
         if item.kind == "leave":
             frame.verb, frame.implied = "leave", True
         frame.ends = self._ends(item.end)

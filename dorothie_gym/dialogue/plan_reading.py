@@ -72,8 +72,17 @@ def read_plan(text: str) -> PlanParse:
     Args:
         text: free English; may be empty.
     """
-    sentences = (_sentence(part) for part in _SENTENCE.split(with_breaks(text)))
-    return parse_plan([sentence for sentence in sentences if sentence is not None])
+    sentences: list[Sentence] = []
+    for part in _SENTENCE.split(with_breaks(text)):
+        sentence = _sentence(part)
+        if sentence is not None and not (sentences and _says_again(sentences[-1], sentence)):
+            sentences.append(sentence)
+    return parse_plan(sentences)
+
+
+def _says_again(before: Sentence, sentence: Sentence) -> bool:
+    """Returns whether a sentence only repeats the direction of the one before: "Left! Left, left!"."""
+    return len({*before.clauses.words, *sentence.clauses.words}) == 1
 
 
 def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
