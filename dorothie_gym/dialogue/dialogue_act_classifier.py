@@ -189,8 +189,8 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
     formula = formula_move(words)
     if parsed.question and formula in _SIGNS:
         formula = None  # "got it?"
-    if formula is DialogueMove.ALIGN and not parsed.question and len(split_words(parsed.text)) > len(words):
-        formula = DialogueMove.IRRELEVANT  # "hello, car" greets
+    if formula is DialogueMove.REPLY_Y and after is None and parsed.plan.steps:
+        formula = None  # "go on then"
     if after is None and parsed.masked.strip(" ,") in _HUMS:
         formula = DialogueMove.REPLY_Y
     move = _move_of(parsed)

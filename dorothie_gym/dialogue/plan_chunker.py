@@ -24,7 +24,7 @@ from dorothie_gym.dialogue.plan_items import (
 from dorothie_gym.dialogue.plan_nouns import SIDES
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
 from dorothie_gym.dialogue.routes import ConditionRelation
-from dorothie_gym.ontology.slots import LandmarkName, SlotValue
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue
 
 _BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "got", "with", "see", "need", "want"})
 """Words behind which "no" says that there is none, and corrects nothing."""
@@ -175,6 +175,9 @@ class _Reader(DirectionReader):
         if match.group == "repairs" and self.words[place] == "no" and match.length == 1:
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
+                return end
+            if self.word_at(end) == "u":
+                self.items.append(NegationItem("forbid"))  # "no U-turns"
                 return end
         return place if self._is_part(match, place) else self._item(match, place)
 
@@ -333,6 +336,7 @@ class _Reader(DirectionReader):
         """Returns the relation that a phrase stands for; behind a line one stops before it."""
         if match.kind == "behind":
             stops = any(isinstance(item, ActionItem) and item.kind == "stop" for item in self.items)
+            stops = stops and not any(value is ObjectClass.VEHICLES for value in self.names.values())
             return ConditionRelation.BEFORE if stops else ConditionRelation.AFTER
         return ConditionRelation.PAST if match.kind == "across" else ConditionRelation(match.kind)
 

@@ -263,14 +263,30 @@ class PlanState:
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
-        first = _errand_before(frame)
-        if first is not None:
+        other, relation = _other_errand(frame), frame.relation
+        if other is not None:
             frame.relation = frame.at = None
-        step = frame.step()
-        return [other for other in (first, step) if other is not None]
+        steps = (frame.step(), other) if relation is ConditionRelation.BEFORE else (other, frame.step())
+        return [step for step in steps if step is not None]
+
+    def _avoids(self, frame: Frame) -> bool:
+        """Makes a place that must not be passed one to avoid: "don't go over the bridge"; returns whether it did."""
+        passed = (
+            frame.action is StepAction.STRAIGHT and frame.relation is ConditionRelation.PAST and frame.at is not None
+        )
+        street = frame.at is not None and frame.at.to_json().keys() == {"street"}
+        turned = frame.action is StepAction.TURN and frame.direction is None and street
+        alone = sum(other.action is not None for other in self.frames) == 1
+        if not frame.forbidden or frame.at is None or not (turned or (passed and alone)):
+            return False
+        self.denied |= {StepAction.TURN} if turned else set()
+        frame.action, frame.place, frame.at = StepAction.AVOID, frame.at, None
+        return True
 
     def _negate_step(self, frame: Frame) -> bool:
         """Negates a step, such as a forbidden street to one to avoid; returns whether a step is left."""
+        if self._avoids(frame):
+            return True
         self.denied |= {frame.action} if frame.action is not None else set()
         if frame.action is StepAction.STOP and frame.at is not None and frame.at.reference is None:
             frame.at = None  # "never stop on a bridge" says nothing of where to go on
@@ -280,10 +296,6 @@ class PlanState:
                 self.cancelled.add(frame.place.landmark)  # "we don't need the KFC any more"
             frame.action = StepAction.AVOID
             return frame.place.street is not None and frame.place.landmark is None
-        street = frame.at is not None and frame.at.to_json().keys() == {"street"}
-        if frame.action is StepAction.TURN and frame.direction is None and frame.forbidden and street:
-            frame.action, frame.place, frame.at = StepAction.AVOID, frame.at, None  # "don't turn into Draper"
-            return True
         if frame.action is StepAction.STOP or frame.action in TURNING:
             alone = sum(other.action is not None for other in self.frames) == 1
             frame.action, frame.direction, frame.ordinal = StepAction.STRAIGHT, None, None
@@ -296,9 +308,10 @@ class PlanState:
         return frame.action in (StepAction.SPEED, StepAction.LIGHTS)
 
 
-def _errand_before(frame: Frame) -> PlanStep | None:
-    """Returns the errand that comes before another one, and takes it out of it: "after the KFC we do the Shell"."""
-    waits = frame.action is StepAction.VISIT and frame.borrowed and frame.relation is ConditionRelation.AFTER
+def _other_errand(frame: Frame) -> PlanStep | None:
+    """Returns the errand that comes before or after another one: "after the KFC we do the Shell"."""
+    ordering = frame.relation in (ConditionRelation.AFTER, ConditionRelation.BEFORE)
+    waits = frame.action is StepAction.VISIT and frame.borrowed and ordering
     if not waits or frame.at is None or frame.at.landmark is None or frame.place is None:
         return None
     return PlanStep(action=StepAction.VISIT, place=frame.at)

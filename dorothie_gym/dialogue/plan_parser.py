@@ -248,7 +248,8 @@ class _Builder(TurnReader, PlaceReader):
         told = sided and ClauseMood.QUESTION not in self.moods  # "left side please, he's asleep"
         if acting or not (told or ORDERED.issuperset(self.moods)):
             return
-        if self.pending.ordinal is not None and self.negation is None and len(self.moods) > 1:
+        short = self.opportunity and len(self.clauses.words) <= _FEW  # "second exit at the roundabout"
+        if self.pending.ordinal is not None and self.negation is None and (len(self.moods) > 1 or short):
             self.open_step(StepAction.TURN)
         elif (
             self.pending.side is not None

@@ -217,6 +217,9 @@ class PlaceReader(PlanState):
         crossed = frame.action is StepAction.STRAIGHT
         if crossed and place.reference is Anaphor.HERE:
             return  # "straight along here"
+        if crossed and place.landmark is LandmarkName.HOUSE and frame.last == "straight":
+            frame.action, frame.place = StepAction.VISIT, place  # "go straight home"
+            return
         if crossed and _names_only_street(place) and frame.last in _ALONG:
             frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
             return
