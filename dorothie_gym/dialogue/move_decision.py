@@ -157,6 +157,7 @@ _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE,
 _OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
+_SUPPOSING: Final = ("isn't ", "wasn't ", "aren't ", "weren't ", "didn't ", "haven't ", "hasn't ")
 _CHOICE: Final = re.compile(
     r"\w or (?!not\b|what\b|something|anything|so\b|did|do\b|are\b|is\b|have|should|shall|was|can\b|will\b|two\b"
     r"|three\b)"
@@ -171,6 +172,7 @@ _STATE: Final = re.compile(
 )
 """State of somebody in the car."""
 
+_HEARD_NAME: Final = re.compile(r"[\w #']+ , (?:the )?#(?:landmark|street)( on #street)? ?")
 _OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant) (?!$)")
 """Words by which a speaker corrects, or explains, what he has just said himself."""
 
@@ -233,6 +235,8 @@ def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: 
         return DialogueMove.INSTRUCT
     if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
         return DialogueMove.QUERY_YN  # "can we make it by six"
+    if move is DialogueMove.QUERY_YN and parsed.masked.startswith(_SUPPOSING):
+        return DialogueMove.CHECK  # "isn't that the KFC?"
     if move is DialogueMove.QUERY_YN and _CHOICE.search(parsed.masked):
         return DialogueMove.QUERY_W  # "on our side or across the road?"
     if move is DialogueMove.QUERY_W and not parsed.question and parsed.masked.startswith(_ALERTS):
@@ -262,6 +266,8 @@ def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: Dia
 def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *, requested: bool) -> DialogueMove:
     """Returns the move of words that order something."""
     parse = parsed.parse
+    if after in _NEWS and _HEARD_NAME.fullmatch(parsed.masked) and _acknowledges(parsed):
+        return DialogueMove.ACKNOWLEDGE  # "all right, the KFC"
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
     named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
@@ -297,6 +303,12 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     if move is DialogueMove.CLARIFY and own and after is None:
         return DialogueMove.INSTRUCT
     return move
+
+
+def _acknowledges(parsed: ParsedText) -> bool:
+    """Returns whether the words before the first comma show that something was heard."""
+    words = split_words(parsed.text)
+    return "," in words and formula_move(words[: words.index(",")]) is DialogueMove.ACKNOWLEDGE
 
 
 def _runs_on(parsed: ParsedText) -> bool:
@@ -336,7 +348,7 @@ def _corrects(parsed: ParsedText) -> bool:
         return False
     if any(phrase in parsed.masked for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
         return True
-    if not (parsed.plan.steps or parsed.values):
+    if not (parsed.plan.steps or parsed.values) or parsed.masked.startswith(("no thanks", "no thank you")):
         return False
     words = parsed.masked.split()
     return not _DENIALS.isdisjoint(words[:3]) or any(phrase in parsed.masked for phrase in _MEANT)

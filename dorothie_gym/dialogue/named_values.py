@@ -42,6 +42,18 @@ _OTHER_VEHICLES: Final = re.compile(
     r"|scooter|suv|pickup|ambulance|bicyclist|(?:much|heavy|any|oncoming|bunch of|lots of|lot of) traffic"
     r"|traffic (?:jam|ahead|like)|the traffic (?:ahead|in front)|how's the traffic)\b"
 )
+_SOUGHT: Final = re.compile(
+    r"\b(?:my|our|his|her) (?:old |best |little |big |other )?(?:people|friends?|mate|mates|buddy|brother|sister|mum"
+    r"|mom|mother|dad|father|gran|granny|grandma|grandpa|aunt|uncle|cousin|nephew|niece|son|daughter|wife|husband|boss"
+    r"|coach|client|colleague|team|partner|girlfriend|boyfriend|grandson|granddaughter|kids|children|parents|passenger)"
+    r"(?:'s| is| are| isn't| should be| will be|'ll be)? ?(?:still |already |just |right )?"
+    r"(?:waiting(?! for (?:me|us))|standing|stood|waving|on (?:the|your)|at the|at #|over (?:on|at|there|by)|outside"
+    r"|by the|next to|in front)"
+)
+"""Words of somebody who is looked for, at a place outside the car."""
+
+_LIVING: Final = re.compile(r"\b(?:lives?|living|lived|house|place|home|works?|working|worked)\b")
+_DOING: Final = re.compile(r"\b(?:get|gets|getting) (?:\w+ ){1,4}done\b")
 _ROAD: Final = re.compile(
     r"\b(?:this|that) (?:whole )?road(?:'s| is| has| was| looks)\b"
     r"|\bthe road(?:'s| is| was| looks) (?:all |very |so |really )?(?:clear|wet|icy|bumpy|narrow|rough|slippery|dug)\b"
@@ -71,6 +83,9 @@ def meant_values(
     if parse.person:
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)
+    if _SOUGHT.search(spoken) and LandmarkName.PERSON not in found and not _LIVING.search(spoken):
+        found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
+        found.append(LandmarkName.PERSON)  # "my sister is waiting at the KFC"
     if _ROAD.search(spoken) and not parse.plan.steps and ObjectClass.ROAD not in found:
         found.append(ObjectClass.ROAD)
     return _with_status(found, actions, parse, spoken)
@@ -102,6 +117,8 @@ def _with_status(
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)
     if parse.repaired or (driving and not landmarks):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, Bishop"
+    if _DOING.search(spoken):
+        found = [value for value in found if value is not GoalStatus.COMPLETE]  # "let's get the KFC done first"
     if landmarks and not parse.cancelled and _WITHDRAWN.match(spoken):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, make it the KFC"
     if driving and not landmarks:
