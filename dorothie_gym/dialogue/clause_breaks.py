@@ -88,6 +88,8 @@ _PREDICATES: Final = frozenset(
 _ENDS: Final = {"subject": ("please",), "repair": ("second", "moment"), "order": ("second", "minute", "moment")}
 """Words that join most clauses to what stands before, but none of a kind: "stop please, I feel sick"."""
 
+_DRIVING: Final = (["we"], ["you"])
+_MODALS: Final = (["should"], ["could"], ["can"], ["need"], ["must"], ["better"], ["might"])
 _BEFORE_ORDERS: Final = {
     "just": ("order",),
     "please": ("order",),
@@ -179,6 +181,8 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     found = breaks.starts.longest(words, place)
     if found is None and _has_subject(words, place):
         found = Match("starts", "subject", 1)
+    if words[place] == "so" and words[place + 1 : place + 2] in _DRIVING and words[place + 2 : place + 3] in _MODALS:
+        found = Match("starts", "order", 1)  # "it's closed, so we should turn around"
     if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
         found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
         found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None

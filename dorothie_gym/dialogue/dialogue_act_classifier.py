@@ -11,12 +11,11 @@ from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
+from dorothie_gym.dialogue.formulas import formula_move, formula_moves
 from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, split_words, strings
 from dorothie_gym.dialogue.move_decision import (
     belong_together,
     decide,
-    formula_move,
-    formula_moves,
     in_context,
     joined,
     sign_of_hearing,

@@ -6,30 +6,24 @@ them, the cues of `dialogue_act_classifier` do.
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
-from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
+from dorothie_gym.dialogue.formulas import OPENING_YES, first_answer, formula_move, leading_answer
+from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_reading import read_plan
-from dorothie_gym.dialogue.route_grammar import PhraseIndex, route_grammar
+from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import is_mere_sign
-from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus
-from dorothie_gym.ontology.spellings import parse_move
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
-
-_FILLER: Final = "Filler"
-_DECIDING: Final = frozenset({DialogueMove.CONFUSE.label, DialogueMove.CONFIRM.label})
-"""Moves whose formulas decide for others beside them: "okay, will do"."""
 
 _SHORT_NO: Final = 8
 """Letters of a "not yet" that answers."""
@@ -154,7 +148,6 @@ _REPAIRING: Final = frozenset(
 """Words of which a correction has one; others need not be tried."""
 _FORBIDDING: Final = frozenset({"never", "don't", "dont", "please"})
 _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
-_OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
 _SUPPOSING: Final = ("isn't ", "wasn't ", "aren't ", "weren't ", "didn't ", "haven't ", "hasn't ")
@@ -173,6 +166,16 @@ _STATE: Final = re.compile(
 """State of somebody in the car."""
 
 _HEARD_NAME: Final = re.compile(r"[\w #']+ , (?:the )?#(?:landmark|street)( on #street)? ?")
+_DENYING: Final = (
+    "it is not",
+    "it's not",
+    "it isn't",
+    "that isn't",
+    "that is not",
+    "that's not",
+    "we're not",
+    "i'm not",
+)
 _OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant) (?!$)")
 """Words by which a speaker corrects, or explains, what he has just said himself."""
 
@@ -180,21 +183,6 @@ _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
 _DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
-
-
-def formula_move(words: Sequence[str]) -> DialogueMove | None:
-    """Returns the move of words that consist of formulas only ("right, okay, thank you"); None of other words."""
-    words = [word for word in words if word != ","]
-    formulas, place = _formulas(), 0
-    found: DialogueMove | None = None
-    while place < len(words):
-        match = formulas.longest(words, place)
-        if match is None:
-            return None
-        if match.kind != _FILLER and (found is None or match.kind in _DECIDING):
-            found = parse_move(match.kind)
-        place += match.length
-    return found
 
 
 def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
@@ -208,7 +196,7 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
     parse = parsed.parse
     if parse is None:
         return move
-    answer = _first_answer(parsed) if after in _ANSWERED else None
+    answer = first_answer(parsed) or leading_answer(parsed) if after in _ANSWERED else None
     if answer is not None and move is not DialogueMove.CLARIFY:
         return answer
     if after in _NEWS and _corrects(parsed):
@@ -249,7 +237,8 @@ def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: 
 def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
     """Returns the move of words that may state something."""
     words = parsed.masked.split()
-    if after in _ANSWERED and words[:1] in (["not"], ["ain't"]) and move is not DialogueMove.REPLY_U:
+    denied = parsed.masked.startswith(_DENYING) or words[:1] in (["not"], ["ain't"])
+    if after in _ANSWERED and denied and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N
     words = words[2:] if words[1:2] == [","] and words[0] in _SIGHS else words
     if words[:1] == ["i"] and words[1:2] in _FEELING and not parsed.values and words[2:3] != ["to"]:
@@ -314,7 +303,7 @@ def _acknowledges(parsed: ParsedText) -> bool:
 def _runs_on(parsed: ParsedText) -> bool:
     """Returns whether no comma stands behind the yes with which an order begins."""
     words = split_words(parsed.text)
-    return len(words) > 3 and words[0] in _OPENING_YES and words[1] != ","
+    return len(words) > 3 and words[0] in OPENING_YES and words[1] != ","
 
 
 def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
@@ -326,20 +315,6 @@ def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     repaired = corrected or (parsed.parse.repaired and bool(parsed.plan.steps))
     denied = bool(parsed.parse.denied) and (words[0] in _FORBIDDING or words[1:2] == ["#acting"])
     return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(("no turning", "no more"))
-
-
-def _first_answer(parsed: ParsedText) -> DialogueMove | None:
-    """Returns the answer with which a span begins, before its first comma; None without any."""
-    words = _without_restart(split_words(parsed.text))
-    if "," not in words:
-        return None
-    move = formula_move(words[: words.index(",")])
-    return move if move in (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U) else None
-
-
-def _without_restart(words: list[str]) -> list[str]:
-    """Returns the words without a first word that is said twice: "I, I think so"."""
-    return words[2:] if len(words) > 2 and words[1] == "," and words[2] == words[0] else words
 
 
 def _corrects(parsed: ParsedText) -> bool:
@@ -452,21 +427,3 @@ def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> 
     corrects = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
     denial = corrects and formula_move(words) is DialogueMove.REPLY_N
     return denial and bool(rest.plan.steps or not _DENIALS.isdisjoint(split_words(following)))
-
-
-@functools.cache
-def formula_moves() -> frozenset[DialogueMove]:
-    """Returns the moves that have formulas; the cues alone tell others."""
-    return frozenset(parse_move(kind) for kind in read_data("formulas.yaml") if kind != _FILLER)
-
-
-@functools.cache
-def _formulas() -> PhraseIndex:
-    rows = []
-    for kind, phrases in read_data("formulas.yaml").items():
-        if kind != _FILLER:
-            parse_move(kind)
-        rows += [("formulas", kind, text) for text in strings(f"formulas.yaml: {kind}", phrases)]
-    if not rows:
-        raise PhraseFileError("formulas.yaml: lists no phrases")
-    return PhraseIndex(rows, adverbs=False)
