@@ -8,6 +8,7 @@ from typing import Final
 from dorothie_gym.dialogue.contingencies import find_contingency
 from dorothie_gym.dialogue.plan_directions import DirectionReader
 from dorothie_gym.dialogue.plan_items import (
+    SIDES,
     ActionItem,
     BoundaryItem,
     ConditionItem,
@@ -21,7 +22,8 @@ from dorothie_gym.dialogue.plan_items import (
     VerbItem,
     WordItem,
 )
-from dorothie_gym.dialogue.plan_nouns import SIDES
+from dorothie_gym.dialogue.plan_nouns import NounReader
+from dorothie_gym.dialogue.plan_quantities import QuantityReader
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
 from dorothie_gym.dialogue.routes import ConditionRelation
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue
@@ -91,7 +93,7 @@ def read_items(
     return reader.read()
 
 
-class _Reader(DirectionReader):
+class _Reader(DirectionReader, NounReader, QuantityReader):
     def read(self) -> list[Item]:
         place = 0
         rules = (

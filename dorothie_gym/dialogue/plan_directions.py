@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from dorothie_gym.dialogue.plan_items import ActionItem, LaneItem, SideItem, TurnItem
-from dorothie_gym.dialogue.plan_nouns import SIDES, NounReader
+from dorothie_gym.dialogue.plan_items import SIDES, ActionItem, LaneItem, SideItem, TokenReader, TurnItem
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ObjectClass
 
@@ -52,7 +51,7 @@ class _Phrase(NamedTuple):
     hand: bool
 
 
-class DirectionReader(NounReader):
+class DirectionReader(TokenReader):
     """Reads left and right.
 
     Attributes:

@@ -2,48 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals, read_ordinal
-from dorothie_gym.dialogue.plan_items import NounPhrase
-from dorothie_gym.dialogue.plan_quantities import QuantityReader
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.plan_items import SIDES, NounPhrase, TokenReader
 from dorothie_gym.dialogue.routes import Anaphor, PlaceReference
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.route_grammar import Match
 
-SIDES: Final[Mapping[str, Direction]] = {
-    "left": Direction.LEFT,
-    "right": Direction.RIGHT,
-    "leftwards": Direction.LEFT,
-    "rightwards": Direction.RIGHT,
-    "lefts": Direction.LEFT,
-    "rights": Direction.RIGHT,
-}
-"""Directions by their words."""
-
 _POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
 
 
-class NounReader(QuantityReader):
+class NounReader(TokenReader):
     """Reads noun phrases."""
-
-    def ordinal(self, place: int) -> tuple[int | None, int]:
-        """Returns an ordinal or a small count, and the place behind it."""
-        start = place
-        while self.word_at(place) in self.grammar.determiners or self.word_at(place) == "very":
-            place += 1
-        word = self.word_at(place).removesuffix("'s")
-        number = read_ordinal(word)
-        if number is None and (word in NUMBER_WORDS or word[:1].isdigit()):
-            counts = read_cardinals([word])
-            number = counts[0] if counts and 2 <= counts[0] <= 9 else None
-        return (None, start) if number is None else (number, place + 1)
 
     def noun_phrase(self, place: int) -> tuple[NounPhrase | None, int]:
         """Returns the noun phrase at a place, and the place behind it."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.numerals import may_be_speed, read_cardinals
-from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, Item, SpeedItem
+from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, SpeedItem, TokenReader
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.route_grammar import RouteGrammar
-    from dorothie_gym.ontology.slots import SlotValue
+    pass
 
 _BEHIND_SPEED: Final = frozenset(
     {
@@ -36,19 +34,8 @@ _BEHIND_SPEED: Final = frozenset(
 _LEAST_SPEED: Final = 5
 
 
-class QuantityReader:
-    """Tokens of a sentence with the items found so far; reads quantities."""
-
-    def __init__(
-        self, words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str], grammar: RouteGrammar
-    ) -> None:
-        """Begins with the tokens, the names and first words of `read_items`, and the grammar."""
-        self.words, self.names, self.lead, self.grammar = words, names, lead, grammar
-        self.items: list[Item] = []
-
-    def word_at(self, place: int) -> str:
-        """Returns the token at a place; "" where there is none."""
-        return self.words[place] if 0 <= place < len(self.words) else ""
+class QuantityReader(TokenReader):
+    """Reads quantities."""
 
     def read_quantity(self, place: int) -> int:
         """Reads a distance or a speed."""
