@@ -326,7 +326,7 @@ class Recogniser:
             asked = after if place == 0 else None
             hypotheses = self._channel.recognise(span.text, self._rng, circumstances)
             text, act = span.text, span.act
-            if len(hypotheses) > 1 or hypotheses[0].text != text:
+            if any(each.text != text for each in hypotheses):
                 text = with_unsure_names(read_hypotheses(hypotheses, asked))
             if not same_words(text, span.text):
                 act = guess_act(text, asked) if self._classify else UNCLASSIFIED

@@ -188,8 +188,10 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
     formula = formula_move(words)
     if parsed.question and formula in _SIGNS:
         formula = None  # "got it?"
-    if formula is DialogueMove.REPLY_Y and after is None and parsed.plan.steps:
-        formula = None  # "go on then"
+    goes_on = formula is DialogueMove.REPLY_Y and after is None
+    corrects = formula is DialogueMove.REPLY_N and after in (DialogueMove.EXPLAIN, DialogueMove.CONFIRM)
+    if (goes_on or corrects) and parsed.plan.steps:
+        formula = None  # "go on then"; "no, right"
     if after is None and parsed.masked.strip(" ,") in _HUMS:
         formula = DialogueMove.REPLY_Y
     move = _move_of(parsed)

@@ -72,12 +72,13 @@ def first_answer(parsed: ParsedText) -> DialogueMove | None:
 
 
 def leading_answer(parsed: ParsedText) -> DialogueMove | None:
-    """Returns the yes or no with which a span begins, behind its interjections: "ah no no this is fine"."""
+    """Returns the yes or no with which a span begins, behind its interjections, or ends: "Beal, yes"."""
     text = parsed.text.lower()
     words = split_words(behind_signs(text, DialogueMove.QUERY_YN) or text)
     if words[:1] and words[0] in ("no", "nope", "nah", "naw") and _PARTS_OF_NO.isdisjoint(words[1:2]):
         return DialogueMove.REPLY_N
-    return DialogueMove.REPLY_Y if words[:1] and words[0] in OPENING_YES else None
+    agrees = words[:1] and (words[0] in OPENING_YES or (words[-2:-1] == [","] and words[-1] in OPENING_YES))
+    return DialogueMove.REPLY_Y if agrees else None
 
 
 def _without_restart(words: list[str]) -> list[str]:

@@ -53,6 +53,9 @@ _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 _OTHER: Final = (
     "other side",
     "the other side",
+    "the one after",
+    "the one before",
+    "the other one",
     "other kerb",
     "wrong side",
     "after it",
