@@ -206,18 +206,20 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return DialogueMove.CLARIFY
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
-    if (
-        after is None
-        and move is DialogueMove.REPLY_N
-        and parsed.masked.startswith("not ")
-        and len(parsed.masked) > _SHORT_NO
-    ):
+    if after is None and _refuses(parsed, move):
         return DialogueMove.INSTRUCT  # "not this one, the next"
     requested = ClauseMood.REQUEST in parse.moods
     ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)
     if ordered:
         return _order(parsed, move, after, requested=requested)
     return _unordered(parsed, parse, move, after)
+
+
+def _refuses(parsed: ParsedText, move: DialogueMove) -> bool:
+    """Returns whether words with a "not" refuse something that nobody has offered in words."""
+    unnamed = move is DialogueMove.CLARIFY and not (parsed.landmarks or parsed.streets)
+    denying = move is DialogueMove.REPLY_N or unnamed
+    return denying and parsed.masked.startswith("not ") and len(parsed.masked) > _SHORT_NO
 
 
 def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
