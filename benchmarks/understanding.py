@@ -17,7 +17,15 @@ from typing import Final
 import numpy as np
 
 from benchmarks.timing import Figures, Progress, ignore_progress, machine, rounded
-from dorothie_gym.dialogue import AsrChannel, DrivingPlan, Span, guess_spans, understand
+from dorothie_gym.dialogue import (
+    AsrChannel,
+    DrivingPlan,
+    Span,
+    TextHypothesis,
+    guess_spans,
+    read_hypotheses,
+    understand,
+)
 from dorothie_gym.errors import SettingsError
 from dorothie_gym.ontology import DialogueAct, DialogueMove, parse_act
 
@@ -101,38 +109,46 @@ def measure(
         progress: callback for the progress.
 
     Returns:
-        `written` and `misheard` (with WORD_ERRORS), each with `kinds` and `all`: `sentences`, `first_move`, `moves`
-        (the whole sequence), `first_move_and_slots`, `slots_precision`, `slots_recall`, `slots_f1`, `plan` (all steps
-        equal) and `steps_f1`; `milliseconds`: median processor time of `guess_spans` and `understand`.
+        `written`, `misheard` (with WORD_ERRORS) and `hypotheses` (the same, read by all hypotheses), each with `kinds`
+        and `all`: `sentences`, `first_move`, `moves` (the whole sequence), `first_move_and_slots`, `slots_precision`,
+        `slots_recall`, `slots_f1`, `plan` (all steps equal) and `steps_f1`; `milliseconds`: median processor time of
+        `guess_spans` and `understand`.
 
     Raises:
         SettingsError: there are no such sentences.
     """
     sentences = read_sentences(folder, split)
-    channel, rng = AsrChannel(rate=WORD_ERRORS), np.random.default_rng(seed)
+    channel = AsrChannel(rate=WORD_ERRORS)
+    rng, again = np.random.default_rng(seed), np.random.default_rng(seed)
     understand("Turn left, please.")
     progress("written words", 0.1)
     times: list[float] = []
-    written = _compare(sentences, lambda text: text, times)
+    written = _compare(sentences, lambda text, after: text, times)
     progress("misheard words", 0.6)
     return {
         "sentences": len(sentences),
         "split": split or "dev and test",
         "written": written,
-        "misheard": _compare(sentences, lambda text: channel.transcribe(text, rng), []),
+        "misheard": _compare(sentences, lambda text, after: channel.transcribe(text, rng), []),
+        "hypotheses": _compare(sentences, lambda text, after: _taken(channel.recognise(text, again), after), []),
         "word_errors": WORD_ERRORS,
         "milliseconds": rounded(1000.0 * float(np.median(times))),
         "machine": machine(),
     }
 
 
+def _taken(hypotheses: Sequence[TextHypothesis], after: DialogueMove | None) -> str:
+    """Returns the hypothesis that makes most sense; "" if nothing was heard."""
+    return read_hypotheses(hypotheses, after).text if hypotheses else ""
+
+
 def _compare(
-    sentences: Sequence[LabelledSentence], hear: Callable[[str], str], times: list[float]
+    sentences: Sequence[LabelledSentence], hear: Callable[[str, DialogueMove | None], str], times: list[float]
 ) -> dict[str, object]:
     counts: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for sentence in sentences:
         after = guess_spans(sentence.before)[-1].act.move if sentence.before.strip() else None
-        text = hear(sentence.text)
+        text = hear(sentence.text, after)
         begun = time.process_time()
         spans = guess_spans(text, after)
         plan = understand(text).plan

@@ -22,6 +22,9 @@ from .exchanges import EXPECTATIONS as EXPECTATIONS
 from .exchanges import Exchange as Exchange
 from .exchanges import ExchangeState as ExchangeState
 from .exchanges import ExchangeTracker as ExchangeTracker
+from .hypotheses import HypothesisReading as HypothesisReading
+from .hypotheses import TextHypothesis as TextHypothesis
+from .hypotheses import read_hypotheses as read_hypotheses
 from .intentions import CommunicativeFunction as CommunicativeFunction
 from .intentions import Intention as Intention
 from .lexicon import Lexicon as Lexicon

@@ -9,7 +9,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from rapidfuzz import process
@@ -19,6 +19,7 @@ from dorothie_gym.dialogue.conversation import USUAL_WORD_ERROR_RATE, Span, Utte
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
+from dorothie_gym.dialogue.hypotheses import TextHypothesis, nbest, read_hypotheses, with_unsure_names
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
 from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.dialogue.recognition_errors import (
@@ -27,6 +28,7 @@ from dorothie_gym.dialogue.recognition_errors import (
     proper_words,
     word_class,
 )
+from dorothie_gym.dialogue.word_pairs import words_of_grammar
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.support.copying import shared
 
@@ -34,6 +36,19 @@ if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
+_SURE_RIGHT: Final = 0.7
+"""Least confidence of a word that was recognised correctly."""
+
+_LEAST_SURE: Final = 0.4
+_SURE_WRONG: Final = 0.5
+"""Range of the confidence of a word that was misheard, above the least one."""
+
+_SAID_AMONG_CHOICES: Final = 0.4
+"""Share of the errors whose spoken word is the second choice."""
+
+_NO_CHOICE: Final = 0.6
+"""Share of the correct words that have no second choice."""
+
 _CANDIDATES = 6
 """Number of candidate words for a substitution."""
 
@@ -78,9 +93,28 @@ class AsrChannel:
         Returns:
             The transcript, with at least one word unless the text is empty.
         """
+        return " ".join(word.heard for word in self._hear(text, rng, circumstances) if word.heard)
+
+    def recognise(self, text: str, rng: np.random.Generator, circumstances: float = 1.0) -> tuple[TextHypothesis, ...]:
+        """Returns the hypotheses for a text, the most probable first: that of `transcribe`, and some others.
+
+        The others have the second choices of single words: what was said, where that is among them, or a confusion of
+        it. `transcribe` returns the same words, and leaves `rng` in the same state.
+
+        Args:
+            text: spoken text.
+            rng: source of randomness; the second choices are drawn from a generator that it spawns.
+            circumstances: as for `transcribe`.
+        """
+        heard = self._hear(text, rng, circumstances)
+        (other,) = rng.spawn(1)
+        return nbest([_choices(word, other.random) for word in heard])
+
+    def _hear(self, text: str, rng: np.random.Generator, circumstances: float) -> list[_HeardWord]:
+        """Returns what was heard of each spoken word, and the insertions."""
         draw: Callable[[], float] = rng.random
         words = text.split()
-        heard: list[str] = []
+        heard: list[_HeardWord] = []
         deletions = self.deletions * self.rate
         substitutions = self.substitutions * self.rate
         insertions = (self.rate - deletions - substitutions) * self._damped(circumstances)
@@ -88,22 +122,47 @@ class AsrChannel:
         for place, word in enumerate(words):
             # dividing the number drawn multiplies the probabilities of an error
             drawn = draw() / self._damped(circumstances * weights[word_class(word)])
-            last_hope = place == len(words) - 1 and not heard
-            if drawn < deletions and not last_hope:
+            before = [number for number, each in enumerate(heard) if each.heard]
+            if drawn < deletions and not (place == len(words) - 1 and not before):
                 # Punctuation is not part of the deleted word: it moves to the previous word.
-                if heard and word[-1] in "?.," and heard[-1][-1] not in "?.,":
-                    heard[-1] += word[-1]
+                if before and word[-1] in "?.," and heard[before[-1]].heard[-1] not in "?.,":
+                    last = heard[before[-1]]
+                    heard[before[-1]] = last._replace(heard=last.heard + word[-1])
+                heard.append(_HeardWord(word, ""))
             elif drawn < deletions + substitutions:
-                heard.append(misheard(word, draw))
+                heard.append(_HeardWord(word, misheard(word, draw)))
             else:
-                heard.append(word)
+                heard.append(_HeardWord(word, word))
             if draw() < insertions:
-                heard.insert(len(heard) - 1 if heard and draw() < 0.5 else len(heard), _inserted(draw))
-        return " ".join(heard)
+                before = [number for number, each in enumerate(heard) if each.heard]
+                place_of = before[-1] if before and draw() < 0.5 else len(heard)
+                heard.insert(place_of, _HeardWord("", _inserted(draw)))
+        return heard
 
     def _damped(self, relative: float) -> float:
         """Returns a relative error rate nearer to 1 for large rates, since no word has more errors than one."""
         return 1.0 + (relative - 1.0) * (1.0 - self.rate)
+
+
+class _HeardWord(NamedTuple):
+    """Spoken word, "" where there was none, and what was heard of it, "" where nothing was."""
+
+    said: str
+    heard: str
+
+
+def _choices(word: _HeardWord, draw: Callable[[], float]) -> tuple[tuple[str, float], ...]:
+    """Returns what a recogniser takes a word for, with probabilities: what was heard, and perhaps a second choice.
+
+    Words that were recognised correctly are surer than others, but not always (Wessel et al., Confidence measures for
+    large vocabulary continuous speech recognition, IEEE Trans. SAP 9(3), 2001).
+    """
+    right = word.said == word.heard
+    sure = _SURE_RIGHT + (1.0 - _SURE_RIGHT) * draw() if right else _SURE_WRONG * draw() + _LEAST_SURE
+    second = word.said if not right and draw() < _SAID_AMONG_CHOICES else misheard(word.heard or word.said, draw)
+    if right and draw() < _NO_CHOICE:
+        return ((word.heard, 1.0),)
+    return ((word.heard, sure), (second, 1.0 - sure))
 
 
 def word_error_rate(said: Sequence[str], heard: Sequence[str]) -> float:
@@ -196,19 +255,10 @@ def _insertions() -> tuple[str, ...]:
     return strings("cues.yaml: inserted", read_data("cues.yaml").get("inserted"))
 
 
-_MARKUP = re.compile(r"^==.*$|#.*$|^<[^>]*>\s*=|[{<][^}>]*[}>]", re.MULTILINE)
-"""What is not spoken in a file of the grammar: titles of sections, comments, and names of phrases and gaps."""
-
-
-def _words_of_grammar(text: str) -> str:
-    """Returns a file of the grammar without its labels, which nobody says."""
-    return _MARKUP.sub(" ", text)
-
-
 @functools.cache
 def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
     """Returns the vocabulary of the recogniser by phonetic key: all generated words and common words like names."""
-    spoken = " ".join(map(_words_of_grammar, read_talk_files().values())).lower()
+    spoken = " ".join(map(words_of_grammar, read_talk_files().values())).lower()
     known = split_words(" ".join(strings("cues.yaml: known", read_data("cues.yaml").get("known"))))
     words = {word for word in re.findall(r"\b[a-z][a-z']+\b", spoken)} | set(known) | set(proper_words())
     found: dict[str, list[str]] = defaultdict(list)
@@ -243,8 +293,9 @@ class OpenMoves:
 class Recogniser:
     """Recogniser of the utterances of a session, with the errors of an `AsrChannel`.
 
-    Correctly recognised spans keep their act. The act of a misrecognised span is classified from the transcript, so
-    that the act does not reveal the spoken words.
+    Of several hypotheses, the one that makes most sense is the transcript; names of which the recogniser is unsure are
+    left out of it, so that the listener asks for them (`hypotheses`). Correctly recognised spans keep their act. The
+    act of a misrecognised span is classified from the transcript, so that the act does not reveal the spoken words.
     """
 
     def __init__(self, channel: AsrChannel, rng: np.random.Generator, *, classify: bool = True) -> None:
@@ -272,10 +323,13 @@ class Recogniser:
         circumstances = measured_errors().circumstances(utterance.speaker, noise)
         spans = []
         for place, span in enumerate(utterance.spans):
-            text = self._channel.transcribe(span.text, self._rng, circumstances)
-            act = span.act
+            asked = after if place == 0 else None
+            hypotheses = self._channel.recognise(span.text, self._rng, circumstances)
+            text, act = span.text, span.act
+            if any(each.text != text for each in hypotheses):
+                text = with_unsure_names(read_hypotheses(hypotheses, asked))
             if not same_words(text, span.text):
-                act = guess_act(text, after if place == 0 else None) if self._classify else UNCLASSIFIED
+                act = guess_act(text, asked) if self._classify else UNCLASSIFIED
             spans.append(Span(text, act))
         self._open.note(utterance)
         return replace(utterance, spans=tuple(spans))

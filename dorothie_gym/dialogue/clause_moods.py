@@ -31,6 +31,12 @@ _SUBJECT_WORDS: Final = 6
 _MODALS: Final = frozenset({"could", "can", "would", "will"})
 _NO_SUBJECTS: Final = frozenset({"let's", "here's", "that's", "it's", "there's", "what's", "hour's"})
 _SUBORDINATING: Final = frozenset({"where", "when", "what", "which", "how"})
+_ENOUGH: Final = frozenset({"plenty", "enough", "ample", "tops", "max", "maximum", "sufficient"})
+"""Words by which a statement about a speed sets it: "thirty miles an hour is plenty"."""
+
+_IMPERATIVES: Final = frozenset({"actions", "verbs", "lights"})
+"""Groups of the grammar with which an order begins."""
+
 _RELATIVE: Final = (["i"], ["we"], ["you"], ["that"], ["who"])
 _ORDERING: Final = frozenset({"actions", "verbs", "lights", "relations", "negations"})
 """Groups of the grammar before which a finite verb must stand to make a statement."""
@@ -72,11 +78,21 @@ class ClauseReader:
             return ClauseMood.REQUEST  # "from the KFC on, could you go slow?"
         if new:
             return ClauseMood.QUESTION if self.question and "," not in self.words[place:] else ClauseMood.COMMAND
+        if before is ClauseMood.QUESTION and not self.question and self._begins_order(place):
+            return ClauseMood.COMMAND  # "do you know the KFC, take us there"
         if before is not ClauseMood.STATEMENT:
             return ClauseMood.QUESTION if before is ClauseMood.QUESTION else ClauseMood.COMMAND
         word = self.words[place] if place < len(self.words) else ""
         past = word.endswith("ed") and word not in _BASE_FORMS
         return ClauseMood.STATEMENT if past or is_participle(word) or self._names_only(place) else ClauseMood.COMMAND
+
+    def _begins_order(self, place: int) -> bool:
+        """Returns whether an imperative stands behind a comma."""
+        place = self._behind_soft(place)
+        if place >= len(self.words) or self.words[place - 1] != ",":
+            return False
+        match = route_grammar().terminals.longest(self.words, place)
+        return match is not None and match.group in _IMPERATIVES
 
     def _behind_soft(self, place: int) -> int:
         """Returns the place behind words that only open a clause: "look, the Panera's on your left"."""
@@ -117,7 +133,7 @@ class ClauseReader:
             if word == "," or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
                 return False
             if self._is_finite(number, place):
-                return True
+                return _ENOUGH.isdisjoint(words[number + 1 : number + 3])
             if word.startswith("#") and words[number + 1 : number + 2] in _RELATIVE:
                 return True  # "the person I have to meet is on Beal"
             match = grammar.terminals.longest(words, number)

@@ -7,21 +7,23 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
+from dorothie_gym.dialogue.formulas import formula_move, formula_moves
 from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, split_words, strings
 from dorothie_gym.dialogue.move_decision import (
     belong_together,
     decide,
-    formula_move,
-    formula_moves,
     in_context,
     joined,
     sign_of_hearing,
     stand_apart,
 )
 from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.dialogue.routes import StepAction
+from dorothie_gym.dialogue.signs import behind_signs
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
@@ -108,8 +110,21 @@ _OVERRULED = frozenset(
 )
 """Moves of the cues that give way to a formula, besides those that formulas have."""
 
+_OF_SIGNS = frozenset(
+    {
+        DialogueMove.ACKNOWLEDGE,
+        DialogueMove.IRRELEVANT,
+        DialogueMove.REPLY_N,
+        DialogueMove.REPLY_Y,
+    }
+)
+"""Moves of interjections, apologies and answers."""
+
 _SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_Y})
 """Moves whose formulas ask with a question mark."""
+
+_IN_FAVOUR = re.compile(r"\b(instead|rather than|not)\b")
+"""Words by which one errand takes the place of another."""
 
 _ROADS = frozenset({"lane", "lanes", "road", "junction", "traffic", "jam", "turning"})
 """Words that no small talk holds."""
@@ -169,9 +184,14 @@ def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
 
 def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct:
     """Returns the dialogue act of a parsed text; see `guess_act`."""
-    formula = formula_move(_plain_words(parsed.text))
+    words = _plain_words(parsed.text)
+    formula = formula_move(words)
     if parsed.question and formula in _SIGNS:
         formula = None  # "got it?"
+    goes_on = formula is DialogueMove.REPLY_Y and after is None
+    corrects = formula is DialogueMove.REPLY_N and after in (DialogueMove.EXPLAIN, DialogueMove.CONFIRM)
+    if (goes_on or corrects) and parsed.plan.steps:
+        formula = None  # "go on then"; "no, right"
     if after is None and parsed.masked.strip(" ,") in _HUMS:
         formula = DialogueMove.REPLY_Y
     move = _move_of(parsed)
@@ -179,6 +199,7 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
         move = formula
     elif formula is None:
         move = decide(parsed, move, after)
+        move = _behind_signs(parsed, move, after)
     if move is DialogueMove.INSTRUCT and GoalStatus.COMPLETE in parsed.statuses and parsed.masked.startswith("#status"):
         move = DialogueMove.EXPLAIN  # "skip the Ikea" is a command, "made it to the Ikea" a statement
     elif move is DialogueMove.EXPLAIN and _is_bare_place(parsed):
@@ -191,6 +212,15 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
     if sign_of_hearing(parsed, move, after):
         move = DialogueMove.ACKNOWLEDGE
     return DialogueAct(move, _slots(parsed, move))
+
+
+def _behind_signs(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
+    """Returns the move of what follows the signs at the beginning of a text; `move` if that tells nothing more."""
+    rest = behind_signs(parsed.text, after) if move in _OF_SIGNS else ""
+    if not rest:
+        return move
+    found = act_of(understand(rest), after).move
+    return move if found in _OF_SIGNS else found
 
 
 def _plain_words(text: str) -> list[str]:
@@ -254,10 +284,13 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
             values.discard(ActionValue.LANE_FOLLOW)  # "don't turn" names a turn
         elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
             values -= set(parsed.denied)  # "don't turn, keep going"
+    implied = parsed.parse is not None and StepAction.STOP in parsed.parse.implied
+    if implied and move is DialogueMove.REPLY_W and not parsed.objects:
+        values.discard(ActionValue.STOP)  # "on the left": a side, where the question has named the action
     if move is DialogueMove.INSTRUCT and not parsed.landmarks:
         values.discard(GoalStatus.COMPLETE)  # "right, then left, done"
     # One goal is abandoned in favour of another.
-    if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1:
+    if GoalStatus.ABANDONED in values and len(parsed.landmarks) > 1 and _IN_FAVOUR.search(parsed.text.lower()):
         values.add(GoalStatus.ONGOING)
     return frozenset(values)
 
@@ -273,9 +306,13 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     Returns:
         Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
-    segments = [segment for sentence in _SENTENCE_END.split(text.strip()) for segment in _segments(sentence)]
+    broken = with_breaks(text.strip(), answering=after is not None)
+    segments = [segment for sentence in _SENTENCE_END.split(broken) for segment in _segments(sentence)]
     spans: list[Span] = []
-    for segment, core in joined([segment for segment in segments if segment], after):
+    words, place = text.split(), 0
+    for marked, core in joined([segment for segment in segments if segment], after):
+        begin, place = place, place + len(marked.split())
+        segment = " ".join(words[begin:place])
         act = guess_act(core, after if not spans else None)
         spans.append(Span(segment, in_context(act, understand(core), [span.act.move for span in spans], after)))
     return tuple(spans)
@@ -323,6 +360,8 @@ def _is_boundary(head: str, rest: str) -> bool:
         return first.move in _BEFORE_QUESTIONS and _STARTS_QUESTION.match(rest.lower()) is not None
     if second.move is DialogueMove.EXPLAIN:
         return _starts_statement(head, rest, first, second)
+    if second.move is DialogueMove.REPLY_W and first.move in (DialogueMove.REPLY_N, DialogueMove.REPLY_Y):
+        return not first.slots and not second.slots - {ActionValue.J_TURN} and bool(second.slots)  # "nope, right"
     return False
 
 

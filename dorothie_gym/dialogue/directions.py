@@ -27,6 +27,9 @@ _SAYS = frozenset({"it's", "that's"})
 _ENDS = frozenset({"", ",", "then", "and", "at", "again"})
 """Words behind "it's left" where it is a direction."""
 
+_SIDED = frozenset({"lane", "hand", "turning", "side", "kerb", "curb"})
+"""Words behind "right" that make it a direction wherever it stands: "to that right lane"."""
+
 _LISTED = frozenset({"left", "right", "lefts", "rights"})
 """Words of which "right, then ..." needs one to begin a list of turns."""
 
@@ -97,12 +100,21 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
             masked[place] = "right" if listed else _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):
             masked[place] = "#left"
+        elif word == "left" and (list(words[place + 1 : place + 3]) == ["to", "do"] or _remains(words, place)):
+            masked[place] = "#left"
         elif word == "straight" and after == "away":
             masked[place] = "#ok"
     return masked
 
 
+def _remains(words: Sequence[str], place: int) -> bool:
+    """Returns whether something is left over: "there's still the KFC left"."""
+    return place == len(words) - 1 and "still" in words[:place]
+
+
 def _right(before: str, after: str, following: str, place: int, lists: WordLists) -> str:
+    if after in _SIDED and following != "?":
+        return "right"
     if after == "?" and place > 0 and (before == "," or before not in lists.turning):
         return "#tag"
     if before in lists.right_not_after or after in lists.right_never_before or (place == 0 and after == ","):

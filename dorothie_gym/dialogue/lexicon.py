@@ -72,9 +72,11 @@ _CONTRACTED = {
     "youre": ("you're",), "theyre": ("they're",), "ive": ("i've",), "youve": ("you've",), "weve": ("we've",),
     "couldnt": ("couldn't",), "wouldnt": ("wouldn't",), "shouldnt": ("shouldn't",), "arent": ("aren't",),
     "wasnt": ("wasn't",), "havent": ("haven't",), "hasnt": ("hasn't",), "lets": ("let's",), "hes": ("he's",),
-    "shes": ("she's",),
+    "shes": ("she's",), "d'you": ("do", "you"), "d'ya": ("do", "you"),
 }  # fmt: skip
 """Contractions and words without apostrophe, as typed by people and emitted by speech recognisers."""
+_APOSTROPHES = str.maketrans({"\u2019": "'", "\u2018": "'"})
+_EDGES = '.,;:!?\u2014\u2013\u2026"()-'
 _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
 _WORD = re.compile(r"[a-z0-9']+|\?|,")
 
@@ -89,6 +91,13 @@ def split_words(text: str) -> list[str]:
     if _CONTRACTED.keys().isdisjoint(words):
         return words
     return [part for word in words for part in _CONTRACTED.get(word, (word,))]
+
+
+def plain_word(word: str) -> str:
+    """Returns a word of a text in lower case, without marks around it and with its apostrophes restored."""
+    word = word.lower().translate(_APOSTROPHES).strip(_EDGES)
+    spelt = _CONTRACTED.get(word)
+    return spelt[0] if spelt is not None and len(spelt) == 1 else word
 
 
 def read_data(name: str) -> YamlMapping:

@@ -6,29 +6,27 @@ them, the cues of `dialogue_act_classifier` do.
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
-from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
+from dorothie_gym.dialogue.formulas import OPENING_YES, first_answer, formula_move, leading_answer
+from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_reading import read_plan
-from dorothie_gym.dialogue.route_grammar import PhraseIndex, route_grammar
+from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import StepAction
-from dorothie_gym.errors import PhraseFileError
+from dorothie_gym.dialogue.signs import is_mere_sign
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus
-from dorothie_gym.ontology.spellings import parse_move
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
 
-_FILLER: Final = "Filler"
-_DECIDING: Final = frozenset({DialogueMove.CONFUSE.label, DialogueMove.CONFIRM.label})
-"""Moves whose formulas decide for others beside them: "okay, will do"."""
+_SHORT_NO: Final = 8
+"""Letters of a "not yet" that answers."""
 
 _SHORT: Final = 4
 """Words of an utterance that can be a mere sign of hearing."""
@@ -39,6 +37,8 @@ _NEWS: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.CONFIRM, DialogueMo
 _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 """Moves that the cues give to an order of unknown form."""
 
+_COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
+_WHAT_TO_DO: Final = ("what you", "what we", "okay so what you", "so what you", "right so what you", "all you")
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
 _OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
 """Words by which the car offers what it asks: "would you like me to turn?"."""
@@ -50,7 +50,40 @@ _NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
 _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
-_OTHER: Final = ("other way", "the other way ,", "wrong way", "not that", "not this", "not the")
+_OTHER: Final = (
+    "other side",
+    "the other side",
+    "the one after",
+    "the one before",
+    "the other one",
+    "other kerb",
+    "wrong side",
+    "after it",
+    "before it",
+    "it's the other",
+    "that's the wrong",
+    "nobody said",
+    "who said",
+    "who asked",
+    "i never",
+    "i think you mis",
+    "you misunder",
+    "you misheard",
+    "you've got the wrong",
+    "you got the wrong",
+    "you've stopped",
+    "you stopped",
+    "that was you",
+    "this isn't it",
+    "that isn't",
+    "this is not",
+    "other way",
+    "the other way ,",
+    "wrong way",
+    "not that",
+    "not this",
+    "not the",
+)
 _ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
 _MEANT: Final = (
     "i said",
@@ -62,6 +95,10 @@ _MEANT: Final = (
     "i told you",
     "that's not",
     "not what i",
+    "i told",
+    " we're after",
+    " i'm after",
+    "i never said",
 )
 _ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that yes and no answer."""
@@ -85,6 +122,9 @@ _PAST: Final = frozenset(
     }
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
+_CALLS: Final = frozenset(
+    {"oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
+)
 _REPAIRING: Final = frozenset(
     {
         "no",
@@ -111,28 +151,41 @@ _REPAIRING: Final = frozenset(
 """Words of which a correction has one; others need not be tried."""
 _FORBIDDING: Final = frozenset({"never", "don't", "dont", "please"})
 _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
-_OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
+_SUPPOSING: Final = ("isn't ", "wasn't ", "aren't ", "weren't ", "didn't ", "haven't ", "hasn't ")
+_CHOICE: Final = re.compile(
+    r"\w or (?!not\b|what\b|something|anything|so\b|did|do\b|are\b|is\b|have|should|shall|was|can\b|will\b|two\b"
+    r"|three\b)"
+)
+"""A question for one of two answers."""
+
+_STATE: Final = re.compile(
+    r"\b(?:i'm|i am|i feel|i'm feeling|we're|we are|he's|she's|they're|my \w+(?:'s| is| are| feels?)?"
+    r"|the \w+(?:'s| is| are)|kids are|baby's) (?:\w+ ){0,3}"
+    r"(?:sick|faint|dizzy|poorly|starving|freezing|boiling|asleep|sleeping|bursting"
+    r"|nervous|scared|unwell|killing me|aching|hurting|crying|late for|nauseous|carsick|exhausted)\b"
+)
+"""State of somebody in the car."""
+
+_HEARD_NAME: Final = re.compile(r"[\w #']+ , (?:the )?#(?:landmark|street)( on #street)? ?")
+_DENYING: Final = (
+    "it is not",
+    "it's not",
+    "it isn't",
+    "that isn't",
+    "that is not",
+    "that's not",
+    "we're not",
+    "i'm not",
+)
+_OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant) (?!$)")
+"""Words by which a speaker corrects, or explains, what he has just said himself."""
+
 _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
 _DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
-
-
-def formula_move(words: Sequence[str]) -> DialogueMove | None:
-    """Returns the move of words that consist of formulas only ("right, okay, thank you"); None of other words."""
-    words = [word for word in words if word != ","]
-    formulas, place = _formulas(), 0
-    found: DialogueMove | None = None
-    while place < len(words):
-        match = formulas.longest(words, place)
-        if match is None:
-            return None
-        if match.kind != _FILLER and (found is None or match.kind in _DECIDING):
-            found = parse_move(match.kind)
-        place += match.length
-    return found
 
 
 def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
@@ -146,18 +199,27 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
     parse = parsed.parse
     if parse is None:
         return move
-    answer = _first_answer(parsed) if after in _ANSWERED else None
+    answer = first_answer(parsed) or leading_answer(parsed) if after in _ANSWERED else None
     if answer is not None and move is not DialogueMove.CLARIFY:
         return answer
     if after in _NEWS and _corrects(parsed):
         return DialogueMove.CLARIFY
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
+    if after is None and _refuses(parsed, move):
+        return DialogueMove.INSTRUCT  # "not this one, the next"
     requested = ClauseMood.REQUEST in parse.moods
     ordered = bool(parse.plan.steps or parse.contingent) or bool(parse.denied and requested)
     if ordered:
         return _order(parsed, move, after, requested=requested)
     return _unordered(parsed, parse, move, after)
+
+
+def _refuses(parsed: ParsedText, move: DialogueMove) -> bool:
+    """Returns whether words with a "not" refuse something that nobody has offered in words."""
+    unnamed = move is DialogueMove.CLARIFY and not (parsed.landmarks or parsed.streets)
+    denying = move is DialogueMove.REPLY_N or unnamed
+    return denying and parsed.masked.startswith("not ") and len(parsed.masked) > _SHORT_NO
 
 
 def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
@@ -166,9 +228,13 @@ def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: 
         return DialogueMove.INSTRUCT
     if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:
         return DialogueMove.QUERY_YN  # "can we make it by six"
+    if move is DialogueMove.QUERY_YN and parsed.masked.startswith(_SUPPOSING):
+        return DialogueMove.CHECK  # "isn't that the KFC?"
+    if move is DialogueMove.QUERY_YN and _CHOICE.search(parsed.masked):
+        return DialogueMove.QUERY_W  # "on our side or across the road?"
     if move is DialogueMove.QUERY_W and not parsed.question and parsed.masked.startswith(_ALERTS):
         return DialogueMove.INSTRUCT
-    if move is DialogueMove.IRRELEVANT and parsed.told is not None:
+    if move is DialogueMove.IRRELEVANT and (parsed.told is not None or _STATE.search(parsed.masked)):
         return DialogueMove.EXPLAIN
     return _stated(parsed, parse, move, after)
 
@@ -176,7 +242,8 @@ def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: 
 def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
     """Returns the move of words that may state something."""
     words = parsed.masked.split()
-    if after in _ANSWERED and words[:1] in (["not"], ["ain't"]) and move is not DialogueMove.REPLY_U:
+    denied = parsed.masked.startswith(_DENYING) or words[:1] in (["not"], ["ain't"])
+    if after in _ANSWERED and denied and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N
     words = words[2:] if words[1:2] == [","] and words[0] in _SIGHS else words
     if words[:1] == ["i"] and words[1:2] in _FEELING and not parsed.values and words[2:3] != ["to"]:
@@ -193,9 +260,14 @@ def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: Dia
 def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *, requested: bool) -> DialogueMove:
     """Returns the move of words that order something."""
     parse = parsed.parse
+    if after in _NEWS and _HEARD_NAME.fullmatch(parsed.masked) and _acknowledges(parsed):
+        return DialogueMove.ACKNOWLEDGE  # "all right, the KFC"
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
-    named = named and parse is not None and len(parse.plan.steps) < 2
+    named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
+    alone = move is DialogueMove.REPLY_N or (move is DialogueMove.REPLY_U and requested)
+    if after is None and alone and not parsed.question and not parsed.masked.startswith(_COMMA_ANSWERS):
+        return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
     if after is None and move in _SIGNS_FIRST and _runs_on(parsed):
@@ -208,7 +280,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
         offered = offered or (mine and not all(step.action in _FOR_PASSENGERS for step in parsed.plan))
         return move if offered else DialogueMove.INSTRUCT
-    if move is DialogueMove.CHECK and not parsed.question:
+    told = move is DialogueMove.QUERY_W and parsed.masked.startswith(_WHAT_TO_DO)
+    if (move is DialogueMove.CHECK or told) and not parsed.question:
         return DialogueMove.INSTRUCT
     if (
         move is DialogueMove.REPLY_N
@@ -220,15 +293,22 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         return DialogueMove.INSTRUCT  # "sorry, left"
     if move is DialogueMove.CLARIFY and after is DialogueMove.QUERY_W:
         return DialogueMove.REPLY_W
-    if move is DialogueMove.CLARIFY and parsed.parse is not None and parsed.parse.repaired and after is None:
+    own = _OWN_REPAIR.search(parsed.masked) is not None or (parsed.parse is not None and parsed.parse.repaired)
+    if move is DialogueMove.CLARIFY and own and after is None:
         return DialogueMove.INSTRUCT
     return move
+
+
+def _acknowledges(parsed: ParsedText) -> bool:
+    """Returns whether the words before the first comma show that something was heard."""
+    words = split_words(parsed.text)
+    return "," in words and formula_move(words[: words.index(",")]) is DialogueMove.ACKNOWLEDGE
 
 
 def _runs_on(parsed: ParsedText) -> bool:
     """Returns whether no comma stands behind the yes with which an order begins."""
     words = split_words(parsed.text)
-    return len(words) > 3 and words[0] in _OPENING_YES and words[1] != ","
+    return len(words) > 3 and words[0] in OPENING_YES and words[1] != ","
 
 
 def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
@@ -242,27 +322,13 @@ def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(("no turning", "no more"))
 
 
-def _first_answer(parsed: ParsedText) -> DialogueMove | None:
-    """Returns the answer with which a span begins, before its first comma; None without any."""
-    words = _without_restart(split_words(parsed.text))
-    if "," not in words:
-        return None
-    move = formula_move(words[: words.index(",")])
-    return move if move in (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U) else None
-
-
-def _without_restart(words: list[str]) -> list[str]:
-    """Returns the words without a first word that is said twice: "I, I think so"."""
-    return words[2:] if len(words) > 2 and words[1] == "," and words[2] == words[0] else words
-
-
 def _corrects(parsed: ParsedText) -> bool:
     """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
     if parsed.question:
         return False
     if any(phrase in parsed.masked for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
         return True
-    if not (parsed.plan.steps or parsed.values):
+    if not (parsed.plan.steps or parsed.values) or parsed.masked.startswith(("no thanks", "no thank you")):
         return False
     words = parsed.masked.split()
     return not _DENIALS.isdisjoint(words[:3]) or any(phrase in parsed.masked for phrase in _MEANT)
@@ -353,6 +419,8 @@ def joined(segments: Sequence[str], after: DialogueMove | None) -> list[tuple[st
 
 def _is_noise(segment: str) -> bool:
     words = [word for word in split_words(segment) if word != ","]
+    if words and words[0] in _CALLS and is_mere_sign(segment):
+        return True  # "oh look, ..."
     return bool(words) and all(word in _HESITATIONS or word in NUMBER_WORDS for word in words)
 
 
@@ -364,21 +432,3 @@ def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> 
     corrects = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
     denial = corrects and formula_move(words) is DialogueMove.REPLY_N
     return denial and bool(rest.plan.steps or not _DENIALS.isdisjoint(split_words(following)))
-
-
-@functools.cache
-def formula_moves() -> frozenset[DialogueMove]:
-    """Returns the moves that have formulas; the cues alone tell others."""
-    return frozenset(parse_move(kind) for kind in read_data("formulas.yaml") if kind != _FILLER)
-
-
-@functools.cache
-def _formulas() -> PhraseIndex:
-    rows = []
-    for kind, phrases in read_data("formulas.yaml").items():
-        if kind != _FILLER:
-            parse_move(kind)
-        rows += [("formulas", kind, text) for text in strings(f"formulas.yaml: {kind}", phrases)]
-    if not rows:
-        raise PhraseFileError("formulas.yaml: lists no phrases")
-    return PhraseIndex(rows, adverbs=False)

@@ -8,9 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
+from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
+from dorothie_gym.dialogue.named_values import meant_values
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, may_be_speed, read_cardinals
 from dorothie_gym.dialogue.plan_fields import named_actions, planned_change, planned_number, planned_turns
 from dorothie_gym.dialogue.plan_parser import PlanParse
@@ -85,8 +87,6 @@ _SPEED_STEMS = frozenset(
 )
 _LIGHT_STEMS = frozenset({"ligh", "beam", "head", "lamp"})
 _ORDER_WORDS = frozenset({"before", "after"})
-_VAGUE = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quick|important|like)\b")
-_TICKED = re.compile(r"\b(tick|check) (?:\w+ ){0,4}off\b")
 _PAST = frozenset({"past", "behind", "beyond"})
 _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
@@ -191,7 +191,9 @@ def understand(text: str) -> ParsedText:
     """
     lists = word_lists()
     parse = read_plan(text)
-    said = without_asides(with_plain_lights(without_vocative(split_words(text), lists)), lists, machines=True)
+    said = without_asides(
+        with_plain_lights(without_vocative(split_words(with_breaks(text)), lists)), lists, machines=True
+    )
     spoken = " ".join(said)
     mentions, words = find_names(said)
     words = mask_directions(words, lists)
@@ -204,7 +206,7 @@ def understand(text: str) -> ParsedText:
     acted, actions, denied = _actions(masked, stems)
     actions = named_actions(actions, parse)
     named = _distinct([*(mention.value for mention in mentions), *_queried_values(masked, words)])
-    named = _meant(named, actions, parse, spoken)
+    named = meant_values(named, actions, parse, spoken)
     landmarks = [mention for mention in mentions if isinstance(mention.value, LandmarkName)]
     turns = planned_turns(find_turns(words, lists), parse)
     return ParsedText(
@@ -237,26 +239,6 @@ def understand(text: str) -> ParsedText:
         plan=parse.plan,
         parse=parse,
     )
-
-
-def _meant(
-    named: Sequence[SlotValue], actions: Sequence[ActionValue], parse: PlanParse, joined: str
-) -> list[SlotValue]:
-    """Returns the values that the words name, with somebody who is to be fetched, and without withdrawn orders."""
-    found: list[SlotValue] = [
-        value for value in named if value is not ObjectClass.UNLABELED or not _VAGUE.search(joined)
-    ]
-    if parse.person:
-        found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
-        found.append(LandmarkName.PERSON)
-    if parse.cancelled and _TICKED.search(joined):
-        found = [GoalStatus.COMPLETE, *(value for value in found if value is not GoalStatus.ABANDONED)]
-    if parse.cancelled and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
-        found.append(GoalStatus.ABANDONED)  # "drop the KFC"
-    driving = bool(actions) or any(isinstance(value, StreetName) for value in found)
-    if parse.repaired or (driving and not any(isinstance(value, LandmarkName) for value in found)):
-        found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, Bishop"
-    return found
 
 
 def _stated(text: str) -> str:

@@ -46,14 +46,14 @@ def named_actions(actions: Sequence[ActionValue], parse: PlanParse) -> tuple[Act
         parse: steps of the text.
     """
     steps = [step.action for step in parse.plan]
-    asked = {*steps, *parse.denied} - set(parse.implied)
+    asked = {*steps, *parse.denied} - (set(parse.implied) - {StepAction.STOP})
     read = {ACTION_VALUES[action] for action in asked if action in ACTION_VALUES}
     if ActionValue.U_TURN in read and ActionValue.J_TURN in actions and ActionValue.U_TURN not in actions:
         read = (read - {ActionValue.U_TURN}) | {ActionValue.J_TURN}  # "turn back at the junction"
     if any(step.change in _OPPOSITES for step in parse.plan):
         read |= {ActionValue.SPEED_CHANGE}  # "turn left slowly"
     turns = ActionValue.J_TURN in read or any(step.action is StepAction.TURN for step in parse.described)
-    found = set(actions)
+    found = set(actions) - (set() if parse.turned else {ActionValue.J_TURN})
     only = bool(steps) and ORDERED.issuperset(parse.moods) and not {StepAction.FOLLOW, StepAction.STRAIGHT} & set(steps)
     if not turns and (only or parse.aside or ActionValue.LANE_SWITCH in read):
         found.discard(ActionValue.J_TURN)

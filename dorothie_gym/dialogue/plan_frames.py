@@ -40,6 +40,7 @@ _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP
 
 _NEXT_JUNCTION: Final = PlaceReference(ordinal=1)
 _MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
+_STARTING: Final = frozenset({"go", "move", "drive"})
 _PREPOSITIONS: Final = frozenset({"down", "along", "via", "up", "by"})
 
 
@@ -55,6 +56,7 @@ class Frame:
         forbidden: whether it is forbidden: "don't turn".
         verb: verb without a meaning of its own, "take".
         word: first word of its action.
+        last: last word of its action.
         bare_number: number without a unit.
         bare: whether it is a name without a verb.
         borrowed: whether its condition comes from the clause before.
@@ -83,9 +85,16 @@ class Frame:
     borrowed: bool = False
     ends: bool = False
     word: str = ""
+    last: str = ""
     deferred: bool = False
     implied: bool = False
     contingent: bool = False
+
+    @property
+    def starts(self) -> bool:
+        """Whether a verb of moving off stands alone, or with what it waits for: "go until the lights let you"."""
+        waits = self.relation is ConditionRelation.UNTIL or (self.ends and self.at is None)
+        return self.action is None and self.verb in _STARTING and self.place is None and waits
 
     def step(self) -> PlanStep | None:
         """Returns the finished step; None without an action or with parts that do not fit together."""
@@ -119,6 +128,7 @@ class PlanState:
         self.frames: list[Frame] = []
         self.frame: Frame | None = None
         self.pending = Frame()  # parts that wait for their step
+        self.begun = 0  # number of steps before the sentence
         self.moods: list[ClauseMood] = []
         self.mood = ClauseMood.COMMAND
         self.fresh = True  # whether a boundary stands behind the last item
@@ -143,6 +153,8 @@ class PlanState:
         """Gives a step whose clause has ended the action that its parts tell."""
         if frame.action is None and frame.verb == "go" and frame.ends:
             frame.action = StepAction.GO
+        if frame.negated and frame.forbidden and (frame.action is StepAction.GO or frame.starts):
+            frame.action, frame.negated = StepAction.WAIT, False  # "don't go until the lights let you"
         if frame.action is StepAction.GO and (frame.distance is not None or frame.relation is ConditionRelation.UNTIL):
             frame.action = StepAction.STRAIGHT  # "drive on until you see the KFC"
         vague = frame.direction is None and frame.ordinal is None and frame.at is None and frame.distance is None
@@ -251,14 +263,30 @@ class PlanState:
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
-        first = _errand_before(frame)
-        if first is not None:
+        other, relation = _other_errand(frame), frame.relation
+        if other is not None:
             frame.relation = frame.at = None
-        step = frame.step()
-        return [other for other in (first, step) if other is not None]
+        steps = (frame.step(), other) if relation is ConditionRelation.BEFORE else (other, frame.step())
+        return [step for step in steps if step is not None]
+
+    def _avoids(self, frame: Frame) -> bool:
+        """Makes a place that must not be passed one to avoid: "don't go over the bridge"; returns whether it did."""
+        passed = (
+            frame.action is StepAction.STRAIGHT and frame.relation is ConditionRelation.PAST and frame.at is not None
+        )
+        street = frame.at is not None and frame.at.to_json().keys() == {"street"}
+        turned = frame.action is StepAction.TURN and frame.direction is None and street
+        alone = sum(other.action is not None for other in self.frames) == 1
+        if not frame.forbidden or frame.at is None or not (turned or (passed and alone)):
+            return False
+        self.denied |= {StepAction.TURN} if turned else set()
+        frame.action, frame.place, frame.at = StepAction.AVOID, frame.at, None
+        return True
 
     def _negate_step(self, frame: Frame) -> bool:
         """Negates a step, such as a forbidden street to one to avoid; returns whether a step is left."""
+        if self._avoids(frame):
+            return True
         self.denied |= {frame.action} if frame.action is not None else set()
         if frame.action is StepAction.STOP and frame.at is not None and frame.at.reference is None:
             frame.at = None  # "never stop on a bridge" says nothing of where to go on
@@ -280,16 +308,23 @@ class PlanState:
         return frame.action in (StepAction.SPEED, StepAction.LIGHTS)
 
 
-def _errand_before(frame: Frame) -> PlanStep | None:
-    """Returns the errand that comes before another one, and takes it out of it: "after the KFC we do the Shell"."""
-    waits = frame.action is StepAction.VISIT and frame.borrowed and frame.relation is ConditionRelation.AFTER
+def _other_errand(frame: Frame) -> PlanStep | None:
+    """Returns the errand that comes before or after another one: "after the KFC we do the Shell"."""
+    ordering = frame.relation in (ConditionRelation.AFTER, ConditionRelation.BEFORE)
+    waits = frame.action is StepAction.VISIT and frame.borrowed and ordering
     if not waits or frame.at is None or frame.at.landmark is None or frame.place is None:
         return None
     return PlanStep(action=StepAction.VISIT, place=frame.at)
 
 
-def append_step(steps: list[PlanStep], step: PlanStep) -> None:
-    """Adds a step, unless it only says the last one again; with more detail it replaces that one."""
+def append_step(steps: list[PlanStep], step: PlanStep, *, named: bool = False) -> None:
+    """Adds a step, unless it only says the last one again; with more detail it replaces that one.
+
+    Args:
+        steps: the steps so far.
+        step: the step.
+        named: whether a verb names its action, so that a turn is no mere side of a lane.
+    """
     if steps and {steps[-1].action, step.action} == {StepAction.SPEED}:
         speed, change = steps[-1].speed or step.speed, steps[-1].change or step.change
         told = (steps[-1].speed is None or step.speed is None) and steps[-1].change in (
@@ -299,7 +334,7 @@ def append_step(steps: list[PlanStep], step: PlanStep) -> None:
         if told and steps[-1].condition is None and step.condition is None:
             steps[-1] = PlanStep(action=StepAction.SPEED, speed=speed, change=change)
             return
-    if steps and _is_side_of_lane(steps[-1], step):
+    if steps and not named and _is_side_of_lane(steps[-1], step):
         steps[-1] = step if step.action is StepAction.LANE else steps[-1]
         return
     if steps and steps[-1].action is step.action and step.action is not StepAction.TURN:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals, read_ordinal
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.route_grammar import RouteGrammar
+    from dorothie_gym.ontology.slots import SlotValue
 
 
 class ActionItem(NamedTuple):
@@ -38,9 +44,10 @@ class LaneItem(NamedTuple):
 
 
 class SideItem(NamedTuple):
-    """Side of the street or of the car."""
+    """Side of the street or of the car; `stated` says whether a statement tells it: "the house is on the left"."""
 
     direction: Direction
+    stated: bool = False
 
 
 class ConditionItem(NamedTuple):
@@ -126,3 +133,41 @@ Item: TypeAlias = (
     | UnitItem
     | WordItem
 )
+
+
+SIDES: Final[Mapping[str, Direction]] = {
+    "left": Direction.LEFT,
+    "right": Direction.RIGHT,
+    "leftwards": Direction.LEFT,
+    "rightwards": Direction.RIGHT,
+    "lefts": Direction.LEFT,
+    "rights": Direction.RIGHT,
+}
+"""Directions by their words."""
+
+
+class TokenReader:
+    """Tokens of a sentence, with the items found so far."""
+
+    def __init__(
+        self, words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str], grammar: RouteGrammar
+    ) -> None:
+        """Begins with the tokens, the names and first words of `read_items`, and the grammar."""
+        self.words, self.names, self.lead, self.grammar = words, names, lead, grammar
+        self.items: list[Item] = []
+
+    def word_at(self, place: int) -> str:
+        """Returns the token at a place; "" where there is none."""
+        return self.words[place] if 0 <= place < len(self.words) else ""
+
+    def ordinal(self, place: int) -> tuple[int | None, int]:
+        """Returns an ordinal or a small count, and the place behind it."""
+        start = place
+        while self.word_at(place) in self.grammar.determiners or self.word_at(place) == "very":
+            place += 1
+        word = self.word_at(place).removesuffix("'s")
+        number = read_ordinal(word)
+        if number is None and (word in NUMBER_WORDS or word[:1].isdigit()):
+            counts = read_cardinals([word])
+            number = counts[0] if counts and 2 <= counts[0] <= 9 else None
+        return (None, start) if number is None else (number, place + 1)

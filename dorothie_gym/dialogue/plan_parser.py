@@ -72,6 +72,7 @@ class PlanParse:
         cancelled: whether errands are given up.
         conditional: whether there is a condition of the world.
         bare: whether the steps of the plan are names without a verb.
+        turned: whether left and right, if there are any, name turns, rather than lanes and sides only.
         forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
     """
 
@@ -89,9 +90,11 @@ class PlanParse:
     conditional: bool = False
     cancelled: bool = False
     bare: bool = False
+    turned: bool = False
 
 
 _ACTIONS: Final = {
+    "after_that": StepAction.VISIT,
     "faster": StepAction.SPEED,
     "slower": StepAction.SPEED,
     "leave": StepAction.TURN,
@@ -110,6 +113,12 @@ _AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
 _DEGREES: Final = frozenset({"too", "less"})
 _HERE: Final = frozenset({"here", "here's"})
 _IT: Final = frozenset({"it", "that", "them", "those"})
+_TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "straight"})
+_WAYS: Final = frozenset({"to", "down", "up", "on", "over", "along", "straight"})
+_PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
+_FEW: Final = 6
+"""Words of a sentence that names nothing but a place to pass."""
+_WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
 _PAST: Final = frozenset({"shut", "went", "got", "closed", "ran", "came", "has", "looks"})
 
 
@@ -131,7 +140,9 @@ class _Builder(TurnReader, PlaceReader):
     def __init__(self) -> None:
         super().__init__()
         self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
-        self.begun = 0  # number of steps before the sentence
+        self.last_speed: int | None = None  # speed named last [km/h]
+        self.turned = False  # whether anything names a turn
+        self.sided = False  # whether anything names a lane or a side
         self._rules: dict[type, Callable[[Any], None]] = {
             ActionItem: self._action,
             VerbItem: self._verb,
@@ -157,8 +168,11 @@ class _Builder(TurnReader, PlaceReader):
         self.begun = len(self.frames)
         self.negation, self.correcting, self.contingent = None, False, False
         self._clause(0, new=True)
+        self.turned = self.turned or not _TURNS.isdisjoint(sentence.clauses.words)
         for item in sentence.items:
             counted = self.counting
+            self.turned = self.turned or isinstance(item, TurnItem)
+            self.sided = self.sided or isinstance(item, SideItem | LaneItem)
             self._rules[type(item)](item)
             self.counting = self.counting and not counted
 
@@ -187,7 +201,8 @@ class _Builder(TurnReader, PlaceReader):
             for step in self.steps_of(frame):
                 described.append(step)
                 if frame.mood in ORDERED:
-                    append_step(contingent if frame.contingent else ordered, step)
+                    named = bool(frame.word) and step.action is StepAction.TURN
+                    append_step(contingent if frame.contingent else ordered, step, named=named)
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
             described=tuple(described),
@@ -201,16 +216,26 @@ class _Builder(TurnReader, PlaceReader):
             waiting=waiting,
             person=self.person,
             forbidding=self.forbidding,
+            turned=self.turned or not self.sided,
             bare=all(frame.bare for frame in self.frames if frame.action is not None and frame.mood in ORDERED),
             implied=frozenset(frame.action for frame in self.frames if frame.implied and frame.action is not None),
         )
 
     def _drop_interjection(self) -> None:
         """Takes back a "wait" that only opens what is asked or ordered: "hang on, can you see the bridge?"."""
+        acting = [frame for frame in self.frames if frame.action is not None]
+        waits = [frame for frame in acting if frame.action is StepAction.WAIT and frame.ends and frame.at is None]
+        if self.repaired and len(acting) > len(waits):
+            for frame in waits:
+                frame.action = None  # "to the KFC, hang on, make that the Ikea"
         first = self.frames[0] if self.frames else None
         if first is None or first.action is not StepAction.WAIT or first.at is not None or not first.ends:
             return
-        if ClauseMood.QUESTION in self.moods or any(frame.action is not None for frame in self.frames[1:]):
+        if (
+            self.repaired
+            or ClauseMood.QUESTION in self.moods
+            or any(frame.action is not None for frame in self.frames[1:])
+        ):
             first.action = None
 
     def _leftovers(self) -> None:
@@ -219,9 +244,12 @@ class _Builder(TurnReader, PlaceReader):
         if self.pending.ordinal is not None and acting and acting[-1].action is StepAction.TURN and acting[-1].negated:
             self.open_step(StepAction.TURN)  # "not the next right, the third"
             return
-        if acting or not ORDERED.issuperset(self.moods):
+        sided = self.pending.side is not None and self.moods[:1] != [ClauseMood.STATEMENT]
+        told = sided and ClauseMood.QUESTION not in self.moods  # "left side please, he's asleep"
+        if acting or not (told or ORDERED.issuperset(self.moods)):
             return
-        if self.pending.ordinal is not None and self.negation is None and len(self.moods) > 1:
+        short = self.opportunity and len(self.clauses.words) <= _FEW  # "second exit at the roundabout"
+        if self.pending.ordinal is not None and self.negation is None and (len(self.moods) > 1 or short):
             self.open_step(StepAction.TURN)
         elif (
             self.pending.side is not None
@@ -230,13 +258,35 @@ class _Builder(TurnReader, PlaceReader):
         ):
             self.open_step(StepAction.TURN).direction = self.pending.side  # "on the left", of the ways
             self.aside = False
-        elif self.pending.side is not None:
+        elif self.pending.side is not None and (self.opportunity or self._on_street()):
+            side, self.pending.side, self.aside = self.pending.side, None, False
+            turn = self.open_step(StepAction.TURN)  # "the turning we want is there on the left"
+            turn.direction = side
+        elif self.pending.side is not None and _WARNING.isdisjoint(self.clauses.words[:1]):
             self.open_step(StepAction.STOP).implied = True
         elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
             self.open_step(StepAction.SPEED)
+        elif self.pending.at and self.pending.relation in _PASSED and len(self.clauses.words) <= _FEW:
+            self._go_past(self.pending.at)
         elif self.pending.relation is ConditionRelation.AT and self.pending.at and self.pending.at.landmark:
             place, self.pending.at = self.pending.at, None
             self.open_step(StepAction.VISIT).place = place
+
+    def _on_street(self) -> bool:
+        """Returns whether only a street has been named: "Draper, on the right hand"."""
+        last = self.last_place
+        if last is None or last.to_json().keys() != {"street"}:
+            return False
+        self.pending.relation, self.pending.at = ConditionRelation.AT, last
+        return True
+
+    def _go_past(self, place: PlaceReference) -> None:
+        """Orders to go on past a place, or along a street: "straight past the KFC", "by Hubbard"."""
+        if place.to_json().keys() == {"street"}:
+            self.pending.at = None
+            self.open_step(StepAction.FOLLOW).place = place
+        else:
+            self.open_step(StepAction.STRAIGHT)
 
     def _boundary(self, item: BoundaryItem) -> None:
         self.fresh = True
@@ -281,6 +331,8 @@ class _Builder(TurnReader, PlaceReader):
         if item.kind in ("accept", "defer"):
             (self._accept if item.kind == "accept" else self._defer)()
             return
+        if item.kind == "after_that":
+            self._defer()
         action = _ACTIONS.get(item.kind) or StepAction(item.kind)
         change = _CHANGES.get(item.kind)
         if action is StepAction.GO and not self._ends(item.end):
@@ -289,25 +341,47 @@ class _Builder(TurnReader, PlaceReader):
         if action is StepAction.SPEED and change is not None:
             self._change(change, item)
             return
+        named = self.frame is not None and self.frame.bare and not self.fresh
+        if self._goes_on_to(action, item) or (action is StepAction.GO and named):
+            return
         if self.repairing:
             self.drop_last()
         frame = self.frame
         if frame is None or self._is_complete(frame, action):
             frame = self.open_step(action)
         elif frame.action in NEEDING_PLACE and action is StepAction.FOLLOW and self.negation is None:
-            action = frame.action or action
-        frame.action, frame.word = action, self.clauses.words[item.place]
+            action = frame.action if frame.action is not None and frame.word != "to" else action
+        self._begin(frame, action, item)
+
+    def _begin(self, frame: Frame, action: StepAction, item: ActionItem) -> None:
+        """Gives a step its action, with what the words of the action tell beside it."""
+        frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
-        if action is StepAction.STOP and frame.at is None and not _HERE.isdisjoint(said):
+        here = not _HERE.isdisjoint(said) or said[0] in ("this", "this'll")
+        if action is StepAction.STOP and frame.at is None and here:
             frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
         if self.negation in NEGATING:
             frame.negated, frame.forbidden = True, self.negation == "forbid"
-        if change is not None:
-            frame.change = change
+        frame.change = _CHANGES.get(item.kind, frame.change)
+        if action is StepAction.SPEED and said[-1] in _IT and frame.speed is None:
+            frame.speed = self.last_speed
         if item.kind == "leave":
             frame.verb, frame.implied = "leave", True
         frame.ends = self._ends(item.end)
+
+    def _goes_on_to(self, action: StepAction, item: ActionItem) -> bool:
+        """Returns whether an action only tells how far a street is followed: "take Fuller (all the way) down to"."""
+        frame, words = self.frame, self.clauses.words
+        if frame is None or self.fresh or frame.action is not StepAction.FOLLOW or frame.place is None:
+            return False
+        following = words[item.end] if item.end < len(words) else ""
+        if following in ("get", "reach", "go", "avoid", "be"):
+            return False
+        if action is StepAction.VISIT and words[item.end - 1] == "to" and words[item.place] in _WAYS:
+            self.reaching = frame
+            return True
+        return words[item.place] in ("all", "down", "up") and action in (StepAction.STRAIGHT, StepAction.FOLLOW)
 
     def _ends(self, place: int) -> bool:
         """Returns whether the clause ends at a token, apart from "now" and the like."""
@@ -318,6 +392,8 @@ class _Builder(TurnReader, PlaceReader):
         """Returns whether another action begins a step of its own behind the current one."""
         if self.fresh:
             return True
+        if frame.action is None and frame.verb and frame.relation is ConditionRelation.UNTIL:
+            return action is not StepAction.STOP  # "go until the KFC turn left"
         if frame.action in (StepAction.GO, StepAction.U_TURN) and action is StepAction.VISIT:
             return False  # "let's go to the KFC"
         if frame.action is StepAction.STRAIGHT and action is StepAction.FOLLOW:
@@ -389,6 +465,9 @@ class _Builder(TurnReader, PlaceReader):
         if frame is not None and speeding and item.word == "less":  # "ten miles an hour less"
             frame.speed, frame.change = None, StepChange.SLOWER
             return
+        if frame is not None and speeding and item.word == "it" and frame.speed is None and frame.change is None:
+            frame.speed = self.last_speed  # "the limit is thirty, stick to it"
+            return
         if frame is not None and frame.word in ("cross", "pass") and item.word in _IT and not self.fresh:
             if self.last_place is not None and frame.at is None:
                 frame.relation, frame.at = ConditionRelation.PAST, self.last_place
@@ -404,6 +483,7 @@ class _Builder(TurnReader, PlaceReader):
                 frame.mood, frame.bare = ClauseMood.STATEMENT, False
 
     def _speed(self, item: SpeedItem) -> None:
+        self.last_speed = item.speed
         frame = self.replaced(StepAction.SPEED)
         if frame is None:
             frame = self.frame if self.frame is not None and not self.fresh else None

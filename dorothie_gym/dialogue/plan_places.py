@@ -17,11 +17,29 @@ _INITIAL: Final = frozenset(
 )
 """Verbs whose object can be an opportunity to turn: "take the second"."""
 
-FETCHING: Final = frozenset({"fetch", "fetching", "collect", "collecting", "pick", "picking", "after", "once"})
+FETCHING: Final = frozenset(
+    {
+        "fetch",
+        "fetching",
+        "grab",
+        "grabbing",
+        "meet",
+        "meeting",
+        "collect",
+        "collecting",
+        "pick",
+        "picking",
+        "after",
+        "once",
+    }
+)
 """First words of phrases by which somebody is fetched."""
 
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
 """Relations of an errand to another place than its own."""
+
+_ALONG: Final = frozenset({"on", "along", "up", "down"})
+"""Last words of an order to go on behind which a street is the one to go along."""
 
 _HAVING: Final = frozenset({"be", "have", "get", "want", "need"})
 """Verbs by which a place becomes an errand: "have a bite at the Panera"."""
@@ -34,6 +52,8 @@ class PlaceReader(PlanState):
         """Begins without places."""
         super().__init__()
         self.last_place: PlaceReference | None = None
+        self.reaching: Frame | None = None  # step that ends at the next place: "down to" of "take Fuller down to"
+        self.opportunity = False  # whether a turning, a street or a junction has been mentioned
         self.person = False  # whether somebody is to be fetched
 
     def read_condition(self, item: ConditionItem) -> None:
@@ -41,13 +61,15 @@ class PlaceReader(PlanState):
         place = item.place.reference if item.place is not None else self.last_place
         if place is not None and place.reference is Anaphor.THERE and self.last_place is not None:
             place = self.last_place
+        if item.place is None and self.pending.at is not None and item.relation is ConditionRelation.AT:
+            return  # "just past the KFC, that's where you stop"
         if place is None:
             if item.place is not None and item.place.ordinal is not None:
                 self._counted(item.relation, item.place.ordinal)
             return
         if self._excludes(place):
             return
-        if place.reference is None:
+        if place.reference is None and not self._describes(place):
             self.last_place = place
         if self.repairing and (frame := self.replaced()) is not None and frame.at is not None:
             frame.relation, frame.at = item.relation, place
@@ -62,6 +84,13 @@ class PlaceReader(PlanState):
         elif self.mood is not ClauseMood.STATEMENT:
             self.stop_between()
             self.pending.relation, self.pending.at = item.relation, place
+
+    def _describes(self, place: PlaceReference) -> bool:
+        """Returns whether a place only tells where another one is: "the house after the bridge"."""
+        frame = self.frame
+        if frame is None or self.fresh or frame.place is None or frame.action is not StepAction.VISIT:
+            return False
+        return frame.place.landmark is not None and place.landmark is None
 
     def _excludes(self, place: PlaceReference) -> bool:
         """Returns whether a negated place is no condition: "not onto Beal, take Fuller", "not at the KFC"."""
@@ -151,14 +180,7 @@ class PlaceReader(PlanState):
             return
         if place.reference is None:
             self.last_place = place
-        if self.negation == "cancel":
-            self.negation = None
-            if place.landmark is not None:
-                self.cancelled.add(place.landmark)
-            elif place.street is not None:
-                self.open_step(StepAction.AVOID).place = place
-            return
-        if self.repairing and self._corrected(place):
+        if self._ends_stretch(place) or self._cancels(place) or (self.repairing and self._corrected(place)):
             return
         place = self._resolved(place)
         frame = self.frame
@@ -169,9 +191,40 @@ class PlaceReader(PlanState):
         elif frame.action is None:
             self._object_of_verb(frame, place)
         elif frame.at is None and frame.action is not StepAction.SPEED:
-            crossed = frame.action is StepAction.STRAIGHT
-            frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
-            frame.at = place
+            self._object_of_action(frame, place)
+
+    def _ends_stretch(self, place: PlaceReference) -> bool:
+        """Returns whether a place ends the stretch of a street that is followed: "Fuller down to the bridge"."""
+        frame, self.reaching = self.reaching, None
+        if frame is None or frame.at is not None or self.fresh:
+            return False
+        frame.relation, frame.at = ConditionRelation.UNTIL, self._resolved(place)
+        return True
+
+    def _cancels(self, place: PlaceReference) -> bool:
+        """Returns whether a place is given up: "skip the KFC"."""
+        if self.negation != "cancel":
+            return False
+        self.negation = None
+        if place.landmark is not None:
+            self.cancelled.add(place.landmark)
+        elif place.street is not None:
+            self.open_step(StepAction.AVOID).place = place
+        return True
+
+    def _object_of_action(self, frame: Frame, place: PlaceReference) -> None:
+        """Puts a place behind an action into its step: "turn right the KFC"."""
+        crossed = frame.action is StepAction.STRAIGHT
+        if crossed and place.reference is Anaphor.HERE:
+            return  # "straight along here"
+        if crossed and place.landmark is LandmarkName.HOUSE and frame.last == "straight":
+            frame.action, frame.place = StepAction.VISIT, place  # "go straight home"
+            return
+        if crossed and _names_only_street(place) and frame.last in _ALONG:
+            frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
+            return
+        frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
+        frame.at = place
 
     def _target(self, frame: Frame, place: PlaceReference) -> None:
         """Completes "take me to", "follow", "avoid" with a place."""
@@ -180,8 +233,12 @@ class PlaceReader(PlanState):
                 frame.action, frame.place = StepAction.VISIT, place
             else:
                 frame.relation, frame.at = ConditionRelation.FROM, place
+        elif frame.word in ("grab", "grabbing", "hit") and _names_only_street(place):
+            frame.action, frame.place = StepAction.FOLLOW, place
         elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
+        elif frame.action is StepAction.VISIT and place.object is not None and frame.word in ("stop", "stopping"):
+            frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
             frame.action, frame.relation, frame.at = StepAction.STRAIGHT, ConditionRelation.UNTIL, place
         elif frame.action is StepAction.FOLLOW and place.landmark is not None:
@@ -244,6 +301,7 @@ class PlaceReader(PlanState):
 
     def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
         self.counting = True
+        self.opportunity = self.opportunity or not blocks
         if self.negation == "cancel" and ordinal is not None:
             self.open_step(StepAction.TURN)  # "skip the next turn"
             self.negation = None

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.numerals import may_be_speed, read_cardinals
-from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, Item, SpeedItem
+from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, SpeedItem, TokenReader
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.route_grammar import RouteGrammar
-    from dorothie_gym.ontology.slots import SlotValue
+    pass
 
 _BEHIND_SPEED: Final = frozenset(
     {
@@ -36,19 +34,8 @@ _BEHIND_SPEED: Final = frozenset(
 _LEAST_SPEED: Final = 5
 
 
-class QuantityReader:
-    """Tokens of a sentence with the items found so far; reads quantities."""
-
-    def __init__(
-        self, words: Sequence[str], names: Mapping[int, SlotValue], lead: Mapping[int, str], grammar: RouteGrammar
-    ) -> None:
-        """Begins with the tokens, the names and first words of `read_items`, and the grammar."""
-        self.words, self.names, self.lead, self.grammar = words, names, lead, grammar
-        self.items: list[Item] = []
-
-    def word_at(self, place: int) -> str:
-        """Returns the token at a place; "" where there is none."""
-        return self.words[place] if 0 <= place < len(self.words) else ""
+class QuantityReader(TokenReader):
+    """Reads quantities."""
 
     def read_quantity(self, place: int) -> int:
         """Reads a distance or a speed."""
@@ -100,6 +87,9 @@ class QuantityReader:
         word, number, start = self.word_at(place), None, place
         if word in ("a", "an", "another"):
             place, word = place + 1, self.word_at(place + 1)
+        if word == "three" and self.word_at(place + 1) == "quarters":
+            place += 2 + (self.word_at(place + 2) == "of")
+            return 0.75, place + (self.word_at(place) in ("a", "an"))
         if word in ("half", "quarter"):
             place += 1 + (self.word_at(place + 1) == "of")
             place += self.word_at(place) in ("a", "an")
@@ -118,6 +108,9 @@ class QuantityReader:
             if length:
                 number = float(read_cardinals([*self.words[place : place + length]])[0])
                 place += length
+                if self.word_at(place) == "point" and (digit := self._run(place + 1)):
+                    number += read_cardinals([*self.words[place + 1 : place + 1 + digit]])[0] / 10.0
+                    place += 1 + digit
         if number == 100.0 and self.word_at(place) == "and" and (more := self._run(place + 1)):
             number, place = number + read_cardinals(list(self.words[place + 1 : place + 1 + more]))[0], place + 1 + more
         return (None, start) if number is None else (number, place)

@@ -6,6 +6,7 @@ import functools
 import re
 from collections.abc import Sequence
 
+from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseReader
 from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import find_names, known_words
@@ -18,6 +19,13 @@ from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
 _CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
 _PERSON = "#person"
+_SEPARABLE = frozenset({"pick", "picking"})
+_FETCHES = frozenset({"fetch", "fetching", "grab", "grabbing", "collect", "collecting", "meet"})
+_BEHIND_NAMES = frozenset({"from", "at", "by", "on", "outside", ",", "and", "then", "first", "please", "in", "off"})
+_AT_ONCE = frozenset({"turn", "left", "right", "go", "then"})
+"""Words behind which lights at the beginning are those of a junction."""
+_APART = frozenset({",", "?", "and", "it", "the_pace", "speed", "pace", "up"})
+"""Words that do not stand between such a verb and its particle."""
 _LIGHTS = frozenset({"light", "lights"})
 _NONE: frozenset[str] = frozenset()
 _COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
@@ -45,6 +53,8 @@ def with_plain_lights(words: Sequence[str]) -> list[str]:
 def _is_at_junction(words: Sequence[str], place: int, compounds: frozenset[str] = _COMPOUNDS) -> bool:
     """Returns whether the lights at a place are those of a junction: "at the next set of lights"."""
     grammar = route_grammar()
+    if place == 0 and not _AT_ONCE.isdisjoint(words[1:2]):
+        return True  # "lights, turn left"
     place -= 1
     if place >= 0 and words[place] in compounds:
         return False
@@ -62,8 +72,17 @@ def read_plan(text: str) -> PlanParse:
     Args:
         text: free English; may be empty.
     """
-    sentences = (_sentence(part) for part in _SENTENCE.split(text))
-    return parse_plan([sentence for sentence in sentences if sentence is not None])
+    sentences: list[Sentence] = []
+    for part in _SENTENCE.split(with_breaks(text)):
+        sentence = _sentence(part)
+        if sentence is not None and not (sentences and _says_again(sentences[-1], sentence)):
+            sentences.append(sentence)
+    return parse_plan(sentences)
+
+
+def _says_again(before: Sentence, sentence: Sentence) -> bool:
+    """Returns whether a sentence only repeats the direction of the one before: "Left! Left, left!"."""
+    return len({*before.clauses.words, *sentence.clauses.words}) == 1
 
 
 def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
@@ -78,6 +97,44 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
     return without_asides(kept, lists) if kept else words
 
 
+def _with_particles(words: list[str]) -> list[str]:
+    """Returns the words with the particle of a verb beside it: "pick my son up" as "pick up my son".
+
+    Units that are spelt out are joined: "k p h".
+    """
+    for place in range(len(words) - 2):
+        if words[place] in ("k", "m") and words[place + 1 : place + 3] == ["p", "h"]:
+            words = [*words[:place], f"{words[place]}ph", *words[place + 3 :]]
+            break
+    for place, word in enumerate(words):
+        if word not in _SEPARABLE:
+            continue
+        end = next((n for n in range(place + 2, min(place + 5, len(words))) if words[n] == "up"), None)
+        if end is not None and _APART.isdisjoint(words[place + 1 : end]):
+            return [*words[: place + 1], "up", *words[place + 1 : end], *words[end + 1 :]]
+    return words
+
+
+def _with_people(words: list[str]) -> list[str]:
+    """Returns the words with the name of somebody who is fetched masked: "grab dave from the house"."""
+    grammar = route_grammar()
+    for place in range(len(words) - 1):
+        verb = words[place] in _FETCHES or words[place : place + 2] == ["pick", "up"]
+        begin = place + 1 + (words[place] == "pick")
+        name = words[begin] if begin < len(words) else ""
+        following = words[begin + 1] if begin + 1 < len(words) else ","
+        known = name in grammar.modifiers or name in known_words() or grammar.terminals.longest([name], 0) is not None
+        if verb and name.isalpha() and not known and following in _BEHIND_NAMES:
+            words = [*words[:begin], _PERSON, *words[begin + 1 :]]
+        elif words[place] == "get" and "from" in words[place + 2 : place + 5] and _gets_people(words[place + 1 :]):
+            words = [*words[:place], "fetch", *words[place + 1 :]]
+    return words
+
+
+def _gets_people(words: Sequence[str]) -> bool:
+    return not route_grammar().people.isdisjoint(words[: list(words).index("from")])
+
+
 def _strangers(text: str) -> frozenset[str]:
     """Returns the words within a sentence that are written as names, and are none of the town's."""
     return frozenset(word.lower() for word in _CAPITALISED.findall(text)) - known_words()
@@ -85,14 +142,14 @@ def _strangers(text: str) -> frozenset[str]:
 
 def _sentence(text: str) -> Sentence | None:
     lists = word_lists()
-    said = with_plain_lights(_plain(split_words(text), lists))
+    said = _with_particles(with_plain_lights(_plain(split_words(text), lists)))
     if not said:
         return None
     mentions, masked = find_names(said, statuses=False)
     strangers = _strangers(text)
-    words = [_PERSON if word in strangers else word for word in mask_directions(masked, lists)]
+    words = _with_people([_PERSON if word in strangers else word for word in mask_directions(masked, lists)])
     names = {mention.start: mention.value for mention in mentions}
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)
     clauses = ClauseReader(words=words, question=words[-1:] == ["?"], contracted=contracted)
-    return Sentence(clauses, read_items(words, names, lead))
+    return Sentence(clauses, read_items(words, names, lead, contracted))

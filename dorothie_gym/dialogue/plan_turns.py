@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, PlanState, with_details
+from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, Frame, PlanState, with_details
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, StepAction
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import LaneItem, SideItem, TurnItem
+
+
+_DOWN: Final = frozenset({"down", "up", "along", "go", "pop", "nip", "duck", "head"})
+"""First words of an action that goes along a road: "pop down that road on your left"."""
 
 
 class TurnReader(PlanState):
@@ -19,6 +23,7 @@ class TurnReader(PlanState):
         """Begins without steps."""
         super().__init__()
         self.correcting = False  # whether the sentence holds a correction so far
+        self.last_place: PlaceReference | None = None
         self.aside = False  # whether left or right is a side of the street
 
     def read_turn(self, item: TurnItem) -> None:
@@ -33,27 +38,8 @@ class TurnReader(PlanState):
             return
         if self._says_again(item):
             return
-        frame = self.frame
-        if frame is not None and frame.action is StepAction.LANE and frame.direction is None:
-            frame.direction = item.direction  # "switch lanes, left"
+        if self._directs(item):
             return
-        if frame is not None and not self.fresh:
-            if frame.action is StepAction.TURN and frame.direction is None:
-                frame.direction = item.direction
-                frame.ordinal = frame.ordinal or item.ordinal
-                return
-            if frame.action is StepAction.U_TURN:
-                return
-            getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
-            if getting or (frame.action is None and frame.verb == "get"):
-                frame.action, frame.direction = StepAction.LANE, item.direction
-                return
-            if frame.action is None or (frame.action in NEEDING_PLACE and frame.place is None):
-                avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
-                frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
-                frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
-                self._repeat(item)
-                return
         named = self._bare_street()
         frame = self.open_step(StepAction.TURN)
         frame.direction = item.direction
@@ -61,6 +47,51 @@ class TurnReader(PlanState):
         if named is not None and frame.at is None:
             frame.relation, frame.at = ConditionRelation.AT, named
         self._repeat(item)
+
+    def _directs(self, item: TurnItem) -> bool:
+        """Returns whether a direction belongs to a step that has been named: "turn at the KFC, that's a right"."""
+        frame = self._undirected()
+        if frame is None:
+            return False
+        if frame is not self.frame or (frame.action is StepAction.LANE and frame.direction is None):
+            frame.direction = item.direction  # "switch lanes, left"
+            return True
+        if self.fresh:
+            return False
+        if frame.action is StepAction.TURN and frame.direction is None:
+            frame.direction = item.direction
+            frame.ordinal = frame.ordinal or item.ordinal
+            return True
+        if frame.action is StepAction.U_TURN:
+            return True
+        if frame.action is None and frame.verb and frame.relation is ConditionRelation.UNTIL:
+            self.close()  # "go until the KFC left"
+            return False
+        return self._turns(frame, item)
+
+    def _turns(self, frame: Frame, item: TurnItem) -> bool:
+        """Returns whether a direction makes a turn, or a change of lane, of the current step."""
+        if frame.action is StepAction.STRAIGHT and frame.word in _DOWN and self.counting and frame.at is None:
+            frame.action = None  # "down the alley to the right"
+        getting = frame.word == "get" and frame.action is StepAction.VISIT and frame.place is None
+        if getting or (frame.action is None and frame.verb == "get"):
+            frame.action, frame.direction = StepAction.LANE, item.direction
+            return True
+        if frame.action is not None and (frame.action not in NEEDING_PLACE or frame.place is not None):
+            return False
+        avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
+        frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
+        frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
+        self._repeat(item)
+        return True
+
+    def _undirected(self) -> Frame | None:
+        """Returns the current step, or the last one if a new sentence only adds its side: "Switch lanes. Right."."""
+        last = self.frames[-1] if self.frames else None
+        if self.frame is None and last is not None and last.direction is None and len(self.frames) == self.begun:
+            if last.action is StepAction.LANE or (last.action is StepAction.TURN and last.at is not None):
+                return last
+        return self.frame
 
     def _denies_side(self) -> bool:
         """Returns whether a direction is a side that is not meant: "stop on the right, not the left"."""
@@ -106,6 +137,10 @@ class TurnReader(PlanState):
 
     def read_lane(self, item: LaneItem) -> None:
         """Reads a lane by its side."""
+        last = self.frames[-1] if self.frames else None
+        if last is not None and last.action is StepAction.LANE and last.direction is not None:
+            if self.negation in NEGATING and not last.negated:
+                return  # "the right lane, not the left"
         frame = self.replaced(StepAction.LANE, StepAction.TURN)
         if frame is None:
             frame = self.frame
@@ -127,28 +162,37 @@ class TurnReader(PlanState):
         used = len(directed) > turns or any(frame.direction is item.direction for frame in directed)
         self.aside = self.aside or not used
 
+    def _tells_place(self) -> bool:
+        """Returns whether the sentence tells where something is: "my house is the one on the right"."""
+        told = (frame for frame in self.frames[self.begun :] if frame.mood is ClauseMood.STATEMENT)
+        return any(frame.action is StepAction.VISIT and frame.place is not None for frame in told)
+
     def _place_side(self, item: SideItem) -> None:
         frame = self.replaced()
         if frame is not None and frame.side is not None:
             frame.side = item.direction
             return
         frame = self.frame
-        if frame is None and self.counting:
+        counting = self.counting and not self._tells_place()
+        if frame is None and counting:
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame is None:
             self.pending.side = item.direction
         elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
             frame.direction = item.direction
-        elif self.counting:
+        elif counting and frame.action is not StepAction.STRAIGHT:
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame.action in (StepAction.STOP, StepAction.WAIT):
             frame.side = item.direction
         elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
             frame.action, frame.direction = StepAction.TURN, item.direction
+        elif frame.action is StepAction.STRAIGHT and frame.word in _DOWN and counting and frame.at is None:
+            frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.VISIT and frame.place is not None:
-            frame.place = with_details(frame.place, side=item.direction)
-            if frame.mood is ClauseMood.STATEMENT:
+            if item.stated and frame.mood is ClauseMood.STATEMENT:
                 self.pending.side = item.direction  # "the house is on the left, stop there"
+            else:
+                frame.place = self.last_place = with_details(frame.place, side=item.direction)
         elif self.pending.ordinal is not None:
             opened = self.open_step(StepAction.TURN)
             opened.direction = item.direction

@@ -41,6 +41,8 @@ class _Phrase(NamedTuple):
     group: str
     kind: str
     elements: tuple[_Element, ...]
+    most: int
+    """Number of words of its longest form."""
 
 
 class PhraseIndex:
@@ -57,7 +59,7 @@ class PhraseIndex:
         for group, kind, text in phrases:
             elements = tuple(_element(word, adverbs) for word in _ELEMENT.findall(text))
             for first in _first_words(text, elements):
-                found[first].append(_Phrase(group, kind, elements))
+                found[first].append(_Phrase(group, kind, elements, _most_words(elements)))
         self._phrases: Mapping[str, Sequence[_Phrase]] = found
 
     def longest(self, words: Sequence[str], place: int, stop: int | None = None) -> Match | None:
@@ -65,6 +67,8 @@ class PhraseIndex:
         best: Match | None = None
         end = len(words) if stop is None else stop
         for phrase in self._phrases.get(words[place], ()):
+            if best is not None and phrase.most <= best.length:
+                continue
             length = _longest(phrase.elements, words, place, 0, end) - place
             if length > 0 and (best is None or length > best.length):
                 best = Match(phrase.group, phrase.kind, length)
@@ -99,6 +103,10 @@ def _element(text: str, adverbs: bool) -> _Element:
         raise PhraseFileError(f"{FILE}: {text!r} is no element of a phrase; write it as a|b_c or (a|b_c)")
     single = frozenset(option[0] for option in options if len(option) == 1)
     return single, tuple(option for option in options if len(option) > 1), optional
+
+
+def _most_words(elements: Sequence[_Element]) -> int:
+    return sum(max([1, *(len(sequence) for sequence in sequences)]) for _, sequences, _ in elements)
 
 
 def _first_words(text: str, elements: Sequence[_Element]) -> Iterator[str]:

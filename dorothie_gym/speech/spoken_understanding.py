@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.conversation import INAUDIBLE
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
+from dorothie_gym.dialogue.hypotheses import TextHypothesis, read_hypotheses
 from dorothie_gym.dialogue.nlu import understand
-from dorothie_gym.dialogue.routes import PlanStep
+from dorothie_gym.dialogue.routes import DrivingPlan, PlanStep
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, SlotValue
 from dorothie_gym.speech.language import punctuation_model
@@ -49,10 +51,11 @@ class SpokenUnderstanding:
 
     Attributes:
         text: recognised words with marks and names as they are written; `INAUDIBLE` if there are none.
-        act: act of the best hypothesis; Irrelevant if nothing was recognised.
+        act: act of the hypothesis that makes most sense; Irrelevant if nothing was recognised.
         confidence: share of the hypotheses, by weight, that have this act, in [0, 1].
         alternatives: other acts with their shares, the most probable first.
         steps: steps of the driving plan of the best hypothesis, each with the share of the hypotheses that have it.
+        unsure: landmarks and streets that most hypotheses, by weight, lack; to be asked about.
     """
 
     text: str
@@ -60,6 +63,7 @@ class SpokenUnderstanding:
     confidence: float
     alternatives: tuple[tuple[DialogueAct, float], ...] = ()
     steps: tuple[tuple[PlanStep, float], ...] = ()
+    unsure: tuple[SlotValue, ...] = ()
 
 
 @functools.lru_cache(maxsize=8192)
@@ -103,27 +107,39 @@ def _is_doubtful(word: RecognizedWord) -> bool:
     return word.confidence < DOUBTFUL and word.text not in _SLIGHT  # NaN is not below it
 
 
-def understand_speech(recognition: Recognition, after: DialogueMove | None = None) -> SpokenUnderstanding:
+def understand_speech(
+    recognition: Recognition,
+    after: DialogueMove | None = None,
+    allows: Callable[[DrivingPlan], bool] | None = None,
+) -> SpokenUnderstanding:
     """Returns the interpretation of recognised speech.
 
-    The act is that of the best hypothesis. Choosing the act with the largest share instead finds it less often, because
-    acts without a name have more hypotheses.
+    The act is that of the hypothesis that makes most sense, see `read_hypotheses`. Choosing the act with the largest
+    share instead finds it less often, because acts without a name have more hypotheses.
 
     Args:
         recognition: result of a recogniser.
         after: last move of the other speaker if it awaits an answer, see `guess_act`.
+        allows: whether the map has what a plan asks for; None if that is unknown.
     """
     if not recognition.hypotheses:
         return SpokenUnderstanding(text=INAUDIBLE, act=DialogueAct(DialogueMove.IRRELEVANT), confidence=0.0)
     shares: dict[DialogueAct, float] = defaultdict(float)
     steps: dict[PlanStep, float] = defaultdict(float)
-    for hypothesis in recognition.hypotheses:
-        words = readable(hypothesis.text)
+    readings = [
+        TextHypothesis(text=readable(hypothesis.text), weight=hypothesis.weight)
+        for hypothesis in recognition.hypotheses
+    ]
+    for hypothesis in readings:
+        words = hypothesis.text
         shares[guess_act(words, after)] += hypothesis.weight
         for step in dict.fromkeys(understand(words).plan):
             steps[step] += hypothesis.weight
-    text = readable(recognition.hypotheses[0].text)
+    taken = read_hypotheses(readings, after, allows)
+    text = taken.text
     act = guess_act(text, after)
     others = sorted(((each, share) for each, share in shares.items() if each != act), key=lambda each: -each[1])
     planned = tuple((step, steps[step]) for step in understand(text).plan)
-    return SpokenUnderstanding(text=text, act=act, confidence=shares[act], alternatives=tuple(others), steps=planned)
+    return SpokenUnderstanding(
+        text=text, act=act, confidence=shares[act], alternatives=tuple(others), steps=planned, unsure=taken.unsure
+    )

@@ -160,3 +160,43 @@ def test_a_greeting_opens_the_channel_whoever_it_addresses(greeting, addressee):
 def test_a_car_that_is_spoken_to_is_no_vehicle_in_sight(text, move, slots):
     (span,) = guess_spans(text)
     assert span.act == parse_act(move, slots)
+
+
+@pytest.mark.parametrize(
+    ("before", "text", "move"),
+    [
+        # answers without a word for yes or no, and behind interjections
+        ("Should I stop here?", "you should", "ReplyY"),
+        ("Should I stop here?", "it would not", "ReplyN"),
+        ("Should I stop here?", "ah no no go on", "ReplyN"),
+        ("Should I stop here?", "could be", "ReplyU"),
+        ("Do you mean Beal?", "Beal, yes", "Confirm"),
+        # signs that something was heard
+        ("The road is closed.", "can't be helped", "Acknowledge"),
+        ("Going to Ikea.", "all right, Ikea", "Acknowledge"),
+        ("Take a left.", "left it is", "Confirm"),
+        # corrections of what was announced
+        ("I'm turning left.", "no, right", "Clarify"),
+        ("I'm turning left.", "the other side", "Clarify"),
+        ("I'm turning left.", "nobody said left", "Clarify"),
+        # nothing was said before: these are orders
+        ("", "not this one, the one after", "Instruct"),
+        ("", "nothing over thirty please", "Instruct"),
+        ("", "you needn't stop here", "Instruct"),
+        ("", "I'd sooner we took Fuller", "Instruct"),
+        ("", "one would be grateful to be let out", "Instruct"),
+        ("", "it would spare my back if you went slower", "Instruct"),
+        # questions
+        ("", "is it on the left or on the right", "QueryW"),
+        ("", "from which side do we come", "QueryW"),
+        ("", "isn't that the Coco", "Check"),
+        ("", "we're taking Beal aren't we", "Check"),
+        ("", "can we see the bridge from here", "QueryYN"),
+        # statements
+        ("", "I feel sick", "Explain"),
+        ("", "the speed limit is thirty here", "Explain"),
+    ],
+)
+def test_wordings_of_passengers_have_their_moves(before, text, move):
+    after = guess_spans(before)[-1].act.move if before else None
+    assert guess_spans(text, after)[0].act.move.label == move

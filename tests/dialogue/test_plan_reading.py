@@ -411,3 +411,56 @@ def test_a_dropped_errand_is_abandoned():
     parsed = understand("get rid of the Qdoba")
     assert parsed.plan.steps == ()
     assert [value.label for value in parsed.statuses] == ["Abandoned"]
+
+
+BEAL, FULLER = {"street": "Beal"}, {"street": "Fuller"}
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        # a street is followed up to a place
+        ("take Beal down to the bridge", [step("follow", "until", BRIDGE, place=BEAL)]),
+        ("straight on Beal until the Shell", [step("follow", "until", SHELL, place=BEAL)]),
+        ("go along Beal all the way up to Fuller", [step("follow", "until", FULLER, place=BEAL)]),
+        ("keep going down Beal to where it meets Fuller", [step("follow", "until", FULLER, place=BEAL)]),
+        ("straight past the KFC", [step("straight", "past", KFC)]),
+        # a place that is told is that of the step
+        ("you'll see a Shell, that's where you go left", [step("turn", AT, SHELL, direction="left")]),
+        ("there's a Shell coming up, turn right just before it", [step("turn", "before", SHELL, direction="right")]),
+        ("once you're off the bridge it's a left", [step("turn", "after", BRIDGE, direction="left")]),
+        # lanes and sides
+        ("get into the lane on your right", [step("lane", direction="right")]),
+        ("Change lanes. The left one.", [step("lane", direction="left")]),
+        ("out of the right lane and into the left one", [step("lane", direction="left")]),
+        ("go into the left lane, then turn left", [step("lane", direction="left"), step("turn", direction="left")]),
+        ("stop to the left", [step("stop", side="left")]),
+        ("let us out by the right-hand kerb", [step("stop", side="right")]),
+        # waiting
+        ("don't move until the bridge is clear", [step("wait", "until", BRIDGE)]),
+        ("don't set off yet", [step("wait")]),
+        # negation and comparison
+        ("don't turn into Beal", [step("avoid", place=BEAL)]),
+        ("Beal is quicker, take that", [step("follow", place=BEAL)]),
+        ("no faster than thirty kilometres an hour", [step("speed", speed=30)]),
+        ("twenty kilometres an hour is plenty", [step("speed", speed=20)]),
+        ("the limit is forty, stick to it", [step("speed", speed=40)]),
+        # people and errands
+        ("pick my aunt up at the KFC", [step("visit", AT, KFC, place={"landmark": "Person"})]),
+        (
+            "I need to do the KFC but not till we've been to the Ikea",
+            [step("visit", place=IKEA), step("visit", place=KFC)],
+        ),
+        ("leave the KFC for last, the Ikea first", [step("visit", place=IKEA), step("visit", place=KFC)]),
+        # repairs
+        ("go to the KFC, hang on, make that the Ikea", [step("visit", place=IKEA)]),
+        ("Left! left left", [step("turn", direction="left")]),
+        # indirect
+        ("it might be wiser to slow down", [step("speed", change="slower")]),
+        ("we'd be grateful to be dropped at the KFC", [step("stop", AT, KFC)]),
+        ("this is me, thanks", [step("stop", AT, {"reference": "here"})]),
+        ("turn around whenever you get a chance", [step("u_turn")]),
+    ],
+)
+def test_wordings_of_passengers(text, steps):
+    matches(text, *steps)

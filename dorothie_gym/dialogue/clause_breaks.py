@@ -1,0 +1,249 @@
+"""Boundaries of clauses in speech without marks, as recognisers and hurried writers leave it.
+
+"turn left here it's the second house" has two clauses. A comma is put where a clause begins by its form: a subject
+with its finite verb, an imperative with what belongs to it, a verb before its subject, or words that take something
+back. The other readers of this package then see the same boundaries as in punctuated text.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from dorothie_gym.dialogue.lexicon import YamlMapping, plain_word, read_data, strings
+from dorothie_gym.dialogue.route_grammar import Match, PhraseIndex, route_grammar
+
+_FILE: Final = "clause_breaks.yaml"
+_MARKS: Final = (",", ".", "?", "!", ";", ":", "\u2026", "\u2014", "\u2013", "-")
+_OPENS: Final = frozenset({"and", "so", "but", "then", "now", "well", "oh", "okay", "ok", "please", "just", "yeah"})
+"""Words that are no clause yet, however many of them open one."""
+
+_AGREED: Final = frozenset({"right", "correct"})
+"""Last words that ask whether a statement is right."""
+
+_TELLING: Final = frozenset(
+    {
+        "it's",
+        "that's",
+        "you're",
+        "we're",
+        "this is",
+        "that is",
+        "it is",
+        "you mean",
+        "you meant",
+        "you said",
+        "you want",
+    }
+)
+_DIRECTING: Final = frozenset(
+    {
+        "the",
+        "a",
+        "next",
+        "on",
+        "your",
+        "my",
+        "our",
+        "first",
+        "second",
+        "third",
+        "to",
+        "other",
+        "hard",
+        "then",
+        "and",
+        "turn",
+    }
+)
+"""Words behind which "right" is a direction."""
+
+_YES_AND_NO: Final = frozenset({"yes", "yeah", "yep", "yup", "aye", "no", "nope", "nah", "naw"})
+_ALSO_PREPOSITIONS: Final = frozenset({"after", "before", "since", "until", "till", "as"})
+_POSSESSIVE: Final = frozenset({"my", "our", "his", "her", "their"})
+_PREDICATES: Final = frozenset(
+    {
+        "a",
+        "not",
+        "so",
+        "very",
+        "on",
+        "in",
+        "at",
+        "here",
+        "there",
+        "late",
+        "sick",
+        "asleep",
+        "just",
+        "still",
+        "gone",
+        "too",
+    }
+)
+"""Words behind a subject with a contracted "is"."""
+
+_ENDS: Final = {"subject": ("please",), "repair": ("second", "moment"), "order": ("second", "minute", "moment")}
+"""Words that join most clauses to what stands before, but none of a kind: "stop please, I feel sick"."""
+
+_DRIVING: Final = (["we"], ["you"])
+_MODALS: Final = (["should"], ["could"], ["can"], ["need"], ["must"], ["better"], ["might"])
+_BEFORE_ORDERS: Final = {
+    "just": ("order",),
+    "please": ("order",),
+    "so": ("order", "question"),
+}
+"""Words in front of an order that belong to it, with the kinds of starts behind them."""
+
+_REQUESTING: Final = frozenset({"would", "could", "can", "will", "won't"})
+
+_PERSONAL: Final = frozenset(
+    {"i", "we", "you", "he", "she", "they", "i'm", "we're", "you're", "i've", "we've", "he's", "what's"}
+)
+
+
+@dataclass(frozen=True)
+class _Breaks:
+    """Contents of data/clause_breaks.yaml; that file explains each list."""
+
+    starts: PhraseIndex
+    tags: PhraseIndex
+    answers: PhraseIndex
+    phrases: PhraseIndex
+    joining: frozenset[str]
+    antecedents: frozenset[str]
+    subordinate: frozenset[str]
+
+
+@functools.cache
+def _breaks() -> _Breaks:
+    data = read_data(_FILE)
+    starts = [
+        ("starts", kind, text)
+        for kind, phrases in data.get("starts", {}).items()
+        for text in strings(f"{_FILE}: starts.{kind}", phrases)
+    ]
+    return _Breaks(
+        starts=PhraseIndex(starts, adverbs=False),
+        tags=_index(data, "tags"),
+        answers=_index(data, "answers"),
+        phrases=_index(data, "phrases"),
+        joining=_words(data, "joining"),
+        antecedents=_words(data, "antecedents"),
+        subordinate=_words(data, "subordinate"),
+    )
+
+
+def _index(data: YamlMapping, name: str) -> PhraseIndex:
+    phrases = strings(f"{_FILE}: {name}", data.get(name))
+    return PhraseIndex([(name, name, text) for text in phrases], adverbs=False)
+
+
+def _words(data: YamlMapping, name: str) -> frozenset[str]:
+    return frozenset(strings(f"{_FILE}: {name}", data.get(name)))
+
+
+@functools.lru_cache(maxsize=4096)
+def with_breaks(text: str, *, answering: bool = True) -> str:
+    """Returns a text with commas between clauses that no mark separates; words and their number stay the same.
+
+    Args:
+        text: free English; may be empty.
+        answering: whether an initial "yes" or "no" can be an answer, and has a comma behind it.
+    """
+    raw = text.split()
+    if len(raw) < 3:
+        return text
+    words = [plain_word(word) for word in raw]
+    begin = 0
+    changed = False
+    for place in range(1, len(raw)):
+        if raw[place - 1].endswith(_MARKS):
+            begin = place
+        elif _begins_clause(words, begin, place) and (answering or begin or words[0] not in _YES_AND_NO):
+            raw[place - 1] += ","
+            begin, changed = place, True
+    if raw[-1][-1] not in _MARKS and _asks_for_agreement(words):
+        raw[-2] = raw[-2] if words[-1] not in _AGREED or raw[-2].endswith(_MARKS) else f"{raw[-2]},"
+        raw[-1] += "?"
+        changed = True
+    return " ".join(raw) if changed else text
+
+
+def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
+    """Returns whether a clause begins at a place of the words, behind the one that began at `begin`."""
+    breaks = _breaks()
+    answer = breaks.answers.longest(words, begin)
+    if answer is not None and answer.length == place - begin:
+        return _answered(words, begin, place)
+    found = breaks.starts.longest(words, place)
+    if found is None and _has_subject(words, place):
+        found = Match("starts", "subject", 1)
+    if words[place] == "so" and words[place + 1 : place + 2] in _DRIVING and words[place + 2 : place + 3] in _MODALS:
+        found = Match("starts", "order", 1)  # "it's closed, so we should turn around"
+    if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
+        found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
+        found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None
+    if found is None and not _ends_in_tag(words, place):
+        return False
+    before = words[place - 1]
+    joined = before in breaks.joining and (found is None or before not in _ENDS.get(found.kind, ()))
+    if joined or breaks.phrases.longest(words, place) is not None:
+        return False
+    head = words[begin:place]
+    if len(head) < 2 or all(word in _OPENS for word in head):
+        return False
+    if found is None:
+        return True
+    if found.kind in ("order", "question") and _is_subordinate(head):
+        return False
+    if found.kind == "subject" and head[0] == "if":
+        return False
+    return not (words[place] in _PERSONAL and before in breaks.antecedents)
+
+
+def _has_subject(words: Sequence[str], place: int) -> bool:
+    """Returns whether somebody or something of the speaker's does something: "my mum's waiting"."""
+    if words[place] not in _POSSESSIVE:
+        return False
+    noun, verb = words[place + 1 : place + 2], words[place + 2 : place + 3]
+    if verb and verb[0] in route_grammar().finite:
+        return True
+    contracted = bool(noun) and noun[0].endswith("'s")
+    return contracted and bool(verb) and (verb[0].endswith("ing") or verb[0] in _PREDICATES)
+
+
+def _is_subordinate(head: Sequence[str]) -> bool:
+    """Returns whether a clause depends on the one to come: "when you see the KFC"."""
+    subordinate = _breaks().subordinate
+    return not subordinate.isdisjoint(head[:2]) or not (subordinate - _ALSO_PREPOSITIONS).isdisjoint(head)
+
+
+def _asks_for_agreement(words: Sequence[str]) -> bool:
+    """Returns whether a statement ends in a tag: "you're going down Beal, aren't you", "this is Fuller, right"."""
+    if words[-1] in _AGREED:
+        if words[-2] in _DIRECTING or words[-2].endswith("ing"):
+            return False
+        return words[0] in _TELLING or " ".join(words[:2]) in _TELLING
+    places = (place for place in (len(words) - 2, len(words) - 3) if place > 1 and _ends_in_tag(words, place))
+    return any(words[place] not in _REQUESTING for place in places)
+
+
+def _ends_in_tag(words: Sequence[str], place: int) -> bool:
+    """Returns whether nothing but a tag stands at a place: "aren't you"."""
+    found = _breaks().tags.longest(words, place)
+    if words[place - 1] in ("that", "this", "what", "where", "it", "here", "there") and words[place] == "is":
+        return False  # "that is it"
+    return found is not None and place + found.length == len(words)
+
+
+def _answered(words: Sequence[str], begin: int, place: int) -> bool:
+    """Returns whether a clause of its own follows an answer or a sign: "no don't stop"."""
+    breaks = _breaks()
+    known = breaks.phrases.longest(words, begin)
+    if known is not None and known.length > place - begin:
+        return False
+    found = breaks.starts.longest(words, place)
+    return found is not None

@@ -1,0 +1,152 @@
+"""Left and right in route talk: turns, lanes, and sides of the street."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from dorothie_gym.dialogue.plan_items import SIDES, ActionItem, LaneItem, SideItem, TokenReader, TurnItem
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.ontology.slots import ObjectClass
+
+_SIDE_WORDS: Final = frozenset({"on", "at", "to", "in", "into", "onto", "along", "down"})
+_BESIDE: Final = frozenset({"on", "at", "along", "down"})
+_DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
+_EDGES: Final = frozenset({"side", "side's", "kerb", "curb", "edge"})
+"""Nouns that make left and right a side of the street."""
+
+_TURN_NOUNS: Final = frozenset({"turn", "turning", "one", "street", "road", "exit", "corner", "fork", "again", "turns"})
+"""Nouns that make left and right a turn."""
+
+_BEING: Final = frozenset({"is", "are", "be", "over", "up"})
+"""Words behind which a side is stated: "the house is on the left"."""
+
+_LANES: Final = frozenset({"lane", "lanes"})
+_OF_LANES: Final = frozenset({"lane", "lanes", "file"})
+_JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
+"""Words between a lane and a direction that has nothing to do with it."""
+
+_LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
+_CHANGING: Final = frozenset({"change", "changing", "switch", "switching"})
+
+
+class _Phrase(NamedTuple):
+    """Direction with the words around it.
+
+    Attributes:
+        begin: its first token.
+        place: the token behind left or right, and behind "hand".
+        preposition: preposition at its beginning, or "".
+        direction: left or right.
+        ordinal: number of the opportunity.
+        several: whether it is a plural: "two lefts".
+        hand: whether it is left-hand or right-hand.
+    """
+
+    begin: int
+    place: int
+    preposition: str
+    direction: Direction
+    ordinal: int | None
+    several: bool
+    hand: bool
+
+
+class DirectionReader(TokenReader):
+    """Reads left and right.
+
+    Attributes:
+        contracted: tokens of the names that end in "'s".
+    """
+
+    contracted: frozenset[int] = frozenset()
+
+    def read_direction(self, place: int) -> int:
+        """Reads a direction with the words around it: a turn, a lane, or a side."""
+        found = self._direction(place)
+        if found is None:
+            return place
+        lane = self._lane(found)
+        return lane if lane is not None else self._turn_or_side(found)
+
+    def _direction(self, place: int) -> _Phrase | None:
+        """Returns the phrase with a direction at a place; None if there is none."""
+        begin = place
+        preposition = self.word_at(place) if self.word_at(place) in _SIDE_WORDS else ""
+        place += preposition != ""
+        ordinal, place = self.ordinal(place)
+        while self.word_at(place) in self.grammar.determiners or self.word_at(place) in _DEGREES:
+            place += 1
+        if ordinal is None:
+            ordinal, place = self.ordinal(place)
+        while self.word_at(place) in _DEGREES:
+            place += 1
+        direction = SIDES.get(self.word_at(place))
+        if direction is None:
+            return None
+        several = self.word_at(place) in ("lefts", "rights")
+        place += 1
+        while self.word_at(place) == self.word_at(place - 1) and self.word_at(place) in ("left", "right"):
+            place += 1  # "left left left"
+        hand = self.word_at(place) in ("hand", "handed")
+        place += hand
+        place += self.word_at(place) == "most"
+        return _Phrase(begin, place, preposition, direction, ordinal, several, hand)
+
+    def _lane(self, found: _Phrase) -> int | None:
+        """Reads the side of a lane; returns the token behind it, or None if it is no lane."""
+        begin, place = found.begin, found.place
+        if self.word_at(place) in ("a", "one") and self.word_at(place + 1) == "lane":
+            self.items.append(LaneItem(found.direction))  # "move left a lane"
+            return place + 2
+        if self.word_at(begin - 1) == "of" and self.word_at(begin - 2) == "out" and self.word_at(place) in _LANES:
+            return place + 1  # "out of the right lane"
+        changed = found.preposition == "to" and self.word_at(begin - 1) in _CHANGING
+        if changed or self.word_at(place) in _OF_LANES or self.word_at(begin - 1) in _LANES:
+            self.items.append(LaneItem(found.direction))
+            return place + (self.word_at(place) in _OF_LANES)
+        if self._is_other_lane(begin, place):
+            self.items.append(LaneItem(found.direction))
+            return place + (self.word_at(place) == "one")
+        return None
+
+    def _turn_or_side(self, found: _Phrase) -> int:
+        """Reads a turn or a side of the street; returns the token behind it."""
+        place, before = found.place, self.word_at(found.begin - 1)
+        edge = self.word_at(place) in _EDGES or self.names.get(place) is ObjectClass.SIDE_WALK
+        going = found.preposition in ("to", "in")
+        aside = edge or (going and self._stands_behind_stop())
+        aside = aside or (found.hand and not going and self.word_at(place) not in _TURN_NOUNS)
+        if aside:
+            place = self._behind_street(place + edge)
+        elif self.word_at(place) in _TURN_NOUNS:
+            place += 1
+        turning = self.word_at(place - 1) in _TURN_NOUNS and found.preposition in ("down", "along")
+        if not turning and (aside or (found.preposition or before) in _BESIDE) and found.ordinal is None:
+            stated = before.endswith("'s") or before in _BEING or found.begin - 1 in self.contracted
+            self.items.append(SideItem(found.direction, stated))
+        else:
+            count = found.ordinal or 1 if found.several else 1
+            self.items.append(TurnItem(found.direction, None if found.several else found.ordinal, min(count, 4)))
+        return place
+
+    def _is_other_lane(self, begin: int, place: int) -> bool:
+        """Returns whether a side tells one of the lanes spoken of: "switch lanes, the right one"."""
+        if _LANES.isdisjoint(self.words[:begin]):
+            return False
+        near = self.words[max(begin - 3, 0) : begin]
+        if not _LANES.isdisjoint(near) and _JOINTS.isdisjoint(near):
+            return True  # "one lane more to the right"
+        before = [word for word in self.words[max(begin - 4, 0) : begin] if word not in ("which", "that", "is", ",")]
+        return self.word_at(place) in ("one", "") and (self.word_at(place) == "one" or before[-1:] in _LANE_NOUNS)
+
+    def _stands_behind_stop(self) -> bool:
+        """Returns whether the last item is an order to stop: "stop to the right"."""
+        last = self.items[-1] if self.items else None
+        return isinstance(last, ActionItem) and last.kind == "stop"
+
+    def _behind_street(self, place: int) -> int:
+        """Returns the place behind "of the street"."""
+        if self.word_at(place) == "of":
+            rest = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
+            return rest + 1 if self.word_at(rest) in ("street", "road", "car") else place
+        return place

@@ -1,0 +1,120 @@
+"""Noun phrases of route talk: places, opportunities to turn, and their ordinals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from dorothie_gym.dialogue.plan_items import SIDES, NounPhrase, TokenReader
+from dorothie_gym.dialogue.routes import Anaphor, PlaceReference
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.route_grammar import Match
+
+_POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
+_UNKNOWN_WORDS: Final = 2
+"""Words between an article and the noun that the grammar need not know: "that daft red wall"."""
+
+
+class NounReader(TokenReader):
+    """Reads noun phrases."""
+
+    def noun_phrase(self, place: int) -> tuple[NounPhrase | None, int]:
+        """Returns the noun phrase at a place, and the place behind it."""
+        start, ordinal, article = place, None, False
+        while True:
+            number, behind = self.ordinal(place)
+            if number is not None and self._counts(place, behind):
+                ordinal, place, article = number, behind, True
+            elif self.word_at(place) in self.grammar.modifiers and place not in self.names:
+                article, place = True, place + 1
+            elif (
+                self.word_at(place).endswith("'s")
+                and place not in self.names
+                and self.word_at(place) not in self.grammar.subjects
+            ):
+                article, place = True, place + 1  # "granny's house"
+            else:
+                break
+        if (match := self._reference(start)) is not None:
+            return NounPhrase(PlaceReference(reference=Anaphor(match.kind)), None), start + match.length
+        found, behind = self._head(place, ordinal)
+        skipped = 0
+        while found is None and article and skipped < _UNKNOWN_WORDS and self._is_unknown(place + skipped):
+            skipped += 1
+            found, behind = self._head(place + skipped, ordinal)
+        if found is None and ordinal is not None and skipped == 0:
+            ends = (
+                ("", ",", "?", "on", "please", "then", "and")
+                if self.word_at(start) in self.grammar.determiners
+                else ("on",)
+            )
+            if self.word_at(place) in ends:
+                return NounPhrase(None, ordinal), place  # "not the first, the second"
+        return (found, behind) if found is not None else (None, start)
+
+    def _counts(self, place: int, behind: int) -> bool:
+        """Returns whether the number between two places belongs to a noun, as in no "first the KFC" or "two lefts"."""
+        adverb = self.words[place] == "first" and self.word_at(behind) in (
+            *self.grammar.determiners,
+            "#landmark",
+            "#street",
+        )
+        return not adverb and SIDES.get(self.word_at(behind)) is None
+
+    def _reference(self, place: int) -> Match | None:
+        asked = self.word_at(place - 1) in ("is", "are") and self.word_at(place + 1) in ("a", "any", "an")
+        if self.word_at(place) == "there" and (asked or self.word_at(place + 1) in ("is", "are", "was", "were")):
+            return None
+        return self.grammar.references.longest(self.words, place) if place < len(self.words) else None
+
+    def _is_unknown(self, place: int) -> bool:
+        word = self.word_at(place)
+        if not word.isalpha() or word in SIDES or word in ("lane", "lanes"):
+            return False
+        return self.grammar.terminals.longest(self.words, place) is None
+
+    def _head(self, place: int, ordinal: int | None) -> tuple[NounPhrase | None, int]:
+        """Returns the noun phrase whose noun is at a place."""
+        value = self.names.get(place)
+        if (
+            value is not None
+            and value.label != "Queried"
+            and isinstance(value, LandmarkName | StreetName | ObjectClass)
+        ):
+            return self._named(place, value, ordinal)
+        match = self.grammar.opportunities.longest(self.words, place) if place < len(self.words) else None
+        if match is None:
+            return None, place
+        end = place + match.length
+        if self.word_at(end) == "of" and self.words[place].startswith("corner"):
+            end += 1 + (self.word_at(end + 1) in self.grammar.determiners)
+            street = self.names.get(end)
+            if isinstance(street, StreetName):
+                return NounPhrase(PlaceReference(street=street), None), end + 1
+            return None, place
+        if self.word_at(end) == "after" and self.word_at(end + 1) in ("it", "that", "next"):
+            return NounPhrase(None, 2 if self.word_at(end + 1) == "next" else 1), end + 2
+        return NounPhrase(None, ordinal, self.words[place] in ("block", "blocks")), end
+
+    def _named(
+        self, place: int, value: LandmarkName | StreetName | ObjectClass, ordinal: int | None
+    ) -> tuple[NounPhrase, int]:
+        if ordinal is None and self.lead.get(place) == "next":
+            ordinal = 1
+        if isinstance(value, StreetName):
+            return NounPhrase(PlaceReference(street=value, ordinal=ordinal), ordinal), place + 1
+        street, end = self._street_of(place + 1)
+        named = PlaceReference(
+            landmark=value if isinstance(value, LandmarkName) else None,
+            street=street,
+            object=value if isinstance(value, ObjectClass) else None,
+            ordinal=ordinal,
+        )
+        return NounPhrase(named, ordinal), end
+
+    def _street_of(self, place: int) -> tuple[StreetName | None, int]:
+        """Returns the street of a place, as in "on Beal" behind "the house", and the token behind it."""
+        street = self.names.get(place + 1) if self.word_at(place) in _POSTPOSITIONS else None
+        named = isinstance(street, StreetName) and street is not StreetName.QUERIED
+        return (street, place + 2) if named and isinstance(street, StreetName) else (None, place)
