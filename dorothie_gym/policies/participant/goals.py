@@ -442,7 +442,7 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     no_street = goal.street is StreetName.UNKNOWN
     state.set_guiding(bool(no_street or state.task.described or rng.random() < state.style.leads))
     state.task = state.task.after_describing()
-    looks = looks_remark(state, goal, rng) if rng.random() < state.config.describes_looks else ()
+    looks = looks_remark(state, view, goal, rng) if rng.random() < state.config.describes_looks else ()
     corner = corner_fact(state, view, goal)
     named = any(goal.street in item.act.slots for item in state.speech.said)  # the street need not be said again
     if named and corner is not None and corner not in state.task.told:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.dialogue.looks import read_look
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.evaluation.analysis.truth_checks import plans
@@ -15,6 +16,7 @@ from dorothie_gym.maps.whereabouts import is_near_corner, is_on_right, signals_n
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
+from dorothie_gym.policies.place_looks import look_at
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
@@ -145,8 +147,15 @@ def _near(world: SessionWorld, said: Proposition, time: float, speaker: Role) ->
 
 
 def _looks(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether a landmark of the name has the stated feature, or all attributes that the words state."""
     place, feature = said.get("place"), said.get("feature")
-    return feature in features_of(place) if isinstance(place, LandmarkName) and feature is not None else None
+    if not isinstance(place, LandmarkName) or not isinstance(feature, str):
+        return None
+    seen = [look_at(world.town, place, row["x"], row["y"]) for row in world.landmarks(place)]
+    stated = read_look(feature)
+    if any(look is not None for look in seen):
+        return bool(stated.stated) and any(look is not None and stated.fits(look) for look in seen)
+    return feature in features_of(place)
 
 
 def _distance(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
