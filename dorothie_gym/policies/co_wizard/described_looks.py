@@ -74,24 +74,24 @@ def take_up_look(state: CoWizardState, look: Look, rng: np.random.Generator) -> 
 
 def compare_looks(state: CoWizardState, view: CoWizardView) -> None:
     """Compares the houses or people of the map that are in view with the description of the goal."""
-    beliefs = state.beliefs
-    if beliefs.look is None or not beliefs.look.stated or state.intentions.arrived:
+    beliefs, described = state.beliefs, state.beliefs.look
+    if described is None or not described.stated or state.intentions.arrived:
         return
     seen = [
         (mark, look)
         for mark in _in_view(view)
         if mark.name is beliefs.goal and mark.place not in beliefs.ruled_out and (look := look_of(state.town, mark))
     ]
-    wrong = tuple(mark.place for mark, look in seen if beliefs.look.contradicts(look))
+    wrong = tuple(mark.place for mark, look in seen if described.contradicts(look))
     if wrong:
         state.beliefs = beliefs = replace(beliefs, ruled_out=(*beliefs.ruled_out, *wrong))
     if beliefs.exact and beliefs.place in wrong:
         state.beliefs = beliefs.without_place()
         state.route = state.route.with_progress(None)
-        other = Proposition.of(Predicate.LOOKS, place=beliefs.goal, feature=beliefs.look.listed, negated=True)
+        other = Proposition.of(Predicate.LOOKS, place=beliefs.goal, feature=described.listed, negated=True)
         state.say(intend(Function.INFORM, other, elided=("place",), wording=Wording(topic="other_look")))
         return
-    fitting = [mark for mark, look in seen if beliefs.look.fits(look)]
+    fitting = [mark for mark, look in seen if described.fits(look)]
     if len(fitting) == 1 and not beliefs.exact:
         aim(state, view, fitting[0])
 

@@ -33,6 +33,7 @@ _REMINDS: Final = 0.1  # probability of a reminder of a step that the car has re
 _REMINDS_UNSURE: Final = 0.6  # probability of a reminder of another step
 _PLANS: Final = 2.0  # foresight of those who plan
 _SINGLE: Final = 0.2  # probability that they name one step all the same
+_WAITS: Final = 0.6  # share of the turns left to a question of the car that are also left out of a whole way
 _SLOW: Final = 4.0  # speed up to which there is time to say more than "turn around" [m/s]
 _SIDE: Final = 0.4  # probability that the end of the way is told with the side of the street
 _ROOM: Final = 3  # number of acts in one breath behind which there is room for another one
@@ -79,7 +80,7 @@ def tell_way(
     if key in guidance.way or guidance.step == key or guidance.looked_ahead == (key, near) or not (near or early):
         return ()
     state.guidance = replace(guidance, looked_ahead=(key, near))
-    if rng.random() < state.style.waits:
+    if rng.random() < _WAITS * state.style.waits:
         return ()
     steps = _steps(state, view, key, distance, rng)
     if len(steps) < 2 and not near:

@@ -95,9 +95,14 @@ def way_ahead(
         manner: manner of giving directions.
         rng: random generator of the decision.
     """
-    if state.town.lanes[view.lane].in_junction:
-        return ()
-    return _along(state, view, view.place, state.route.to_goal.legs, min(count, MOST_STEPS), manner, rng)
+    legs, here = state.route.to_goal.legs, view.place
+    if state.town.lanes[view.lane].in_junction:  # the way begins behind the junction that the car is crossing
+        behind = next((k for k, leg in enumerate(legs) if not state.town.lanes[leg.lane].in_junction), len(legs))
+        legs = legs[behind:]
+        if not legs:
+            return ()
+        here = legs[0].lane, legs[0].start
+    return _along(state, view, here, legs, min(count, MOST_STEPS), manner, rng)
 
 
 def way_behind_u_turn(
