@@ -11,9 +11,9 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.looks import Look, read_look
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.dialogue.routes import DrivingPlan
+from dorothie_gym.dialogue.routes import DrivingPlan, PlanStep, StepAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, Slot
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
 from dorothie_gym.policies.co_wizard.goals import aim
 from dorothie_gym.policies.observation_parser import IN_VIEW, SeenLandmark, landmarks_in_view
@@ -32,6 +32,9 @@ _MOVES: Final = frozenset(
 _SOMEBODY: Final = re.compile(r"\blook (?:out )?for (?:somebody|someone|a person)\b", re.IGNORECASE)
 """Beginning of a description of a person, also where its colours were misheard."""
 
+_SEEKING: Final = frozenset({StepAction.VISIT, StepAction.STRAIGHT, StepAction.STOP})
+_DESCRIBED: Final = frozenset({LandmarkName.HOUSE, LandmarkName.PERSON, ObjectClass.PEDESTRIAN})
+
 _ORDERS: Final = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.STOP, ActionValue.LANE_SWITCH})
 
 
@@ -43,8 +46,9 @@ def looks_heard(state: CoWizardState, heard: HeardUtterance) -> dict[int, Look]:
     found: dict[int, Look] = {}
     for number, act in enumerate(heard.acts):
         orders = _ORDERS & set(act.values(Slot.ACTION)) or act.values(Slot.STREET) or act.values(Slot.STATUS)
-        if act.move in _MOVES and not orders:
-            text = heard.words_of(number).text
+        words = heard.words_of(number)
+        if act.move in _MOVES and not orders and words.distance is None:
+            text = words.text
             look = read_look(text)
             person = state.beliefs.goal is LandmarkName.PERSON
             if (look.stated and _kind_of(look) is state.beliefs.goal) or (person and _SOMEBODY.search(text)):
@@ -54,11 +58,14 @@ def looks_heard(state: CoWizardState, heard: HeardUtterance) -> dict[int, Look]:
 
 def without_looks(heard: HeardUtterance, looks: dict[int, Look]) -> HeardUtterance:
     """Returns an utterance without the steps that some of its acts seem to ask for, because they describe a look."""
-    seeming = {step for number in looks for step in heard.words_of(number).plan}
-    if not seeming:
-        return heard
-    rest = DrivingPlan(tuple(step for step in heard.words.plan if step not in seeming))
-    return replace(heard, words=replace(heard.words, plan=rest))
+    steps = tuple(step for step in heard.words.plan if not (looks and _only_identifies(step)))
+    return replace(heard, words=replace(heard.words, plan=DrivingPlan(steps)))
+
+
+def _only_identifies(step: PlanStep) -> bool:
+    """Returns whether a step only names the house or the person that is described: "look for somebody in red"."""
+    places = {place.landmark for place in step.places} | {place.object for place in step.places}
+    return step.action in _SEEKING and not places.isdisjoint(_DESCRIBED)
 
 
 def take_up_look(state: CoWizardState, look: Look, rng: np.random.Generator) -> None:

@@ -11,7 +11,6 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.maps.model import SignalKind
-from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
@@ -23,7 +22,7 @@ from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.looks import Look
-    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+    from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
 FAMOUS = frozenset(LandmarkName) - {
@@ -113,23 +112,6 @@ def _distinguished(goal: SeenLandmark, look: Look, rng: np.random.Generator) -> 
         return Proposition.of(Predicate.LOOKS, place=goal.name, feature=look.house)
     kind = ObjectClass.BUILDING if rng.random() < _AS_BUILDING else None
     return Proposition.of(Predicate.LOOKS, place=goal.name, object=kind, feature=look.listed)
-
-
-def side_remark(state: ParticipantState, view: ParticipantView, last: StepKey) -> tuple[Remark, ...]:
-    """Returns the remark on which side of the street the target is behind a turn, if that is the last of the route."""
-    goal, progress = state.task.goal, state.route.progress
-    turns = [] if progress is None else list(progress.crossings(state.town, view.station))
-    if (
-        goal is None
-        or goal.name is LandmarkName.PERSON
-        or not turns
-        or (turns[-1].lane, turns[-1].exit.connector) != last[1:]
-    ):
-        return ()
-    if progress is None or any(leg.entry is LaneEntry.U_TURN for leg in progress.legs[1:]):
-        return ()
-    side = Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
-    return (_said(state, side),) if side not in state.task.told else ()
 
 
 def famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> SeenLandmark | None:

@@ -11,7 +11,7 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.participant.hints import side_remark
+from dorothie_gym.policies.participant.approach_end import ending_behind
 from dorothie_gym.policies.participant.way_ahead import WayStep, way_ahead, way_behind_u_turn, way_remarks
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.policy import replace
@@ -149,7 +149,7 @@ def _said(
     state.guidance = state.guidance.after_describing(tuple(rest), now)
     remarks = way_remarks(steps, move)
     if len(steps) <= _ROOM and move is DialogueMove.INSTRUCT and rng.random() < _SIDE:
-        remarks = (*remarks, *side_remark(state, view, steps[-1].keys[-1]))
+        remarks = (*remarks, *ending_behind(state, view, steps[-1].keys[-1], rng))
     return remarks
 
 
