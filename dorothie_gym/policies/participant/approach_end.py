@@ -82,6 +82,13 @@ def _side_of(state: ParticipantState, goal: SeenLandmark) -> Direction:
 
 def _marks(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> Iterator[_Mark]:
     """Yields what stands beside a place, or tells it from its neighbours."""
+    look = distinguishing_look(state.town, goal, view.landmarks)
+    if goal.name is LandmarkName.PERSON:  # who is no "it"
+        if look is not None:
+            person = ObjectClass.PEDESTRIAN
+            fact = Proposition.of(Predicate.LOOKS, place=goal.name, object=person, feature=look.listed)
+            yield _Mark(fact, "at_end_person")
+        return
     near = famous_nearby(goal, view, _BESIDE)
     if near is not None and view.unique(near):
         yield _Mark(Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name), "at_end")
@@ -93,12 +100,5 @@ def _marks(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -
     corner = corner_fact(state, view, goal)
     if corner is not None:
         yield _Mark(corner, "at_end")
-    look = distinguishing_look(state.town, goal, view.landmarks)
-    if look is None:
-        return
-    if goal.name is LandmarkName.HOUSE:
+    if look is not None:
         yield _Mark(Proposition.of(Predicate.LOOKS, place=goal.name, feature=look.house), "at_end_house", ())
-    else:
-        person = ObjectClass.PEDESTRIAN
-        fact = Proposition.of(Predicate.LOOKS, place=goal.name, object=person, feature=look.listed)
-        yield _Mark(fact, "at_end_person")

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from dorothie_gym.dialogue.looks import read_look
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
@@ -17,6 +19,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.policies.place_looks import look_at
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
@@ -36,6 +39,7 @@ TIME_FACTOR: Final = 1.5
 SHORT_TIME: Final = 15.0
 """Largest irrelevant difference of times [s]."""
 
+_PASSING: Final = 30.0  # distance from a place within which the car passes it [m]
 _POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
 _SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
 _NEAR: Final = 130.0  # largest distance of two places near each other [m]
@@ -158,6 +162,17 @@ def _looks(world: SessionWorld, said: Proposition, time: float, speaker: Role) -
     return feature in features_of(place)
 
 
+def _passed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether the car has come past a place on this trip; None where a number of times since the errand is stated."""
+    place = said.get("place")
+    if not isinstance(place, LandmarkName) or said.get("times") is not None:
+        return None
+    rows = world.session.trajectory
+    driven = rows[rows["frame"] <= time * FRAME_RATE]
+    near = [np.hypot(driven["x"] - row["x"], driven["y"] - row["y"]) <= _PASSING for row in world.landmarks(place)]
+    return any(bool(each.any()) for each in near)
+
+
 def _distance(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
     """Whether the shortest route has about the stated length; detours around roadblocks are ignored."""
     place, metres = said.get("place"), said.get("metres")
@@ -264,6 +279,7 @@ _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.NEAR: _near,
     Predicate.LOOKS: _looks,
     Predicate.DISTANCE: _distance,
+    Predicate.PASSED: _passed,
     Predicate.FEELS: _feels,
     Predicate.ARRIVES_IN: _arrives_in,
     Predicate.CLOSE: _close,
