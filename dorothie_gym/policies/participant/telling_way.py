@@ -32,9 +32,10 @@ _FORGOTTEN: Final = 40.0  # time after which one reminds of a step [s]
 _REMINDS: Final = 0.1  # probability of a reminder of a step that the car has repeated a moment ago
 _REMINDS_UNSURE: Final = 0.6  # probability of a reminder of another step
 _PLANS: Final = 2.0  # foresight of those who plan
-_SINGLE: Final = 0.2  # probability that they name one step all the same
+_SINGLE: Final = 0.08  # probability that they name one step all the same
 _WAITS: Final = 0.6  # share of the turns left to a question of the car that are also left out of a whole way
 _SLOW: Final = 4.0  # speed up to which there is time to say more than "turn around" [m/s]
+_U_TURN_ROOM: Final = 40.0  # road that a U-turn needs behind the words, so that they may be longer [m]
 _SIDE: Final = 0.4  # probability that the end of the way is told with the side of the street
 _ROOM: Final = 3  # number of acts in one breath behind which there is room for another one
 _BRIEF: Final = 12.0  # time within which the car takes up directions [s]
@@ -127,7 +128,9 @@ def _looks_ahead(state: ParticipantState, rng: np.random.Generator) -> int:
 def way_back(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns the description of the way behind a U-turn, to be said after the instruction to turn round."""
     steps = way_behind_u_turn(state, view, _looks_ahead(state, rng) - 1, state.style.manner, rng)
-    if view.speed > _SLOW or not steps or rng.random() < state.style.waits:
+    rest = state.town.lanes[view.lane].length - view.station
+    hurried = view.speed > _SLOW and rest < _TELLING * (len(steps) + 1) * view.speed + _U_TURN_ROOM
+    if hurried or not steps or rng.random() < _WAITS * state.style.waits:
         return ()
     keys = tuple(key for one in steps for key in one.keys)
     state.guidance = state.guidance.after_describing(keys, view.time)
