@@ -113,10 +113,13 @@ class ClauseReader:
         grammar, words = route_grammar(), self.words
         if place >= len(words) or words[place] not in _LOCATING:
             return False
-        end = next((number for number in range(place, len(words)) if words[number] in (",", "?")), len(words))
-        matches = [grammar.terminals.longest(words, number) for number in range(place, end)]
-        acts = any(match is not None and match.group in ("actions", "verbs", "lights") for match in matches)
-        return not (acts or {"left", "right"} & set(words[place:end]))
+        while place < len(words) and words[place] not in (",", "?"):
+            match = grammar.terminals.longest(words, place)
+            acts = match is not None and match.group in ("actions", "verbs", "lights")
+            if acts or words[place] in ("left", "right"):
+                return False
+            place += 1 if match is None else match.length
+        return True
 
     def _states(self, place: int) -> bool:
         """Returns whether a finite verb comes before anything that is ordered: "nobody's coming", "turning left"."""
