@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _NEAR: Final = 90.0  # distance to a turn within which an announcement of the car is about it [m]
 _LANE: Final = (30.0, 70.0)  # distances to a turn between which a wrong lane is pointed out [m]
 _TIME: Final = 6.0  # time since the last order within which the car may still be about to obey it [s]
+_OBEYING: Final = 4.0  # time that the car has after an order before it is corrected [s]
 _TURNING: Final = 7.0  # speed at which a car still turns without haste [m/s]
 _SIDEWAYS: Final = frozenset({Direction.LEFT, Direction.RIGHT})
 
@@ -37,11 +38,12 @@ def correct_early(state: ParticipantState, view: ParticipantView, rng: np.random
         return
     if not state.speech.idle or view.speaking > 0.0 or state.guidance.corrected == step.key:
         return
-    settled = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end) > _TIME
+    ordered = max(state.guidance.step_at, state.speech.last_end)
+    settled = view.time - max(ordered, state.conversation.heard_at) > _TIME
     lane = _missing_lane(state, view, step)
     if lane is not None and settled:
         wording, action = Wording(topic="early_lane", direction=lane), ActionValue.LANE_SWITCH
-    elif _is_too_fast(state, view, step) and rng.random() < state.style.corrects:
+    elif view.time - ordered > _OBEYING and _is_too_fast(state, view, step) and rng.random() < state.style.corrects:
         wording, action = Wording(topic="early_turn", direction=step.direction), ActionValue.J_TURN
     else:
         return

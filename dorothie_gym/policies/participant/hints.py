@@ -97,8 +97,8 @@ def looks_remark(
     state: ParticipantState, view: ParticipantView, goal: SeenLandmark, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
     """Returns a remark on the look of a place, which tells a house or person from others; none if it is unknown."""
-    individual = distinguishing_look(state.town, goal, view.landmarks)
-    if individual is not None:
+    individual, told = distinguishing_look(state.town, goal, view.landmarks), _features_told(state)
+    if individual is not None and told.isdisjoint((individual.listed, individual.house)):
         return (_said(state, _distinguished(goal, individual, rng)),)
     features = list(_looks(state, goal))
     return (_said(state, features[int(rng.integers(len(features)))]),) if features else ()
@@ -181,9 +181,13 @@ def corner_fact(state: ParticipantState, view: ParticipantView, goal: SeenLandma
     return Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street, cross=crossing)
 
 
+def _features_told(state: ParticipantState) -> set[object]:
+    return {said.get("feature") for said in state.task.told} - {None}
+
+
 def _looks(state: ParticipantState, goal: SeenLandmark) -> Iterator[Proposition]:
     person, look = goal.name is LandmarkName.PERSON, look_of(state.town, goal)
-    told = {said.get("feature") for said in state.task.told}
+    told = _features_told(state)
     single = features_of(goal.name) if look is None else replace(look, storeys=None).features
     for feature in (each for each in single if each not in told):
         kinds = (ObjectClass.PEDESTRIAN,) if person else (ObjectClass.BUILDING, None)

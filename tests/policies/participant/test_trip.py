@@ -15,6 +15,7 @@ from dorothie_gym.maps.whereabouts import is_on_right
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies.participant.approach_end import ending
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn, correct_early
+from dorothie_gym.policies.participant.hints import looks_remark
 from dorothie_gym.policies.participant.trip_memory import TripMemory
 from dorothie_gym.policies.participant.trip_talk import recollection, trip_questions, trip_remarks
 from dorothie_gym.policies.place_looks import look_of
@@ -164,6 +165,23 @@ def test_a_car_too_fast_for_its_turn_is_corrected_once(turning: Drive) -> None:
     turning.state.speech = turning.state.speech.cleared()
     correct_early(turning.state, turning.view, np.random.default_rng(0))
     assert not turning.state.speech.queue
+
+
+def test_a_car_that_was_just_told_has_time_to_obey(turning: Drive) -> None:
+    turning.state.guidance = replace(turning.state.guidance, step_at=turning.view.time - 2.0)
+    correct_early(turning.state, turning.view, np.random.default_rng(0))
+    assert not turning.state.speech.queue
+
+
+def test_the_look_of_a_place_is_stated_once(drive: Drive) -> None:
+    site = drive.town.sites[4]
+    house = replace(drive.view.landmarks[0], name=LandmarkName.HOUSE, x=site.position[0], y=site.position[1])
+    features = []
+    for seed in range(6):
+        for remark in looks_remark(drive.state, drive.view, house, np.random.default_rng(seed)):
+            features.append(read_look(str(remark.meaning[0].get("feature"))))
+    assert len(features) >= 3
+    assert all(one != other for one, other in itertools.combinations(features, 2))
 
 
 @pytest.mark.parametrize("change", [{"speed": 6.0}, {"standing": True}])
