@@ -181,8 +181,9 @@ def corner_fact(state: ParticipantState, view: ParticipantView, goal: SeenLandma
     return Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street, cross=crossing)
 
 
-def _features_told(state: ParticipantState) -> set[object]:
-    return {said.get("feature") for said in state.task.told} - {None}
+def _features_told(state: ParticipantState) -> set[str]:
+    features = (said.get("feature") for said in state.task.told)
+    return {feature for feature in features if isinstance(feature, str)}
 
 
 def _looks(state: ParticipantState, goal: SeenLandmark) -> Iterator[Proposition]:

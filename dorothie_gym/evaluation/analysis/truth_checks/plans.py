@@ -100,8 +100,8 @@ def has_status(world: SessionWorld, said: Proposition, time: float, speaker: Rol
     """Returns whether the task at a place has a status: open ones may be called pending or ongoing."""
     place, status, count = (said.get(name) for name in ("place", "status", "count"))
     if isinstance(count, int) and status is GoalStatus.PENDING:
-        found = [value for name in LandmarkName for value in world.statuses(time, name)]
-        return sum(value in _OPEN for value in found) == count + 1  # besides the present one
+        errands = [value for name in LandmarkName for value in world.statuses(time, name)]
+        return sum(value in _OPEN for value in errands) == count + 1  # besides the present one
     if not isinstance(place, LandmarkName) or not isinstance(status, GoalStatus):
         return None
     found = set(world.statuses(time, place))
