@@ -6,6 +6,7 @@ is chosen:
 - `history`: `HistGradientBoostingClassifier` on the last moves with their speakers, the last physical actions with
   their angles, and the ages of both; no words, slots or places.
 - `state`: the same classifier on the features of the row `trees` of `dorothie-gym train`, with slots and the car.
+- `moves`: the same classifier on the last moves with their speakers alone.
 - `words`: `LogisticRegression` on TF-IDF weights of the last utterances and on the last move.
 """
 
@@ -75,6 +76,10 @@ def _last_move(columns: Columns, table: PointTable) -> sparse.csr_matrix:
     return sparse.csr_matrix(np.eye(31)[last])
 
 
+def _moves(columns: Columns, tables: Sequence[PointTable]) -> list[Any]:
+    return [history(columns, table)[:, :MOVES] for table in tables]
+
+
 def _histories(columns: Columns, tables: Sequence[PointTable]) -> list[Any]:
     return [history(columns, table) for table in tables]
 
@@ -99,17 +104,29 @@ def _words(columns: Columns, tables: Sequence[PointTable]) -> list[Any]:
 
 MODELS: Final[Mapping[str, Callable[[Columns, Sequence[PointTable]], list[Any]]]] = {
     "history": _histories,
+    "moves": _moves,
     "state": _states,
     "words": _words,
 }
 """Features of each model for several tables; `words` takes its vocabulary from the first one."""
+
+TASKS: Final[Mapping[str, tuple[Task, ...]]] = {
+    "history": tuple(Task),
+    "moves": (Task.UFN, Task.RFN),
+    "state": tuple(Task),
+    "words": (Task.UFN, Task.RFN),
+}
+"""Tasks of each model."""
+
+UNSEEN: Final = 1e-4
+"""Smallest probability of a class that is counted, also of one that was not learned."""
 
 LIMITS: Final = {("history", Task.UFN): 0.52, ("history", Task.NFD): 0.65, ("words", Task.UFN): 0.80}
 """Largest shares that are accepted."""
 
 
 def _foreseen(columns: Columns, task: Task, name: str) -> dict[str, float]:
-    """Returns the accuracy of a model at a task, the share of the commonest class, and the numbers of points."""
+    """Returns accuracy and bits per point of a model at a task, the share of the commonest class, and counts."""
     tables = [points(columns, task, fold) for fold in ("train", "val", "test")]
     learned, *unseen = MODELS[name](columns, tables)
     labels, *truths = (each.label_action if task is Task.NFD else each.label_move for each in tables)
@@ -118,9 +135,12 @@ def _foreseen(columns: Columns, task: Task, name: str) -> dict[str, float]:
     model = LogisticRegression(max_iter=1000) if words else HistGradientBoostingClassifier(random_state=0)
     model.fit(learned, labels)
     truth = np.concatenate(truths)
-    found = np.concatenate([model.predict(inputs) for inputs in unseen if inputs.shape[0]])
+    shares = np.concatenate([model.predict_proba(inputs) for inputs in unseen if inputs.shape[0]])
+    found = model.classes_[shares.argmax(axis=1)]
+    of_truth = (shares * (model.classes_ == truth[:, None])).sum(axis=1)
     return {
         "accuracy": float(np.mean(found == truth)),
+        "bits": float(-np.log2(np.maximum(of_truth, UNSEEN)).mean()),
         "majority": float(np.mean(truth == np.bincount(labels).argmax())),
         "points": len(truth),
         "training_points": len(labels),
@@ -131,17 +151,14 @@ def main(
     corpus: Annotated[Path, typer.Argument(help="folder of the corpus, with folds")],
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> None:
-    """Prints the share of points that each model foresees, beside the share of the commonest class."""
+    """Prints the share of points that each model foresees and its bits per point, beside the commonest class."""
     with reporting_errors(), threadpool_limits(1):
         columns = build(corpus)
-        found = {
-            name: {task.value: _foreseen(columns, task, name) for task in tasks}
-            for name, tasks in {"history": tuple(Task), "state": tuple(Task), "words": (Task.UFN, Task.RFN)}.items()
-        }
+        found = {name: {task.value: _foreseen(columns, task, name) for task in tasks} for name, tasks in TASKS.items()}
     if as_json:
         print(json.dumps(found))
         return
-    table = Table("model", "task", "foreseen", "at most", "commonest", "points")
+    table = Table("model", "task", "foreseen", "at most", "bits", "commonest", "points")
     for name, tasks in found.items():
         for task, shares in tasks.items():
             limit = LIMITS.get((name, Task(task)))
@@ -150,6 +167,7 @@ def main(
                 task,
                 f"{100 * shares['accuracy']:.1f} %",
                 "" if limit is None else f"{100 * limit:.0f} %",
+                f"{shares['bits']:.2f}",
                 f"{100 * shares['majority']:.1f} %",
                 f"{shares['points']:,}",
             )

@@ -25,6 +25,9 @@ ORDERED: Final = frozenset({ClauseMood.COMMAND, ClauseMood.REQUEST})
 _BASE_FORMS: Final = frozenset({"speed", "proceed", "need", "bring", "swing"})
 """Verbs that end as participles do."""
 
+_LOCATING: Final = frozenset({"by", "next", "near", "close", "beside", "opposite", "just"})
+"""First words of phrases that tell where something stands."""
+
 _SUBJECT_WORDS: Final = 6
 """Words of a clause among which its finite verb is sought."""
 
@@ -84,7 +87,8 @@ class ClauseReader:
             return ClauseMood.QUESTION if before is ClauseMood.QUESTION else ClauseMood.COMMAND
         word = self.words[place] if place < len(self.words) else ""
         past = word.endswith("ed") and word not in _BASE_FORMS
-        return ClauseMood.STATEMENT if past or is_participle(word) or self._names_only(place) else ClauseMood.COMMAND
+        states = past or is_participle(word) or self._names_only(place) or self._locates(place)
+        return ClauseMood.STATEMENT if states else ClauseMood.COMMAND
 
     def _begins_order(self, place: int) -> bool:
         """Returns whether an imperative stands behind a comma."""
@@ -119,6 +123,19 @@ class ClauseReader:
             for number in range(place, end)
         )
         return named and quiet
+
+    def _locates(self, place: int) -> bool:
+        """Returns whether a clause goes on with where something is: "it's on the right, by the lights"."""
+        grammar, words = route_grammar(), self.words
+        if place >= len(words) or words[place] not in _LOCATING:
+            return False
+        while place < len(words) and words[place] not in (",", "?"):
+            match = grammar.terminals.longest(words, place)
+            acts = match is not None and match.group in ("actions", "verbs", "lights")
+            if acts or words[place] in ("left", "right"):
+                return False
+            place += 1 if match is None else match.length
+        return True
 
     def _states(self, place: int) -> bool:
         """Returns whether a finite verb comes before anything that is ordered: "nobody's coming", "turning left"."""

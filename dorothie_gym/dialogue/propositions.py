@@ -108,14 +108,14 @@ class Predicate(enum.StrEnum):
     BEHIND = "behind"
     """A landmark is behind the car."""
     PASSED = "passed"
-    """The car has driven past a landmark, a number of times."""
+    """The car has driven past a landmark: a number of times since the errand began, or else once on this trip."""
     TRIED = "tried"
     """An action, or every attempt to reach the place, has failed a number of times."""
     NEARER = "nearer"
     """The route to a landmark is shorter than that to another one."""
     # the tasks
     TASK = "task"
-    """The errand at a landmark has a status."""
+    """The errand at a landmark has a status, or a number of errands besides the present one has."""
     ORDER = "order"
     """An errand comes before another one."""
     PURPOSE = "purpose"
@@ -182,7 +182,7 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.PASSED: {**_PLACE, "times": int},
         Predicate.TRIED: {"action": ActionValue, "times": int},
         Predicate.NEARER: {**_PLACE, "landmark": LandmarkName},
-        Predicate.TASK: {**_PLACE, "street": StreetName, "status": GoalStatus},
+        Predicate.TASK: {**_PLACE, "street": StreetName, "status": GoalStatus, "count": int},
         Predicate.ORDER: {"place": LandmarkName, "then": LandmarkName},
         Predicate.PURPOSE: {**_PLACE, "purpose": str, "person": str, "item": str, "reason": str},
         Predicate.GOAL: {**_PLACE, "street": StreetName},

@@ -1,6 +1,7 @@
-"""Designs of the landmarks' buildings: forms and colours, as the camera draws them and speakers describe them.
+"""Designs of the landmarks: forms and colours of buildings and people, as the camera draws and speakers describe them.
 
-All houses are alike, and all persons: their looks do not show which of them is a goal. The designs are our own.
+A brand looks the same everywhere. Houses and people differ by their site, so that no two of a town look alike. Their
+colours are rare among the other buildings and the people in the streets. The designs are our own.
 """
 
 from __future__ import annotations
@@ -60,11 +61,29 @@ class StoreDesign:
 
 @dataclass(frozen=True)
 class HouseDesign:
-    """Colours of a house: walls, gabled roof, and frames of the windows."""
+    """Form and colours of a house.
+
+    Attributes:
+        wall: colour of the walls.
+        roof: colour of the gabled roof.
+        trim: colour of the frames of the windows, and of the gable.
+        storeys: number of storeys.
+        tree: whether a tree stands beside it.
+    """
 
     wall: Colour
     roof: Colour
     trim: Colour
+    storeys: int
+    tree: bool
+
+
+@dataclass(frozen=True)
+class PersonDesign:
+    """Clothes of a waiting person: a coat and trousers."""
+
+    coat: Colour
+    trousers: Colour
 
 
 STORES: Final[Mapping[LandmarkName, StoreDesign]] = MappingProxyType(
@@ -86,20 +105,40 @@ STORES: Final[Mapping[LandmarkName, StoreDesign]] = MappingProxyType(
 MIDDLE_STRIPE: Final[Colour] = (208, 30, 44)
 """Colour of the stripe between those of accent and fascia (`Top.STRIPED`)."""
 
-HOUSE: Final = HouseDesign((46, 178, 184), (222, 74, 36), (250, 250, 246))
+_WALLS: Final[tuple[Colour, ...]] = ((46, 178, 184), (240, 202, 70), (126, 92, 168), (58, 104, 190), (92, 158, 84))
+"""Colours of houses; none has the everyday name of a colour of the facades of other buildings, but for glass fronts."""
 
-COAT: Final[Colour] = (250, 216, 30)
-"""Colour of the coat of a waiting person."""
+_ROOFS: Final[tuple[Colour, ...]] = ((222, 74, 36), (34, 34, 38), (242, 242, 238), (104, 60, 36), (240, 140, 34))
+
+_TRIMS: Final[tuple[Colour, ...]] = ((250, 250, 246), (30, 30, 32), (250, 250, 246), (206, 44, 38))
+
+_COATS: Final[tuple[Colour, ...]] = ((250, 216, 30), (206, 36, 40), (40, 150, 70), (44, 92, 200), (128, 70, 170))
+
+_TROUSERS: Final[tuple[Colour, ...]] = ((40, 60, 140), (236, 234, 228), (24, 24, 26), (112, 68, 38), (128, 128, 128))
+"""Trousers; the last is gray. Together with `_COATS`, 25 sites differ."""
+
+
+def house_design(site: int) -> HouseDesign:
+    """Returns the design of a house by the id of its site: neighbouring sites differ in every colour."""
+    row = site // len(_WALLS)
+    return HouseDesign(
+        wall=_WALLS[site % len(_WALLS)],
+        roof=_ROOFS[(site + row) % len(_ROOFS)],
+        trim=_TRIMS[(site + row) % len(_TRIMS)],
+        storeys=1 + (site + row // 2) % 2,
+        tree=(site // 2 + row) % 3 == 0,
+    )
+
+
+def person_design(site: int) -> PersonDesign:
+    """Returns the clothes of a person by the id of the site."""
+    row = site // len(_COATS)
+    return PersonDesign(coat=_COATS[site % len(_COATS)], trousers=_TROUSERS[(site + row) % len(_TROUSERS)])
 
 
 @lru_cache(maxsize=64)
 def features_of(name: LandmarkName) -> tuple[str, ...]:
-    """Returns the visible features of a landmark, as phrases with an article ("a red roof"); empty for other names."""
-    if name is LandmarkName.HOUSE:
-        wall, roof, trim = map(colour_name, (HOUSE.wall, HOUSE.roof, HOUSE.trim))
-        return f"{_with_article(wall)} facade", f"{_with_article(roof)} roof", f"{trim} window frames"
-    if name is LandmarkName.PERSON:
-        return (f"{_with_article(colour_name(COAT))} coat",)
+    """Returns the visible features of a brand, as phrases with an article ("a red roof"); empty for other names."""
     design = STORES.get(name)
     if design is None:
         return ()

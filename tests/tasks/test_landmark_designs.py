@@ -5,21 +5,22 @@ from __future__ import annotations
 import pytest
 
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.tasks.landmark_designs import HOUSE, STORES, colour_name, features_of
+from dorothie_gym.tasks.landmark_designs import STORES, colour_name, features_of, house_design, person_design
 
 NAMELESS = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
+INDIVIDUAL = (LandmarkName.HOUSE, LandmarkName.PERSON)
 
 
-@pytest.mark.parametrize("name", [name for name in LandmarkName if name not in NAMELESS], ids=str)
-def test_every_landmark_has_features_with_colours(name):
+@pytest.mark.parametrize("name", STORES, ids=str)
+def test_every_brand_has_features_with_colours(name):
     features = features_of(name)
     assert features
     assert len(set(features)) == len(features)
     assert all(feature.isascii() and feature == feature.lower() for feature in features)
 
 
-@pytest.mark.parametrize("name", NAMELESS, ids=str)
-def test_places_without_a_building_have_no_features(name):
+@pytest.mark.parametrize("name", [*NAMELESS, *INDIVIDUAL], ids=str)
+def test_places_without_a_design_of_their_name_have_no_features(name):
     assert features_of(name) == ()
 
 
@@ -37,4 +38,14 @@ def test_colours_have_everyday_names(colour, name):
 
 def test_brands_differ_in_what_they_look_like():
     assert len({features_of(name) for name in STORES}) == len(STORES)
-    assert colour_name(HOUSE.roof) in " ".join(features_of(LandmarkName.HOUSE))
+
+
+def test_neighbours_differ_in_every_colour():
+    for site in range(40):
+        house, beside = house_design(site), house_design(site + 1)
+        assert house.wall != beside.wall
+        assert house.roof != beside.roof
+        person, next_one = person_design(site), person_design(site + 1)
+        assert person.coat != next_one.coat
+        assert person.trousers != next_one.trousers
+        assert colour_name(house.wall) != colour_name(house.roof)

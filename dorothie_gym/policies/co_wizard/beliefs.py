@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dorothie_gym.dialogue.looks import Look
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.actions import MentalAction
@@ -29,6 +30,7 @@ class BeliefState:
         sent_goal: landmark of the last goal update with a guessed place.
         owner: person whose house is the goal, according to the participant; None if it is not a house, or a house
             without a named owner.
+        look: look of the goal as the participant has described it.
     """
 
     goal: LandmarkName | None = None
@@ -42,6 +44,7 @@ class BeliefState:
     told: tuple[Proposition, ...] = ()
     sent_goal: LandmarkName | None = None
     owner: str | None = None
+    look: Look | None = None
 
     @property
     def stop_place(self) -> Place | None:
@@ -72,12 +75,14 @@ class BeliefState:
 
     def with_known_goal(self, landmark: LandmarkName, place: Place) -> BeliefState:
         """Sets a goal whose place is on the map."""
-        return replace(self, goal=landmark, place=place, exact=True, sent_goal=None)
+        look = self.look if landmark is self.goal else None
+        return replace(self, goal=landmark, place=place, exact=True, sent_goal=None, look=look)
 
     def with_unknown_goal(self, landmark: LandmarkName) -> BeliefState:
         """Sets a goal whose place is not on the map; a description of the same goal stays valid."""
         again = self.goal is landmark and not self.exact
-        return replace(self, goal=landmark, place=None, exact=False, described=again and self.described, plan=())
+        described, look = again and self.described, self.look if again else None
+        return replace(self, goal=landmark, place=None, exact=False, described=described, plan=(), look=look)
 
     def with_goal_ahead(self, landmark: LandmarkName | None) -> BeliefState:
         """Marks the goal as close ahead at a place that is not exactly known; `landmark` renames it."""
@@ -103,6 +108,10 @@ class BeliefState:
         """Records that the participant has described where the goal lies."""
         return replace(self, described=True)
 
+    def with_look(self, look: Look) -> BeliefState:
+        """Adds to the look of the goal."""
+        return replace(self, look=look if self.look is None else self.look.joined(look))
+
     def with_place_ruled_out(self) -> BeliefState:
         """Excludes the current place as a candidate for the name of its landmark."""
         return self if self.place is None else replace(self, ruled_out=(*self.ruled_out, self.place))
@@ -113,4 +122,4 @@ class BeliefState:
 
     def without_goal(self) -> BeliefState:
         """Removes the goal."""
-        return replace(self, goal=None, place=None, exact=False, plan=(), sent_goal=None)
+        return replace(self, goal=None, place=None, exact=False, plan=(), sent_goal=None, look=None)

@@ -25,6 +25,7 @@ from dorothie_gym.policies.co_wizard.answers import (
     switch_lights_on,
 )
 from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
+from dorothie_gym.policies.co_wizard.described_looks import looks_heard, take_up_look, without_looks
 from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
 from dorothie_gym.policies.co_wizard.goals import (
     COMMON,
@@ -101,14 +102,19 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     unclear = is_unclear(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
-    planned = planned_acts(state, heard)
-    if unclear or (_mishears(state, view, heard, rng) and not planned):
+    looks = looks_heard(state, heard)
+    heard = without_looks(heard, looks)
+    planned = planned_acts(state, heard) - looks.keys()
+    if unclear or (_mishears(state, view, heard, rng) and not planned and not looks):
         ask_back(state, view, heard.words)
         state.say(*before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
     note_owner(state, heard)
     for number, act in enumerate(heard.acts):
+        if number in looks:
+            take_up_look(state, looks[number], rng)
+            continue
         asks = act.move in _IDLE and heard.words.question and heard.words.asked is not None
         react = answer_open if asks else _REACTIONS.get(act.move)
         if react is not None and number not in planned:

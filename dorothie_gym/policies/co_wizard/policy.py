@@ -11,6 +11,7 @@ from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.co_wizard.described_looks import compare_looks
 from dorothie_gym.policies.co_wizard.dialogue_update import listen
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, junction_ahead, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
@@ -115,6 +116,7 @@ def attend(observation: ObservationMapping, state: CoWizardState) -> PendingDeci
     watch_road(updated, view, rng)
     search_on(updated, view)
     recognise_goal(updated, view)
+    compare_looks(updated, view)
     keep_plan(updated, view)
     creep(updated, view)
     return PendingDecision(updated, view, rng)

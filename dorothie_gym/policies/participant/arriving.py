@@ -16,6 +16,7 @@ from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies.participant.approach_end import ending
 from dorothie_gym.policies.participant.given_orders import times_told
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
@@ -65,6 +66,9 @@ REWORDINGS = 4
 
 BEHIND_CORNER = 5.0
 """Distance from the start of a lane within which a car has just turned and is about to accelerate [m]."""
+
+ENDING_TIME = 2.0
+"""Time to say on which side of the street the place is, and what stands there [s]."""
 
 STANDING_RANGE = 45.0
 """Distance to the place within which a standing car gets its next instruction [m]."""
@@ -177,19 +181,22 @@ def _announce_place(state: ParticipantState, view: ParticipantView, left: float,
     if goal is None:
         return
     if left > 3.5 * speed + 20.0:
-        distance = max(left - view.speed * 3.0, 10.0)  # when it has been said
-        if rng.random() < state.config.states_distance:
+        room = left > 3.5 * speed + 20.0 + ENDING_TIME * speed
+        end = ending(state, view, rng) if room and rng.random() < state.style.endings else ()
+        distance = max(left - view.speed * (3.0 + ENDING_TIME * len(end)), 10.0)  # when it has been said
+        if end or rng.random() < state.config.states_distance:
             ahead = Proposition.of(Predicate.DISTANCE, place=goal.name, metres=10 * round(distance / 10.0))
             words = intend(CommunicativeFunction.INFORM, ahead, wording=Wording(topic="ahead"), urgent=True)
         else:
             wording = Wording(distance=distance)
             words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
+        said = (words, *(replace(item, urgent=True) for item in end))
     elif left > 3.0 * speed + 12.0:
-        words = order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True)
+        said = (order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True),)
     else:
         return
     state.guidance = state.guidance.with_approach_announced(True)
-    state.say(words)
+    state.say(*said)
 
 
 def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:

@@ -168,6 +168,9 @@ class ParticipantStyle:
         leads: probability that guidance to an unknown place begins right after its description.
         foresight: largest number of steps of the way that are described at once.
         manner: manner of giving directions.
+        endings: probability that the end of an approach is described by what stands there.
+        corrects: probability that a car that approaches its turn too fast is told so.
+        recalls: probability that a destination is introduced by what happened there, or close to it, on this trip.
     """
 
     guides: float
@@ -190,6 +193,9 @@ class ParticipantStyle:
     leads: float = 0.12
     foresight: float = 1.0
     manner: Directions = Directions.TURNS
+    endings: float = 0.5
+    corrects: float = 0.5
+    recalls: float = 0.5
 
     @classmethod
     def of(cls, persona: Persona, rng: np.random.Generator) -> ParticipantStyle:
@@ -218,6 +224,9 @@ class ParticipantStyle:
             leads=within(0.3, 0.8, persona.knowledge, rng) if plans else 0.1,
             foresight=within(2.0, 4.9, persona.knowledge, rng) if plans else within(1.0, 2.5, persona.knowledge, rng),
             manner=persona.directions,
+            corrects=within(0.8, 0.2, persona.patience, rng),
+            recalls=within(0.3, 0.9, persona.attention, rng),
+            endings=0.85 if landmarks else 0.2 if vague else 0.5,
             notices=0.0 if persona.ignores else within(0.7, 1.0, persona.attention, rng),
         )
 

@@ -23,6 +23,7 @@ from dorothie_gym.policies.participant.messages import (
     refers_back,
     seconds_to_take_in,
 )
+from dorothie_gym.policies.participant.trip_talk import recollection
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, intend
@@ -74,6 +75,8 @@ def _report_done(
     # leaves the car time to report its arrival first
     delay = float(rng.uniform(*state.config.report_delay))
     state.speech = state.speech.cleared().hold(view.time + delay).plan(done)
+    if landmark is not None:
+        state.trip = state.trip.after_stop(landmark)
     state.task = state.task.closed(subgoal.index)
     state.task = state.task.after_finishing(None if landmark is None else landmark.name, view.time)
     if subgoal.index == state.task.target:
@@ -396,6 +399,8 @@ def _say_announcement(
         state.say(replace(reason[0], joined=same_breath), replace(words, joined=True))
     else:
         state.say(words, *(_as_afterthought(item) for item in reason))
+    if not reason:
+        state.say(*recollection(state, view, rng))
     goal, target = state.task.goal, state.task.target
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]
@@ -442,7 +447,8 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     no_street = goal.street is StreetName.UNKNOWN
     state.set_guiding(bool(no_street or state.task.described or rng.random() < state.style.leads))
     state.task = state.task.after_describing()
-    looks = looks_remark(state, goal, rng) if rng.random() < state.config.describes_looks else ()
+    looks = looks_remark(state, view, goal, rng) if rng.random() < state.config.describes_looks else ()
+    looks = looks or recollection(state, view, rng)
     corner = corner_fact(state, view, goal)
     named = any(goal.street in item.act.slots for item in state.speech.said)  # the street need not be said again
     if named and corner is not None and corner not in state.task.told:

@@ -11,16 +11,18 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.maps.model import SignalKind
-from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
+from dorothie_gym.policies.place_looks import distinguishing_look, look_of
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import DENSE, sight
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
-    from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+    from dorothie_gym.dialogue.looks import Look
+    from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
 FAMOUS = frozenset(LandmarkName) - {
@@ -49,6 +51,12 @@ _PROGRESS = frozenset({Predicate.CLOSE, Predicate.DISTANCE, Predicate.RIGHT_WAY}
 
 _IN_MIND = 12.0
 """Time for which a place that was named is understood as "it" [s]."""
+
+_AS_NOUN = 0.5
+"""Probability that a house is described by a noun phrase: "the yellow house with the black roof"."""
+
+_AS_BUILDING = 0.4
+"""Probability that it is otherwise called a building."""
 
 _FEELINGS = 0.25
 """Probability of a remark about a feeling that has a cause, instead of a hint."""
@@ -85,27 +93,25 @@ def _can_name(fact: Proposition) -> bool:
     return fact.get("landmark") is None
 
 
-def looks_remark(state: ParticipantState, goal: SeenLandmark, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about the look of a place, as in the camera's scene; none if it is unknown."""
-    features = list(_looks(goal))
+def looks_remark(
+    state: ParticipantState, view: ParticipantView, goal: SeenLandmark, rng: np.random.Generator
+) -> tuple[Remark, ...]:
+    """Returns a remark on the look of a place, which tells a house or person from others; none if it is unknown."""
+    individual, told = distinguishing_look(state.town, goal, view.landmarks), _features_told(state)
+    if individual is not None and told.isdisjoint((individual.listed, individual.house)):
+        return (_said(state, _distinguished(goal, individual, rng)),)
+    features = list(_looks(state, goal))
     return (_said(state, features[int(rng.integers(len(features)))]),) if features else ()
 
 
-def side_remark(state: ParticipantState, view: ParticipantView, last: StepKey) -> tuple[Remark, ...]:
-    """Returns the remark on which side of the street the target is behind a turn, if that is the last of the route."""
-    goal, progress = state.task.goal, state.route.progress
-    turns = [] if progress is None else list(progress.crossings(state.town, view.station))
-    if (
-        goal is None
-        or goal.name is LandmarkName.PERSON
-        or not turns
-        or (turns[-1].lane, turns[-1].exit.connector) != last[1:]
-    ):
-        return ()
-    if progress is None or any(leg.entry is LaneEntry.U_TURN for leg in progress.legs[1:]):
-        return ()
-    side = Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
-    return (_said(state, side),) if side not in state.task.told else ()
+def _distinguished(goal: SeenLandmark, look: Look, rng: np.random.Generator) -> Proposition:
+    """Returns the statement that tells a house or person from the others: of its features, or as a noun phrase."""
+    if goal.name is LandmarkName.PERSON:
+        return Proposition.of(Predicate.LOOKS, place=goal.name, object=ObjectClass.PEDESTRIAN, feature=look.listed)
+    if rng.random() < _AS_NOUN:
+        return Proposition.of(Predicate.LOOKS, place=goal.name, feature=look.house)
+    kind = ObjectClass.BUILDING if rng.random() < _AS_BUILDING else None
+    return Proposition.of(Predicate.LOOKS, place=goal.name, object=kind, feature=look.listed)
 
 
 def famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> SeenLandmark | None:
@@ -126,8 +132,11 @@ def _said(state: ParticipantState, content: Proposition, *, names_place: bool = 
         topic = next(f"located_{name}" for name in ("side", "cross", "street") if content.get(name) is not None)
     if content.predicate is Predicate.FEELS:
         topic = f"feels_{content.get('feeling')}"
+    if content.predicate is Predicate.LOOKS and str(content.get("feature")).startswith("the "):
+        topic = "looks_like"
     topic = f"{'not_' * content.negated}{topic}"
     wording = Wording(topic=topic, direction=side if isinstance(side, Direction) else None)
+    names_place = names_place or topic == "looks_like"
     elided = ("cause",) if names_place and content.predicate is not Predicate.RIGHT_WAY else ("place", "cause")
     return intend(CommunicativeFunction.INFORM, content, elided=elided, wording=wording, joined=True)
 
@@ -159,7 +168,7 @@ def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Propositi
     signs = signals_near(state.town, goal.x, goal.y)
     for sign in dict.fromkeys(_SIGNS[kind] for kind in _SIGNS if kind in signs):
         yield Proposition.of(Predicate.NEAR, place=goal.name, object=sign)
-    yield from _looks(goal)
+    yield from _looks(state, goal)
 
 
 def corner_fact(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> Proposition | None:
@@ -172,9 +181,16 @@ def corner_fact(state: ParticipantState, view: ParticipantView, goal: SeenLandma
     return Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street, cross=crossing)
 
 
-def _looks(goal: SeenLandmark) -> Iterator[Proposition]:
-    person = goal.name is LandmarkName.PERSON
-    for feature in features_of(goal.name):
+def _features_told(state: ParticipantState) -> set[str]:
+    features = (said.get("feature") for said in state.task.told)
+    return {feature for feature in features if isinstance(feature, str)}
+
+
+def _looks(state: ParticipantState, goal: SeenLandmark) -> Iterator[Proposition]:
+    person, look = goal.name is LandmarkName.PERSON, look_of(state.town, goal)
+    told = _features_told(state)
+    single = features_of(goal.name) if look is None else replace(look, storeys=None).features
+    for feature in (each for each in single if each not in told):
         kinds = (ObjectClass.PEDESTRIAN,) if person else (ObjectClass.BUILDING, None)
         for kind in kinds:
             yield Proposition.of(Predicate.LOOKS, place=goal.name, object=kind, feature=feature)

@@ -10,6 +10,7 @@ import numpy as np
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
+from dorothie_gym.policies.participant.early_corrections import correct_early
 from dorothie_gym.policies.participant.given_orders import drop_repetition, note_said
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
@@ -90,6 +91,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         if view.turning and updated.motion.standstill(view.time) > TURN_TIME:
             view = replace(view, turning=False)
         updated.motion = updated.motion.observed(view.time, standing=view.standing)
+        updated.trip = updated.trip.moved(view.position, view.time, standing=view.standing)
         excuse_at_light(updated, view)
         note_tasks(updated, view, rng)
         choose_target(updated, view, rng)
@@ -99,6 +101,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         resume_after_wait(updated, view)
         watch(updated, view)
         guide(updated, view, rng)
+        correct_early(updated, view, rng)
         react(updated, view, rng)
         admit_repetition(updated, view)
         own_up(updated, view)

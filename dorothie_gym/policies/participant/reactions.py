@@ -25,6 +25,7 @@ from dorothie_gym.policies.observation_parser import (
     weather,
 )
 from dorothie_gym.policies.participant.goals import purpose_of_target
+from dorothie_gym.policies.participant.trip_talk import note_said, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.speech import Remark, intend
@@ -284,7 +285,9 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     next_chat = view.time + float(rng.exponential(state.style.chat)) + 20.0
     state.conversation = state.conversation.with_next_chat(next_chat)
     options = _chat_options(state, view, rng)
-    state.say(*options[int(rng.integers(len(options)))])
+    chosen = options[int(rng.integers(len(options)))]
+    note_said(state, chosen)
+    state.say(*chosen)
 
 
 def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
@@ -309,6 +312,7 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
     found: list[tuple[Remark, ...]] = [
         *((intend(Function.OTHER),),) * 3,
         (_question(state, view, rng),),
+        *trip_remarks(state, view) * 3,
     ]
     if not state.guidance.guiding:
         arrival = Proposition.of(Predicate.ARRIVES_IN, place=goal.name, seconds=ASKED)
@@ -317,6 +321,7 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found.append((intend(Function.CHECK_QUESTION, act_builders.destination(goal.name)),))
         found.append((intend(asks_open, Proposition.of(Predicate.DRIVES_AT, speed=ASKED)),))
         found.append((intend(asks, Proposition.of(Predicate.CROWDED, object=ObjectClass.VEHICLES)),))
+        found += trip_questions(state)
         found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:

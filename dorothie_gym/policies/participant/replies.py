@@ -26,6 +26,7 @@ from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
+from dorothie_gym.policies.participant.early_corrections import contradicts_turn
 from dorothie_gym.policies.participant.goals import announcement, describe
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere
@@ -210,7 +211,7 @@ def _explanation(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks, statuses = act.values(Slot.LANDMARK), act.values(Slot.STATUS)
-    if _correct(state, view, act, words):
+    if _correct(state, view, act, words) or contradicts_turn(state, view, act, words):
         return
     names_goal = state.task.goal is not None and state.task.goal.name in landmarks
     lost = GoalStatus.UNKNOWN in statuses or _LACKS_PLACE.search(words.text.lower()) is not None

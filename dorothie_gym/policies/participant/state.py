@@ -19,6 +19,7 @@ from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.participant.given_orders import GivenOrder
+from dorothie_gym.policies.participant.trip_memory import TripMemory
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.speech import Remark, SpeakingState
@@ -250,6 +251,7 @@ class GuidanceState:
         looked_ahead: last step for which it was decided whether to describe the way, and whether it was near.
         considered: last step for which it was decided whether to wait for a question of the car.
         left_to_ask: result of that decision.
+        corrected: last turn before which the car was corrected.
     """
 
     guiding: bool = False
@@ -283,6 +285,7 @@ class GuidanceState:
     looked_ahead: tuple[StepKey, bool] | None = None
     considered: StepKey | None = None
     left_to_ask: bool = False
+    corrected: StepKey | None = None
 
     def with_guiding(self, guiding: bool) -> GuidanceState:
         """Begins or ends the guidance."""
@@ -394,6 +397,10 @@ class GuidanceState:
             return replace(self, nudged_at=now, nudges=self.nudges + 1)
         return replace(self, nudged_at=now, nudges=1, nudged_from=left)
 
+    def after_correcting(self, step: StepKey) -> GuidanceState:
+        """Records that the car was corrected before a turn."""
+        return replace(self, corrected=step)
+
     def with_consideration(self, step: StepKey, left_to_ask: bool) -> GuidanceState:
         """Records whether a step is left to a question of the car."""
         return replace(self, considered=step, left_to_ask=left_to_ask)
@@ -448,6 +455,7 @@ class ParticipantState(SpeakingState[ParticipantStyle, ParticipantConfig]):
         guidance: turn-by-turn guidance to the target.
         route: route to the target.
         motion: observed motion of the car.
+        trip: what happened on the trip so far.
     """
 
     conversation: ConversationState = field(default_factory=ConversationState)
@@ -455,6 +463,7 @@ class ParticipantState(SpeakingState[ParticipantStyle, ParticipantConfig]):
     guidance: GuidanceState = field(default_factory=GuidanceState)
     route: RouteState = field(default_factory=RouteState)
     motion: MotionState = field(default_factory=MotionState)
+    trip: TripMemory = field(default_factory=TripMemory)
 
     def say_only(self, *remarks: Remark) -> None:
         """Replaces the queued remarks."""

@@ -11,7 +11,7 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.participant.hints import side_remark
+from dorothie_gym.policies.participant.approach_end import ending_behind
 from dorothie_gym.policies.participant.way_ahead import WayStep, way_ahead, way_behind_u_turn, way_remarks
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.policy import replace
@@ -32,8 +32,10 @@ _FORGOTTEN: Final = 40.0  # time after which one reminds of a step [s]
 _REMINDS: Final = 0.1  # probability of a reminder of a step that the car has repeated a moment ago
 _REMINDS_UNSURE: Final = 0.6  # probability of a reminder of another step
 _PLANS: Final = 2.0  # foresight of those who plan
-_SINGLE: Final = 0.2  # probability that they name one step all the same
+_SINGLE: Final = 0.08  # probability that they name one step all the same
+_WAITS: Final = 0.6  # share of the turns left to a question of the car that are also left out of a whole way
 _SLOW: Final = 4.0  # speed up to which there is time to say more than "turn around" [m/s]
+_U_TURN_ROOM: Final = 40.0  # road that a U-turn needs behind the words, so that they may be longer [m]
 _SIDE: Final = 0.4  # probability that the end of the way is told with the side of the street
 _ROOM: Final = 3  # number of acts in one breath behind which there is room for another one
 _BRIEF: Final = 12.0  # time within which the car takes up directions [s]
@@ -79,7 +81,7 @@ def tell_way(
     if key in guidance.way or guidance.step == key or guidance.looked_ahead == (key, near) or not (near or early):
         return ()
     state.guidance = replace(guidance, looked_ahead=(key, near))
-    if rng.random() < state.style.waits:
+    if rng.random() < _WAITS * state.style.waits:
         return ()
     steps = _steps(state, view, key, distance, rng)
     if len(steps) < 2 and not near:
@@ -126,7 +128,9 @@ def _looks_ahead(state: ParticipantState, rng: np.random.Generator) -> int:
 def way_back(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns the description of the way behind a U-turn, to be said after the instruction to turn round."""
     steps = way_behind_u_turn(state, view, _looks_ahead(state, rng) - 1, state.style.manner, rng)
-    if view.speed > _SLOW or not steps or rng.random() < state.style.waits:
+    rest = state.town.lanes[view.lane].length - view.station
+    hurried = view.speed > _SLOW and rest < _TELLING * (len(steps) + 1) * view.speed + _U_TURN_ROOM
+    if hurried or not steps or rng.random() < _WAITS * state.style.waits:
         return ()
     keys = tuple(key for one in steps for key in one.keys)
     state.guidance = state.guidance.after_describing(keys, view.time)
@@ -148,7 +152,7 @@ def _said(
     state.guidance = state.guidance.after_describing(tuple(rest), now)
     remarks = way_remarks(steps, move)
     if len(steps) <= _ROOM and move is DialogueMove.INSTRUCT and rng.random() < _SIDE:
-        remarks = (*remarks, *side_remark(state, view, steps[-1].keys[-1]))
+        remarks = (*remarks, *ending_behind(state, view, steps[-1].keys[-1], rng))
     return remarks
 
 

@@ -45,6 +45,7 @@ _CORNER: Final = 12.0  # from the end of a lane to the middle of its junction [m
 _AT_CORNER: Final = 26.0  # distance from the middle of a junction of a landmark on its corner [m]
 _JUST_BEHIND: Final = 90.0  # distance up to which a turn is "after" a landmark [m]
 _SEEN_LATER: Final = 15.0  # distance to a landmark that is still ahead when the words end [m]
+_WORDS: Final = 3.0  # time to say a way [s]
 _EXACT: Final = 30.0  # deviation from a compass point up to which a street leads there [degrees]
 _STOP_SIGNS: Final = frozenset({SignalKind.STOP})
 _SIGNS: Final = frozenset({SignalKind.STOP, SignalKind.YIELD})
@@ -95,9 +96,14 @@ def way_ahead(
         manner: manner of giving directions.
         rng: random generator of the decision.
     """
-    if state.town.lanes[view.lane].in_junction:
-        return ()
-    return _along(state, view, view.place, state.route.to_goal.legs, min(count, MOST_STEPS), manner, rng)
+    legs, here = state.route.to_goal.legs, view.place
+    if state.town.lanes[view.lane].in_junction:  # the way begins behind the junction that the car is crossing
+        behind = next((k for k, leg in enumerate(legs) if not state.town.lanes[leg.lane].in_junction), len(legs))
+        legs = legs[behind:]
+        if not legs:
+            return ()
+        here = legs[0].lane, legs[0].start
+    return _along(state, view, here, legs, min(count, MOST_STEPS), manner, rng)
 
 
 def way_behind_u_turn(
@@ -263,8 +269,9 @@ def _plainly(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _De
 def _by_landmark(state: ParticipantState, view: ParticipantView, turn: _Turn) -> _Described:
     """Describes a turn by a landmark on its corner, or behind which it is the first opportunity."""
     options = []
+    spoken = view.speed * _WORDS if turn.road.stretches[0].lane == view.lane else 0.0
     for distance, name in _landmarks_beside(state, view, turn.road):
-        relation = _relation(turn, distance)
+        relation = _relation(turn, distance, spoken)
         if relation is not None:
             options.append((relation is not ConditionRelation.AT, abs(distance - turn.crossing.distance), name))
     if not options:
@@ -285,9 +292,15 @@ def _landmarks_beside(
     return [(distance, name) for distance, name in found if distance is not None]
 
 
-def _relation(turn: _Turn, distance: float) -> ConditionRelation | None:
-    """Returns how a turn lies to a place at a distance on the road [m]; None where the place does not tell it."""
-    if distance < _SEEN_LATER:
+def _relation(turn: _Turn, distance: float, spoken: float) -> ConditionRelation | None:
+    """Returns how a turn lies to a place on the road; None where the place does not tell it.
+
+    Args:
+        turn: the turn.
+        distance: distance to the place [m].
+        spoken: distance that the car drives while the words are said [m].
+    """
+    if distance < _SEEN_LATER + spoken:
         return None
     nearest = min(turn.fitting, key=lambda one: abs(one.distance + _CORNER - distance))
     if nearest == turn.crossing and abs(turn.crossing.distance + _CORNER - distance) < _AT_CORNER:

@@ -1,4 +1,4 @@
-"""Landmarks: recognisable at 40 m, off the roads, and equal for all houses and persons."""
+"""Landmarks: recognisable at 40 m, off the roads, and equal whether they are goals or not."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     repair_runs,
     reply_checks,
 )
-from dorothie_gym.evaluation.analysis.truth_checks.directions import directions_of
+from dorothie_gym.evaluation.analysis.truth_checks.directions import directions_of, manner_of
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
 from dorothie_gym.evaluation.analysis.truth_checks.perceivable import perceived_at
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
@@ -85,6 +85,11 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
 """Titles of the figures except those of the exceptions."""
 
 _EXCEPTIONS: Final = "exceptions/"
+_MANNERS: Final = "directions/"
+_OF_MANNERS: Final[Mapping[str, str]] = MappingProxyType(
+    {"ahead": "with two or more steps", "by_places": "that name a landmark or an object"}
+)
+"""Figures by manner of giving directions."""
 
 
 @dataclass
@@ -123,6 +128,9 @@ class TalkChecks:
         """Yields title, share and number of cases of each figure."""
         for figure, title in SHARES.items():
             yield title, self.share(figure), self.cases[figure]
+        for name in sorted(name for name in self.cases if name.startswith(_MANNERS)):
+            manner, figure = name.removeprefix(_MANNERS).split("/")
+            yield f"directions of the manner {manner} {_OF_MANNERS[figure]}", self.share(name), self.cases[name]
         for name in sorted(name for name in self.cases if name.startswith(_EXCEPTIONS)):
             kind = name.removeprefix(_EXCEPTIONS).replace("_", " ")
             yield f"exceptions talked about: {kind}", self.share(name), self.cases[name]
@@ -132,6 +140,8 @@ class TalkChecks:
         rows: dict[str, object] = {}
         for figure in SHARES:
             rows[figure], rows[f"{figure}_n"] = self.share(figure), self.cases[figure]
+        for name in sorted(name for name in self.cases if name.startswith(_MANNERS)):
+            rows[name], rows[f"{name}_n"] = self.share(name), self.cases[name]
         kinds = sorted(name.removeprefix(_EXCEPTIONS) for name in self.cases if name.startswith(_EXCEPTIONS))
         rows["exceptions"] = {kind: self.share(_EXCEPTIONS + kind) for kind in kinds}
         rows["exceptions_n"] = {kind: self.cases[_EXCEPTIONS + kind] for kind in kinds}
@@ -197,9 +207,13 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None, name:
             checks.judge(figure, case, name)
     for case in mention_checks.arrival_claims(world) if world is not None else ():
         checks.judge("arrival_claims", case, name)
+    manner = manner_of(session)
     for direction in directions_of(session):
         checks.add("directions_ahead", direction.steps > 1)
         checks.add("directions_by_places", direction.names_place)
+        if manner is not None:
+            checks.add(f"{_MANNERS}{manner}/ahead", direction.steps > 1)
+            checks.add(f"{_MANNERS}{manner}/by_places", direction.names_place)
 
 
 def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.dialogue.propositions import Predicate
@@ -27,6 +27,14 @@ class GivenDirection(NamedTuple):
 
     steps: int
     names_place: bool
+
+
+def manner_of(session: Session) -> str | None:
+    """Returns the manner in which the participant's persona gives directions; None where none is recorded."""
+    personas = session.header.extra.get("personas")
+    persona = personas.get(str(Role.PARTICIPANT)) if isinstance(personas, Mapping) else None
+    manner = persona.get("directions") if isinstance(persona, Mapping) else None
+    return manner if isinstance(manner, str) else None
 
 
 def directions_of(session: Session) -> Iterator[GivenDirection]:

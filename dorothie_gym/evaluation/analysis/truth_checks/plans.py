@@ -98,7 +98,10 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
 
 def has_status(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
     """Returns whether the task at a place has a status: open ones may be called pending or ongoing."""
-    place, status = said.get("place"), said.get("status")
+    place, status, count = (said.get(name) for name in ("place", "status", "count"))
+    if isinstance(count, int) and status is GoalStatus.PENDING:
+        errands = [value for name in LandmarkName for value in world.statuses(time, name)]
+        return sum(value in _OPEN for value in errands) == count + 1  # besides the present one
     if not isinstance(place, LandmarkName) or not isinstance(status, GoalStatus):
         return None
     found = set(world.statuses(time, place))

@@ -6,6 +6,9 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
+from dorothie_gym.dialogue.looks import read_look
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.evaluation.analysis.truth_checks import plans
@@ -15,6 +18,8 @@ from dorothie_gym.maps.whereabouts import is_near_corner, is_on_right, signals_n
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
+from dorothie_gym.policies.place_looks import look_at
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
@@ -34,6 +39,7 @@ TIME_FACTOR: Final = 1.5
 SHORT_TIME: Final = 15.0
 """Largest irrelevant difference of times [s]."""
 
+_PASSING: Final = 30.0  # distance from a place within which the car passes it [m]
 _POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
 _SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
 _NEAR: Final = 130.0  # largest distance of two places near each other [m]
@@ -145,8 +151,26 @@ def _near(world: SessionWorld, said: Proposition, time: float, speaker: Role) ->
 
 
 def _looks(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether a landmark of the name has the stated feature, or all attributes that the words state."""
     place, feature = said.get("place"), said.get("feature")
-    return feature in features_of(place) if isinstance(place, LandmarkName) and feature is not None else None
+    if not isinstance(place, LandmarkName) or not isinstance(feature, str):
+        return None
+    seen = [look_at(world.town, place, row["x"], row["y"]) for row in world.landmarks(place)]
+    stated = read_look(feature)
+    if any(look is not None for look in seen):
+        return bool(stated.stated) and any(look is not None and stated.fits(look) for look in seen)
+    return feature in features_of(place)
+
+
+def _passed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether the car has come past a place on this trip; None where a number of times since the errand is stated."""
+    place = said.get("place")
+    if not isinstance(place, LandmarkName) or said.get("times") is not None:
+        return None
+    rows = world.session.trajectory
+    driven = rows[rows["frame"] <= time * FRAME_RATE]
+    near = [np.hypot(driven["x"] - row["x"], driven["y"] - row["y"]) <= _PASSING for row in world.landmarks(place)]
+    return any(bool(each.any()) for each in near)
 
 
 def _distance(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
@@ -255,6 +279,7 @@ _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.NEAR: _near,
     Predicate.LOOKS: _looks,
     Predicate.DISTANCE: _distance,
+    Predicate.PASSED: _passed,
     Predicate.FEELS: _feels,
     Predicate.ARRIVES_IN: _arrives_in,
     Predicate.CLOSE: _close,

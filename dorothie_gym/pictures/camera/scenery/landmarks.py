@@ -18,10 +18,18 @@ from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface,
 from dorothie_gym.pictures.camera.models.people import STANDING, Look, Outfit, person_form
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Part, Rgb, dressed
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
+from dorothie_gym.pictures.camera.scenery.trees import tree_form
 from dorothie_gym.pictures.maps.shapes import disc
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks import landmark_designs
-from dorothie_gym.tasks.landmark_designs import COAT, HOUSE, MIDDLE_STRIPE, STORES, StoreDesign, Top
+from dorothie_gym.tasks.landmark_designs import (
+    MIDDLE_STRIPE,
+    STORES,
+    StoreDesign,
+    Top,
+    house_design,
+    person_design,
+)
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array
@@ -35,6 +43,8 @@ PICTOGRAM = 3.2
 """Width and height of the pictograms of houses and persons [m]: 19 pixels at 40 m in the standard picture."""
 
 _WALL = 3.4  # [m] height of the glazed storey of a store
+_HOUSE_STOREY = 3.0  # [m] height of a storey of a house
+_TREE = 1.1, 0.9  # [m] radius of the tree beside a house, and distance of its trunk from the wall
 _METAL: Rgb = (178, 180, 182)
 _ROOF: Rgb = (128, 126, 124)
 
@@ -47,9 +57,6 @@ _LIT_SIGNS = {*(texture for texture, *_ in BRAND_SIGNS.values()), Texture.HOUSE_
 def landmark_key(index: int) -> int:
     """Returns the instance of a landmark by its index in the storyboard: -1, -2, ..., no key of a body."""
     return -1 - index
-
-
-_PERSON = Look(Outfit.COAT, COAT, (30, 40, 90), (198, 148, 114), (40, 32, 28), COAT)
 
 
 def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: Heights) -> Mesh:
@@ -80,7 +87,7 @@ def landmark_form(name: LandmarkName, lot: Lot, ground: Heights) -> Mesh:
     else:
         _warn_of_plain_building(name)
         _plain_building(works)
-    return works.builder.build()
+    return works.build()
 
 
 @cache
@@ -104,10 +111,22 @@ class _Works:
     def __init__(self, lot: Lot, ground: Heights) -> None:
         self.lot = lot
         self.builder = MeshBuilder()
+        self._ground, self._trees = ground, list[Mesh]()
         x, y = lot.depth, lot.length / 2.0
         corners = oriented([(0.0, -y), (0.0, y), (x, y), (x, -y)], lot.front, lot.heading)
         heights = feet_on(ground, corners)
         self.low, self.base = float(heights.min()), float(heights.max())
+
+    def build(self) -> Mesh:
+        """Returns the triangles."""
+        return joined([self.builder.build(), *self._trees]) if self._trees else self.builder.build()
+
+    def tree(self, deep: float, right: float, radius: float) -> None:
+        """Adds a tree with a crown of a radius [m]."""
+        place = np.array([self.lot.at(deep, right)])
+        foot = np.column_stack((place, feet_on(self._ground, place)))
+        tree = stamped(tree_form(0), foot, np.array([self.lot.heading]), np.array([radius]))
+        self._trees.append(tree)
 
     def rectangle(self, deep: tuple[float, float], right: tuple[float, float]) -> Array:
         """Returns corners (4, 2) [m] of a rectangle between two depths and two places to the right."""
@@ -310,17 +329,25 @@ def _petrol_station(works: _Works, design: StoreDesign, texture: Texture, length
 
 
 def _house(works: _Works) -> None:
+    design = house_design(works.lot.site)
     length, depth = min(works.lot.length, 11.0), min(works.lot.depth, 9.0)
-    side, walls = length / 2.0, 3.3
+    side, walls = length / 2.0, 0.3 + _HOUSE_STOREY * design.storeys
     deep = (0.8, max(depth, 2.0))
     works.foundation(deep, (-side, side))
-    works.box(deep, (-side, side), (0.0, walls), HOUSE.wall)
-    _gable(works, deep, side, walls, HOUSE.roof, HOUSE.trim)
+    works.box(deep, (-side, side), (0.0, walls), design.wall)
+    _gable(works, deep, side, walls, design.roof, design.trim)
     works.panel(deep[0] - 0.03, 0.0, 1.1, 1.2, 2.2, texture=Texture.DOOR)
-    for right in (-0.6 * side, 0.6 * side):
-        works.panel(deep[0] - 0.02, right, 1.7, 1.7, 1.5, colour=HOUSE.trim)
-        works.panel(deep[0] - 0.04, right, 1.7, 1.4, 1.2, colour=(74, 96, 116), surface=Surface.GLASS)
+    for storey in range(design.storeys):
+        for right in (-0.6 * side, 0.6 * side) if storey == 0 else (-0.6 * side, 0.0, 0.6 * side):
+            _window(works, deep[0], right, 1.7 + _HOUSE_STOREY * storey, design.trim)
+    if design.tree:
+        works.tree(deep[0] + _TREE[0], -side - _TREE[1], _TREE[0])
     works.sign(side + 0.9, 2.5, (PICTOGRAM, PICTOGRAM), Texture.HOUSE_SIGN, (24, 74, 168), deep=0.2)
+
+
+def _window(works: _Works, deep: float, right: float, up: float, frame: Rgb) -> None:
+    works.panel(deep - 0.02, right, up, 1.7, 1.5, colour=frame)
+    works.panel(deep - 0.04, right, up, 1.4, 1.2, colour=(74, 96, 116), surface=Surface.GLASS)
 
 
 def _person_sign(works: _Works) -> Mesh:
@@ -330,10 +357,12 @@ def _person_sign(works: _Works) -> Mesh:
 
 def _waiting_person(lot: Lot, ground: Heights) -> Mesh:
     """Returns a person who waves to the street, at the place of the site."""
+    design = person_design(lot.site)
+    look = Look(Outfit.COAT, design.coat, design.trousers, (198, 148, 114), (40, 32, 28), design.coat)
     arm = ModelBuilder(ObjectClass.PEDESTRIAN)
     arm.limb((0.0, 0.22, 1.42), (0.08, 0.42, 1.68), (0.055, 0.05), Part.TOP)
     arm.limb((0.08, 0.42, 1.68), (0.06, 0.40, 2.0), (0.048, 0.04), Part.SKIN, closed=True)
-    body = joined([dressed(part, _PERSON.palette) for part in (person_form(_PERSON.outfit, STANDING), arm.build())])
+    body = joined([dressed(part, look.palette) for part in (person_form(look.outfit, STANDING), arm.build())])
     place = np.array([lot.place])
     foot = np.column_stack((place, feet_on(ground, place)))
     return stamped(body, foot, np.array([lot.heading + math.pi]))
