@@ -24,6 +24,7 @@ from dorothie_gym.dialogue.move_decision import (
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import behind_signs
+from dorothie_gym.dialogue.span_tagger import retagged
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
@@ -297,7 +298,7 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
 
 @functools.lru_cache(maxsize=2048)
 def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
-    """Segments free English into spans with one act each, at sentence ends and at commas before a new act.
+    """Segments free English into spans with one act each: by the rules, or by the trained tagger where it is surer.
 
     Args:
         text: free English; blank text gives no span.
@@ -306,6 +307,21 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     Returns:
         Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
+    spans = rule_spans(text, after)
+    if not spans or all(formula_move(_plain_words(span.text)) is not None for span in spans):
+        return spans  # formulas have no other move
+    found = retagged(spans, after)
+    if found is None:
+        return spans
+    ruled = {(span.text, span.act.move): span for span in spans}
+    return tuple(
+        ruled.get((part, move)) or Span(part, DialogueAct(move, _slots(understand(part), move))) for part, move in found
+    )
+
+
+@functools.lru_cache(maxsize=2048)
+def rule_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
+    """Segments free English as `guess_spans`, by the rules alone: at sentence ends and where a new act begins."""
     broken = with_breaks(text.strip(), answering=after is not None)
     segments = [segment for sentence in _SENTENCE_END.split(broken) for segment in _segments(sentence)]
     spans: list[Span] = []

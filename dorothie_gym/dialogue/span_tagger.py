@@ -1,0 +1,359 @@
+"""Trained tagger of spans: cuts an utterance into spans and finds their moves, where it is surer than the rules.
+
+Convolutions over the words (Kim, EMNLP 2014), with the reading of the rules among their inputs, score the labels of
+each word: begin or inside of a span, for each move. A chain of labels (a linear-chain conditional random field;
+Lafferty et al., ICML 2001) with scores of move pairs finds the best sequence. Words have vectors of a table and of
+their letter groups (Bojanowski et al., TACL 2017).
+
+All weights and sums are whole numbers, so that results are equal on every processor. `benchmarks/span_training.py`
+trains the weights.
+"""
+
+from __future__ import annotations
+
+import functools
+import io
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.dialogue.span_features import MASKS, SIGNS, SpanFeatures, span_features
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.spellings import parse_move
+from dorothie_gym.support.compilation import compiled
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.conversation import Span
+
+WEIGHTS_FILE: Final = "span_tagger.npz"
+"""Data file of the shipped weights."""
+
+INPUT_BITS: Final = 5
+"""Binary places of the inputs."""
+
+HIDDEN_BITS: Final = 6
+"""Binary places of the hidden values."""
+
+KERNEL: Final = 3
+"""Words under a convolution."""
+
+DILATIONS: Final = (1, 2, 4)
+"""Distances between the words of each convolution."""
+
+BUCKETS: Final = 1024
+"""Number of vectors for letter groups; a group's is chosen by its CRC-32."""
+
+_GROUPS: Final = (3, 4)
+"""Lengths of letter groups [letters]."""
+
+_ENDINGS: Final = ("'s", "'ll", "'re", "'ve", "'d", "'m", "'", "s")
+"""Endings without which an unknown word is looked up again."""
+
+_NIBBLE: Final = 4
+_CENTRE: Final = 8
+"""Nibble that stands for zero."""
+
+_STEP: Final = 12
+"""Value of one nibble step, with INPUT_BITS binary places."""
+
+_MARGIN: Final = 2.0
+"""Lead in log odds with which the tagger overrules the rules; chosen by cross-validation (benchmarks/people)."""
+
+_LOWEST: Final = -(2**30)
+
+Whole = NDArray[np.int32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpanTagger:
+    """Weights of the tagger, all whole numbers; h is the number of hidden values, m that of moves.
+
+    Attributes:
+        moves: the moves, in the order of the labels.
+        words: row of each word in `vectors`; masks come behind the words, and then unknown words.
+        vectors: vectors of words (n, d), int32.
+        groups: vectors of letter groups (BUCKETS, g).
+        marks, begins, rules, afters, places: vectors of marks, of the begin of a rules' span, of the rules' moves, of
+            the moves before (0 is none), and of places (inner, first, last).
+        convolutions: weights (KERNEL, inputs, h) of each convolution.
+        biases: their biases (h,).
+        shifts: binary places by which their sums are too long.
+        pooled: weights (2 h + a, h) of the summary of the utterance.
+        pooled_bias: its biases (h,).
+        pooled_shift: binary places by which its sums are too long.
+        output: weights (2 h, 2 m) of the labels: begin and inside of each move in turn.
+        output_bias: their biases (2 m,).
+        pairs: scores (1 + m, m) of a move behind the start, and behind each move.
+        margin: lead by which the tagger overrules the rules.
+    """
+
+    moves: tuple[DialogueMove, ...]
+    words: Mapping[str, int]
+    vectors: Whole
+    groups: Whole
+    marks: Whole
+    begins: Whole
+    rules: Whole
+    afters: Whole
+    places: Whole
+    convolutions: tuple[Whole, ...]
+    biases: tuple[Whole, ...]
+    shifts: tuple[int, ...]
+    pooled: Whole
+    pooled_bias: Whole
+    pooled_shift: int
+    output: Whole
+    output_bias: Whole
+    pairs: Whole
+    margin: int
+
+    def tag(self, features: SpanFeatures) -> tuple[list[int], int, int]:
+        """Returns the best labels, their score, and that of the rules' labels."""
+        inputs = self.inputs(features)
+        number, hidden = len(features.words), len(self.pooled_bias)
+        values = np.empty((len(DILATIONS) + 1, number, hidden), np.int32)
+        before, held = inputs, values[0]
+        for layer, dilation in enumerate(DILATIONS):
+            _convolve(
+                before, self.convolutions[layer], self.biases[layer], dilation, self.shifts[layer], layer > 0, held
+            )
+            before, held = held, values[layer + 1]
+        after = self.afters[self._after(features)] << (HIDDEN_BITS - INPUT_BITS)
+        summary = np.empty(hidden, np.int32)
+        _summarise(before, after, self.pooled, self.pooled_bias, self.pooled_shift, summary)
+        scores = np.empty((number, 2 * len(self.moves)), np.int32)
+        _score(before, summary, self.output, self.output_bias, scores)
+        labels, rules = np.empty(number, np.int32), self._rules_labels(features)
+        best, said = _decode(scores, self.pairs, rules, np.empty((number, len(self.moves)), np.int32), labels)
+        return labels.tolist(), int(best), int(said)
+
+    def _after(self, features: SpanFeatures) -> int:
+        return 0 if features.after is None else 1 + self.moves.index(features.after)
+
+    def _rules_labels(self, features: SpanFeatures) -> Whole:
+        pairs = zip(features.moves, features.begins, strict=True)
+        return np.array([2 * self.moves.index(move) + (not begins) for move, begins in pairs], np.int32)
+
+    def inputs(self, features: SpanFeatures) -> Whole:
+        """Returns the input vectors (n, inputs) of the words."""
+        number = len(features.words)
+        places = np.zeros(number, np.int64)
+        places[0], places[-1] = 1, 2
+        after = np.broadcast_to(self.afters[self._after(features)], (number, self.afters.shape[1]))
+        signs = np.array(features.signs, np.int32).reshape(number, SIGNS) << INPUT_BITS
+        return np.ascontiguousarray(
+            np.concatenate(
+                (
+                    np.stack([_word_vector(self, word) for word in features.words]),
+                    self.marks[list(features.marks)],
+                    self.begins[[int(begins) for begins in features.begins]],
+                    self.rules[[self.moves.index(move) for move in features.moves]],
+                    after,
+                    self.places[places],
+                    signs,
+                ),
+                axis=1,
+            ),
+            dtype=np.int32,
+        )
+
+
+@functools.lru_cache(maxsize=16384)
+def _word_vector(tagger: SpanTagger, word: str) -> Whole:
+    """Returns the vector of a word, and behind it the mean vector of its letter groups, rounded."""
+    rows = letter_groups(word)
+    total = tagger.groups[list(rows)].sum(axis=0)
+    mean = (2 * total + len(rows)) // (2 * len(rows))
+    return np.concatenate((tagger.vectors[word_row(word, tagger.words)], mean)).astype(np.int32)
+
+
+def word_row(word: str, rows: Mapping[str, int]) -> int:
+    """Returns the row of a word, of its mask, or that of unknown words.
+
+    Args:
+        word: masked word.
+        rows: rows of the known words, from 0 on.
+    """
+    if word in MASKS:
+        return len(rows) + MASKS.index(word)
+    found = rows.get(word)
+    if found is None:
+        found = next((rows[bare] for bare in _bare_forms(word) if bare in rows), len(rows) + len(MASKS))
+    return found
+
+
+def _bare_forms(word: str) -> list[str]:
+    forms = [word.replace("'", "")]
+    forms += [word.removesuffix(ending) for ending in _ENDINGS if word.endswith(ending)]
+    return [*forms, f"{word[:-1]}g"] if word.endswith("in'") else forms
+
+
+@functools.lru_cache(maxsize=16384)
+def letter_groups(word: str) -> tuple[int, ...]:
+    """Returns the rows of the vectors of a word's letter groups, and of the word as a whole."""
+    bounded = f"<{word}>"
+    groups = [bounded[at : at + length] for length in _GROUPS for at in range(len(bounded) - length + 1)]
+    return tuple(zlib.crc32(group.encode()) % BUCKETS for group in (word, *groups))
+
+
+@functools.cache
+def load_tagger() -> SpanTagger:
+    """Returns the shipped tagger."""
+    data = resources.files("dorothie_gym.dialogue").joinpath("data", WEIGHTS_FILE).read_bytes()
+    return unpack(data)
+
+
+def unpack(data: bytes) -> SpanTagger:
+    """Returns the tagger of a weights file (`numpy.savez`)."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        stored = {name: file[name] for name in file.files}
+    text = {name: stored[name].tobytes().decode().split("\n") for name in ("words", "moves")}
+    whole = {name: np.ascontiguousarray(value, np.int32) for name, value in stored.items() if name not in text}
+    nibbles = np.stack((stored["vectors"] % (1 << _NIBBLE), stored["vectors"] >> _NIBBLE), axis=-1).astype(np.int32)
+    shifts, scale = whole["shifts"].tolist(), int(whole["scale"][0])
+    return SpanTagger(
+        moves=tuple(map(parse_move, text["moves"])),
+        words={word: row for row, word in enumerate(text["words"])},
+        vectors=(nibbles.reshape(len(nibbles), -1) - _CENTRE) * _STEP,
+        groups=whole["groups"],
+        marks=whole["marks"],
+        begins=whole["begins"],
+        rules=whole["rules"],
+        afters=whole["afters"],
+        places=whole["places"],
+        convolutions=tuple(whole[f"convolution{number}"] for number in range(len(DILATIONS))),
+        biases=tuple(whole[f"bias{number}"] for number in range(len(DILATIONS))),
+        shifts=tuple(shifts[: len(DILATIONS)]),
+        pooled=whole["pooled"],
+        pooled_bias=whole["pooled_bias"],
+        pooled_shift=shifts[len(DILATIONS)],
+        output=whole["output"],
+        output_bias=whole["output_bias"],
+        pairs=whole["pairs"],
+        margin=round(_MARGIN * (1 << scale)),
+    )
+
+
+def retagged(spans: Sequence[Span], after: DialogueMove | None) -> list[tuple[str, DialogueMove]] | None:
+    """Returns the spans of an utterance where the tagger is surer than the rules, and None elsewhere.
+
+    Args:
+        spans: spans of the rules, at least one.
+        after: move of the other speaker before the utterance.
+    """
+    tagger = load_tagger()
+    features = span_features(spans, after)
+    labels, best, rules = tagger.tag(features)
+    if best - rules <= tagger.margin:
+        return None
+    found: list[tuple[str, DialogueMove]] = []
+    for token, label in zip(" ".join(span.text for span in spans).split(), labels, strict=True):
+        if label % 2 == 0:
+            found.append((token, tagger.moves[label // 2]))
+        else:
+            found[-1] = f"{found[-1][0]} {token}", found[-1][1]
+    return found
+
+
+@compiled
+def _convolve(
+    values: Whole, weights: Whole, bias: Whole, dilation: int, shift: int, residual: bool, found: Whole
+) -> None:
+    """Writes the rectified convolution (n, h) of values (n, k) to `found`, with the values themselves if `residual`."""
+    for at in range(len(values)):
+        for j in range(len(bias)):
+            found[at, j] = bias[j]
+        for tap in range(KERNEL):
+            source = at + (tap - KERNEL // 2) * dilation
+            if 0 <= source < len(values):
+                for i in range(values.shape[1]):
+                    value = values[source, i]
+                    if value != 0:
+                        for j in range(len(bias)):
+                            found[at, j] += value * weights[tap, i, j]
+        for j in range(len(bias)):
+            found[at, j] = max(found[at, j] + (1 << (shift - 1)), 0) >> shift
+            if residual:
+                found[at, j] += values[at, j]
+
+
+@compiled
+def _summarise(values: Whole, after: Whole, weights: Whole, bias: Whole, shift: int, found: Whole) -> None:
+    """Writes a rectified summary (h,) of values (n, h), of their maxima, the first ones and the move before."""
+    width = values.shape[1]
+    for j in range(len(bias)):
+        found[j] = bias[j]
+    for i in range(width):
+        largest = values[0, i]
+        for at in range(1, len(values)):
+            largest = max(largest, values[at, i])
+        for j in range(len(bias)):
+            found[j] += largest * weights[i, j] + values[0, i] * weights[width + i, j]
+    for i in range(len(after)):
+        for j in range(len(bias)):
+            found[j] += after[i] * weights[2 * width + i, j]
+    for j in range(len(bias)):
+        found[j] = max(found[j] + (1 << (shift - 1)), 0) >> shift
+
+
+@compiled
+def _score(values: Whole, summary: Whole, weights: Whole, bias: Whole, found: Whole) -> None:
+    """Writes the scores (n, 2 m) of the labels of all words, from values (n, h) and the summary (h,)."""
+    width = values.shape[1]
+    for at in range(len(values)):
+        for j in range(len(bias)):
+            found[at, j] = bias[j]
+        for i in range(width):
+            for j in range(len(bias)):
+                found[at, j] += values[at, i] * weights[i, j] + summary[i] * weights[width + i, j]
+
+
+@compiled
+def _decode(scores: Whole, pairs: Whole, rules: Whole, before: Whole, labels: Whole) -> tuple[int, int]:
+    """Writes the best labels (n,) and returns their score and that of given ones (n,).
+
+    Args:
+        scores: scores (n, 2 m) of the labels.
+        pairs: scores (1 + m, m) of neighbouring spans' moves.
+        rules: labels whose score is returned as well.
+        before: room (n, m) for the label before each begin of a span.
+        labels: room for the best labels; while they are sought, that of the label m before a word is in `before`.
+    """
+    number, moves = len(scores), pairs.shape[1]
+    # The best score of a path that ends inside a span of each move is kept in the columns of the inside labels,
+    # with the begin of that span in `before`; `scores` is overwritten.
+    said = pairs[0, rules[0] // 2] + scores[0, rules[0]]
+    for at in range(1, number):
+        said += scores[at, rules[at]]
+        if rules[at] % 2 == 0:
+            said += pairs[1 + rules[at - 1] // 2, rules[at] // 2]
+    for move in range(moves):
+        scores[0, 2 * move + 1] = _LOWEST
+        scores[0, 2 * move] += pairs[0, move]
+    for at in range(1, number):
+        for move in range(moves):
+            inside = max(scores[at - 1, 2 * move], scores[at - 1, 2 * move + 1])
+            scores[at, 2 * move + 1] += inside
+            best, chosen = _LOWEST, 0
+            for last in range(moves):
+                ended = max(scores[at - 1, 2 * last], scores[at - 1, 2 * last + 1]) + pairs[1 + last, move]
+                if ended > best:
+                    best, chosen = ended, last
+            scores[at, 2 * move] += best
+            before[at, move] = chosen
+    label = 0
+    for other in range(1, 2 * moves):
+        if scores[number - 1, other] > scores[number - 1, label]:
+            label = other
+    top = scores[number - 1, label]
+    for at in range(number - 1, -1, -1):
+        labels[at] = label
+        if at > 0:
+            move = label // 2 if label % 2 == 1 else before[at, label // 2]
+            label = 2 * move + (1 if scores[at - 1, 2 * move + 1] > scores[at - 1, 2 * move] else 0)
+    return top, said
