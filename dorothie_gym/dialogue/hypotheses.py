@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
@@ -23,6 +22,7 @@ from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.routes import DrivingPlan
 from dorothie_gym.dialogue.word_pairs import unusual_pairs
 from dorothie_gym.ontology.slots import Slot, SlotValue
+from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def nbest(choices: Sequence[Sequence[tuple[str, float]]]) -> tuple[TextHypothesi
     """
     firsts = [options[0] for options in choices]
     others = [
-        (math.log(max(second[1], 1e-6) / max(options[0][1], 1e-6)), place, second[0])
+        (pm.log(max(second[1], 1e-6) / max(options[0][1], 1e-6)), place, second[0])
         for place, options in enumerate(choices)
         for second in options[1:]
     ]
@@ -130,7 +130,7 @@ def nbest(choices: Sequence[Sequence[tuple[str, float]]]) -> tuple[TextHypothesi
             words[place] = word
         text = " ".join(word for word in words if word)
         if text and text not in found:
-            found[text] = math.exp(min(gain, 0.0))
+            found[text] = pm.exp(min(gain, 0.0))
         if len(found) == MOST:
             break
     total = sum(found.values())
@@ -209,7 +209,7 @@ def _meaning(spans: Sequence[Span]) -> tuple[DialogueMove | None, frozenset[Slot
 def _score(hypothesis: Hypothesis, spans: Sequence[Span], allows: Callable[[DrivingPlan], bool] | None) -> float:
     """Returns how probable a hypothesis is by its sound and by what it says, as a logarithm up to a constant."""
     plan = understand(hypothesis.text).plan
-    score = math.log(max(hypothesis.weight, _LEAST_WEIGHT)) - _UNUSUAL * unusual_pairs(hypothesis.text)
+    score = pm.log(max(hypothesis.weight, _LEAST_WEIGHT)) - _UNUSUAL * unusual_pairs(hypothesis.text)
     score += _VALUE * sum(len(span.act.slots) for span in spans) + _PLAN * bool(plan.steps)
     score += _DETAIL * sum(len(step.to_json()) for step in plan)
     return score if allows is None or not plan.steps or allows(plan) else score - _FORBIDDEN
