@@ -19,7 +19,7 @@ COLOURS: Final = (
 
 @shared
 @dataclass(frozen=True, kw_only=True)
-class Look:
+class Appearance:
     """Visible attributes of a house or a person, in the order in which speakers prefer them; None where not stated.
 
     Attributes:
@@ -46,18 +46,18 @@ class Look:
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return {name: value for name, value in values.items() if value}
 
-    def fits(self, other: Look) -> bool:
+    def fits(self, other: Appearance) -> bool:
         """Returns whether `other` has every attribute that is stated here."""
         return all(getattr(other, name) == value for name, value in self.stated.items())
 
-    def contradicts(self, other: Look) -> bool:
+    def contradicts(self, other: Appearance) -> bool:
         """Returns whether an attribute is stated of both, and differently."""
         theirs = other.stated
         return any(theirs.get(name, value) != value for name, value in self.stated.items())
 
-    def joined(self, later: Look) -> Look:
+    def joined(self, later: Appearance) -> Appearance:
         """Returns what is stated here and later; what is stated later corrects it."""
-        return Look(**{**self.stated, **later.stated})
+        return Appearance(**{**self.stated, **later.stated})
 
     @property
     def features(self) -> tuple[str, ...]:
@@ -82,7 +82,7 @@ class Look:
         return f"the {self.facade} {size}house" + (f" with {_listed(parts)}" if parts else "")
 
 
-def distinguishing(target: Look, others: Sequence[Look]) -> Look:
+def distinguishing(target: Appearance, others: Sequence[Appearance]) -> Appearance:
     """Returns the attributes that tell a house or person from others: the incremental algorithm.
 
     Attributes are tried in the order of preference, and kept if they rule out one of the others that are left (Dale and
@@ -101,10 +101,10 @@ def distinguishing(target: Look, others: Sequence[Look]) -> Look:
             chosen[name], left = value, remaining
         if not left:
             break
-    return Look(**chosen)
+    return Appearance(**chosen)
 
 
-def read_look(text: str) -> Look:
+def read_look(text: str) -> Appearance:
     """Returns the attributes of a house or a person that a text states; none are stated where it describes nothing."""
     found: dict[str, Any] = {}
     words = text.casefold()
@@ -119,7 +119,7 @@ def read_look(text: str) -> Look:
             found[name] = True
         else:
             found[name] = _SPELT.get(value, value)
-    return Look(**found)
+    return Appearance(**found)
 
 
 _FEATURES: Final = MappingProxyType(

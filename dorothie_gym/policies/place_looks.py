@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from dorothie_gym.dialogue.looks import Look, distinguishing
+from dorothie_gym.dialogue.looks import Appearance, distinguishing
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.landmark_designs import colour_name, house_design, person_design
@@ -20,7 +20,7 @@ _AT_SITE = 2.0
 
 
 @lru_cache(maxsize=512)
-def look_at(town: Town, name: LandmarkName, x: float, y: float) -> Look | None:
+def look_at(town: Town, name: LandmarkName, x: float, y: float) -> Appearance | None:
     """Returns the look of a house or person at a position [m]; None for other landmarks, or if no site is there."""
     if name not in (LandmarkName.HOUSE, LandmarkName.PERSON) or not town.sites:
         return None
@@ -29,9 +29,9 @@ def look_at(town: Town, name: LandmarkName, x: float, y: float) -> Look | None:
         return None
     if name is LandmarkName.PERSON:
         clothes = person_design(site)
-        return Look(coat=colour_name(clothes.coat), trousers=colour_name(clothes.trousers))
+        return Appearance(coat=colour_name(clothes.coat), trousers=colour_name(clothes.trousers))
     house = house_design(site)
-    return Look(
+    return Appearance(
         facade=colour_name(house.wall),
         storeys=house.storeys,
         roof=colour_name(house.roof),
@@ -40,12 +40,12 @@ def look_at(town: Town, name: LandmarkName, x: float, y: float) -> Look | None:
     )
 
 
-def look_of(town: Town, mark: SeenLandmark) -> Look | None:
+def look_of(town: Town, mark: SeenLandmark) -> Appearance | None:
     """Returns the look of a landmark on the map, as `look_at`."""
     return look_at(town, mark.name, mark.x, mark.y)
 
 
-def distinguishing_look(town: Town, mark: SeenLandmark, marks: Iterable[SeenLandmark]) -> Look | None:
+def distinguishing_look(town: Town, mark: SeenLandmark, marks: Iterable[SeenLandmark]) -> Appearance | None:
     """Returns the attributes by which a house or person is told from the others of its kind on the map."""
     look = look_of(town, mark)
     if look is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dorothie_gym.dialogue.looks import Look
+from dorothie_gym.dialogue.looks import Appearance
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.actions import MentalAction
@@ -44,7 +44,7 @@ class BeliefState:
     told: tuple[Proposition, ...] = ()
     sent_goal: LandmarkName | None = None
     owner: str | None = None
-    look: Look | None = None
+    look: Appearance | None = None
 
     @property
     def stop_place(self) -> Place | None:
@@ -108,7 +108,7 @@ class BeliefState:
         """Records that the participant has described where the goal lies."""
         return replace(self, described=True)
 
-    def with_look(self, look: Look) -> BeliefState:
+    def with_look(self, look: Appearance) -> BeliefState:
         """Adds to the look of the goal."""
         return replace(self, look=look if self.look is None else self.look.joined(look))
 

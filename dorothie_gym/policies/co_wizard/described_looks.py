@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.looks import Look, read_look
+from dorothie_gym.dialogue.looks import Appearance, read_look
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import DrivingPlan, PlanStep, StepAction
@@ -38,12 +38,12 @@ _DESCRIBED: Final = frozenset({LandmarkName.HOUSE, LandmarkName.PERSON, ObjectCl
 _ORDERS: Final = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.STOP, ActionValue.LANE_SWITCH})
 
 
-def looks_heard(state: CoWizardState, heard: HeardUtterance) -> dict[int, Look]:
+def looks_heard(state: CoWizardState, heard: HeardUtterance) -> dict[int, Appearance]:
     """Returns the looks of the goal that acts of an utterance describe, by the numbers of the acts.
 
     What identifies the goal is no order, also where it is put as one: "look for the yellow house".
     """
-    found: dict[int, Look] = {}
+    found: dict[int, Appearance] = {}
     for number, act in enumerate(heard.acts):
         orders = _ORDERS & set(act.values(Slot.ACTION)) or act.values(Slot.STREET) or act.values(Slot.STATUS)
         words = heard.words_of(number)
@@ -56,7 +56,7 @@ def looks_heard(state: CoWizardState, heard: HeardUtterance) -> dict[int, Look]:
     return found
 
 
-def without_looks(heard: HeardUtterance, looks: dict[int, Look]) -> HeardUtterance:
+def without_looks(heard: HeardUtterance, looks: dict[int, Appearance]) -> HeardUtterance:
     """Returns an utterance without the steps that some of its acts seem to ask for, because they describe a look."""
     steps = tuple(step for step in heard.words.plan if not (looks and _only_identifies(step)))
     return replace(heard, words=replace(heard.words, plan=DrivingPlan(steps)))
@@ -68,7 +68,7 @@ def _only_identifies(step: PlanStep) -> bool:
     return step.action in _SEEKING and not places.isdisjoint(_DESCRIBED)
 
 
-def take_up_look(state: CoWizardState, look: Look, rng: np.random.Generator) -> None:
+def take_up_look(state: CoWizardState, look: Appearance, rng: np.random.Generator) -> None:
     """Remembers a look of the goal, and repeats it or shows that it was heard."""
     state.beliefs = state.beliefs.with_look(look)
     state.intentions = state.intentions if state.intentions.arrived else state.intentions.resumed()
@@ -112,5 +112,5 @@ def _in_view(view: CoWizardView) -> list[SeenLandmark]:
     return [mark for mark in view.landmarks if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
 
 
-def _kind_of(look: Look) -> LandmarkName:
+def _kind_of(look: Appearance) -> LandmarkName:
     return LandmarkName.PERSON if look.coat is not None or look.trousers is not None else LandmarkName.HOUSE

@@ -21,7 +21,7 @@ from dorothie_gym.policies.view_range import DENSE, sight
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.looks import Look
+    from dorothie_gym.dialogue.looks import Appearance
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
@@ -104,7 +104,7 @@ def looks_remark(
     return (_said(state, features[int(rng.integers(len(features)))]),) if features else ()
 
 
-def _distinguished(goal: SeenLandmark, look: Look, rng: np.random.Generator) -> Proposition:
+def _distinguished(goal: SeenLandmark, look: Appearance, rng: np.random.Generator) -> Proposition:
     """Returns the statement that tells a house or person from the others: of its features, or as a noun phrase."""
     if goal.name is LandmarkName.PERSON:
         return Proposition.of(Predicate.LOOKS, place=goal.name, object=ObjectClass.PEDESTRIAN, feature=look.listed)

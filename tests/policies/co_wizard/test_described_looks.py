@@ -6,7 +6,7 @@ import copy
 
 import pytest
 
-from dorothie_gym.dialogue.looks import Look
+from dorothie_gym.dialogue.looks import Appearance
 from dorothie_gym.ontology import DialogueMove, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.described_looks import compare_looks
 from dorothie_gym.policies.co_wizard.state import CoWizardState
@@ -24,7 +24,7 @@ def test_a_description_of_the_goal_is_no_order(words: str) -> None:
     assert ride.state.beliefs.goal is LandmarkName.HOUSE
     ride.said.clear()
     ride.say(words, seconds=3.0)
-    assert ride.state.beliefs.look == Look(facade="yellow")
+    assert ride.state.beliefs.look == Appearance(facade="yellow")
     assert not ride.state.plan.steps
     assert all(speech.act.move is not DialogueMove.QUERY_W for speech in ride.said)
 
@@ -58,7 +58,7 @@ def beside_houses(ride: Ride, number: int = 2) -> tuple[CoWizardView, list[SeenL
     return replace(view, landmarks=tuple(houses), raw={**view.raw, "pose": pose}), houses
 
 
-def believing(ride: Ride, house: SeenLandmark, look: Look) -> CoWizardState:
+def believing(ride: Ride, house: SeenLandmark, look: Appearance) -> CoWizardState:
     state = copy.copy(ride.state)
     state.speech = state.speech.cleared()
     state.beliefs = state.beliefs.with_known_goal(LandmarkName.HOUSE, house.place).with_look(look)
@@ -70,7 +70,7 @@ def test_a_house_of_another_look_is_not_the_goal() -> None:
     view, houses = beside_houses(ride)
     other = look_of(ride.env.town, houses[1])
     assert other is not None
-    state = believing(ride, houses[0], Look(facade=other.facade))
+    state = believing(ride, houses[0], Appearance(facade=other.facade))
     compare_looks(state, view)
     assert houses[0].place in state.beliefs.ruled_out
     assert not state.beliefs.exact
@@ -82,7 +82,7 @@ def test_a_house_of_this_look_stays_the_goal() -> None:
     view, houses = beside_houses(ride)
     own = look_of(ride.env.town, houses[0])
     assert own is not None
-    state = believing(ride, houses[0], Look(facade=own.facade, roof=own.roof))
+    state = believing(ride, houses[0], Appearance(facade=own.facade, roof=own.roof))
     compare_looks(state, view)
     assert state.beliefs.exact and state.beliefs.place == houses[0].place
     assert not state.speech.queue
@@ -92,7 +92,7 @@ def test_a_house_out_of_sight_is_not_judged() -> None:
     ride = Ride(4)
     view, houses = beside_houses(ride, 1)
     far = replace(view, raw={**view.raw, "pose": [houses[0].x + 300.0, houses[0].y, 0.0]})
-    state = believing(ride, houses[0], Look(roof="gray"))
+    state = believing(ride, houses[0], Appearance(roof="gray"))
     compare_looks(state, far)
     assert state.beliefs.exact
     compare_looks(state, view)
@@ -104,7 +104,7 @@ def test_the_house_in_view_that_fits_becomes_the_goal() -> None:
     view, houses = beside_houses(ride)
     own = look_of(ride.env.town, houses[0])
     assert own is not None
-    state = believing(ride, houses[1], Look(facade=own.facade))
+    state = believing(ride, houses[1], Appearance(facade=own.facade))
     state.beliefs = state.beliefs.without_place()
     compare_looks(state, view)
     assert state.beliefs.exact and state.beliefs.place == houses[0].place
