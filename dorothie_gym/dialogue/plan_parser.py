@@ -409,8 +409,7 @@ class _Builder(TurnReader, PlaceReader):
             if frame.mood is ClauseMood.STATEMENT and frame.place is not None and frame.action in NEEDING_PLACE:
                 frame.mood = ClauseMood.COMMAND
                 return
-        if self.last_place is not None and self.last_place.street is not None:
-            self.open_step(StepAction.FOLLOW).place = self.last_place
+        self.take_last_place()
 
     def _defer(self) -> None:
         """Puts the errand named last behind the others."""

@@ -70,7 +70,7 @@ class PlaceReader(PlanState):
         if self._excludes(place):
             return
         if place.reference is None and not self._describes(place):
-            self.last_place = place
+            self.last_place = self._located(place) if item.relation is ConditionRelation.AT else place
         if self.repairing and (frame := self.replaced()) is not None and frame.at is not None:
             frame.relation, frame.at = item.relation, place
             return
@@ -283,6 +283,24 @@ class PlaceReader(PlanState):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def take_last_place(self) -> None:
+        """Orders to visit, or to follow, the place named last: "the KFC, on Draper, go there"."""
+        last = self.last_place
+        if last is None or any(frame.place == last for frame in self.frames):
+            return
+        if last.landmark is not None:
+            self.pending.at = None
+            self.open_step(StepAction.VISIT).place = last
+        elif last.street is not None:
+            self.open_step(StepAction.FOLLOW).place = last
+
+    def _located(self, place: PlaceReference) -> PlaceReference:
+        """Returns the landmark named last with its street for a street alone: "the KFC, on Draper, go there"."""
+        last = self.last_place
+        if last is None or last.landmark is None or last.street is not None or not _names_only_street(place):
+            return place
+        return with_details(last, street=place.street)
 
     def _resolved(self, place: PlaceReference) -> PlaceReference:
         return self.last_place if place.reference is Anaphor.THERE and self.last_place is not None else place

@@ -460,6 +460,12 @@ BEAL, FULLER = {"street": "Beal"}, {"street": "Fuller"}
         ("we'd be grateful to be dropped at the KFC", [step("stop", AT, KFC)]),
         ("this is me, thanks", [step("stop", AT, {"reference": "here"})]),
         ("turn around whenever you get a chance", [step("u_turn")]),
+        ("I was rather hoping you'd drive to the Ikea", [step("visit", place=IKEA)]),
+        ("you don't happen to be heading to the KFC?", [step("visit", place=KFC)]),
+        ("isn't it high time we slowed down", [step("speed", change="slower")]),
+        # a place named before
+        ("the KFC on Beal, go there", [step("visit", place={**KFC, **BEAL})]),
+        ("there's the KFC, on Beal, go there", [step("visit", place={**KFC, **BEAL})]),
     ],
 )
 def test_wordings_of_passengers(text, steps):
