@@ -311,8 +311,8 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     if not spans or all(formula_move(_plain_words(span.text)) is not None for span in spans):
         return spans  # formulas have no other move
     found = retagged(spans, after)
-    if found is None:
-        return spans
+    if found is None or (all(move is DialogueMove.REPLY_N for _, move in found) and understand(text).plan):
+        return spans  # "no, not right, left!" orders something
     ruled = {(span.text, span.act.move): span for span in spans}
     return tuple(
         ruled.get((part, move)) or Span(part, DialogueAct(move, _slots(understand(part), move))) for part, move in found

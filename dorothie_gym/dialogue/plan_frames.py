@@ -338,11 +338,20 @@ def append_step(steps: list[PlanStep], step: PlanStep, *, named: bool = False) -
         steps[-1] = step if step.action is StepAction.LANE else steps[-1]
         return
     if steps and steps[-1].action is step.action and step.action is not StepAction.TURN:
-        old, new = steps[-1].to_json(), step.to_json()
+        old, new = _fields(steps[-1]), _fields(step)
         if old.items() <= new.items() or new.items() <= old.items():
             steps[-1] = step if len(new) > len(old) else steps[-1]
             return
     steps.append(step)
+
+
+def _fields(step: PlanStep) -> dict[str, object]:
+    """Returns what a step says; of a visited place each detail by itself: "pick her up, so my friend on Hubbard"."""
+    fields: dict[str, object] = {**step.to_json()}
+    if step.action is StepAction.VISIT and step.place is not None:
+        del fields["place"]
+        fields |= {f"place {name}": value for name, value in step.place.to_json().items()}
+    return fields
 
 
 def _is_side_of_lane(first: PlanStep, second: PlanStep) -> bool:

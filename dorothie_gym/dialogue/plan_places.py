@@ -280,9 +280,21 @@ class PlaceReader(PlanState):
         if place.landmark is not None:
             frame = self.open_step(StepAction.VISIT)
             frame.place, frame.bare = place, True
+        elif self._adds_street(place):
+            return
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _adds_street(self, place: PlaceReference) -> bool:
+        """Gives the visited place right before it a street without a preposition: "take me to the house, um, Beal"."""
+        frame = self.frame
+        if frame is None or self.fresh or frame is not self.frames[-1] or frame.place is None:
+            return False
+        if frame.action is not StepAction.VISIT or frame.place.street is not None or not _names_only_street(place):
+            return False
+        frame.place = self.last_place = with_details(frame.place, street=place.street)
+        return True
 
     def take_last_place(self) -> None:
         """Orders to visit, or to follow, the place named last: "the KFC, on Draper, go there"."""
@@ -311,6 +323,8 @@ class PlaceReader(PlanState):
         for frame in reversed(self.frames):
             for name in ("place", "at"):
                 old = getattr(frame, name)
+                if old is not None and old.street is not None and _names_only_street(place):
+                    place = with_details(old, street=place.street)  # "the house on Beal, no, Fuller"
                 if old is not None and (old.landmark is None) is (place.landmark is None):
                     setattr(frame, name, place)
                     self.repaired, self.frame, self.fresh = True, frame, False

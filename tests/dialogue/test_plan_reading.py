@@ -460,9 +460,14 @@ BEAL, FULLER = {"street": "Beal"}, {"street": "Fuller"}
         ("we'd be grateful to be dropped at the KFC", [step("stop", AT, KFC)]),
         ("this is me, thanks", [step("stop", AT, {"reference": "here"})]),
         ("turn around whenever you get a chance", [step("u_turn")]),
-        ("I was rather hoping you'd drive to the Ikea", [step("visit", place=IKEA)]),
-        ("you don't happen to be heading to the KFC?", [step("visit", place=KFC)]),
-        ("isn't it high time we slowed down", [step("speed", change="slower")]),
+        ("I was kinda hoping you'd drive to the Ikea", [step("visit", place=IKEA)]),
+        ("you wouldn't happen to be heading to the KFC?", [step("visit", place=KFC)]),
+        ("it's high time we slowed down", [step("speed", change="slower")]),
+        # one errand, said twice or with its street behind
+        ("I have to pick up Anna, so take me to our passenger Anna on Beal", [step("visit", place={**PERSON, **BEAL})]),
+        ("head to my friend on Beal. I have to pick her up.", [step("visit", place={**PERSON, **BEAL})]),
+        ("take me to the house, um, Beal", [step("visit", place={"landmark": "House", **BEAL})]),
+        ("the house on Beal, uh no, Fuller", [step("visit", place={"landmark": "House", "street": "Fuller"})]),
         # a place named before
         ("the KFC on Beal, go there", [step("visit", place={**KFC, **BEAL})]),
         ("there's the KFC, on Beal, go there", [step("visit", place={**KFC, **BEAL})]),
