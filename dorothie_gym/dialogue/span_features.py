@@ -90,7 +90,7 @@ def span_features(spans: Sequence[Span], after: DialogueMove | None) -> SpanFeat
         begins=tuple(begins),
         moves=tuple(moves),
         signs=tuple(signs),
-        after=after,
+        after=None,  # the rules know it: as an input of its own it outweighs the words
     )
 
 
