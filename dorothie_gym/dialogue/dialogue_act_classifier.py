@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dorothie_gym.dialogue.clause_breaks import with_breaks
@@ -313,10 +313,18 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     found = retagged(spans, after)
     if found is None or (all(move is DialogueMove.REPLY_N for _, move in found) and understand(text).plan):
         return spans  # "no, not right, left!" orders something
+    if any(_joins_sentences(part, spans) for part, _ in found):
+        return spans
     ruled = {(span.text, span.act.move): span for span in spans}
     return tuple(
         ruled.get((part, move)) or Span(part, DialogueAct(move, _slots(understand(part), move))) for part, move in found
     )
+
+
+def _joins_sentences(part: str, spans: Sequence[Span]) -> bool:
+    """Returns whether a part has sentences to which the rules give different moves: "Left. Is that the KFC?"."""
+    moves = {span.act.move for span in spans if span.text in part}
+    return len(moves) > 1 and _SENTENCE_END.search(part) is not None
 
 
 @functools.lru_cache(maxsize=2048)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.entity_recognition import known_words, nearest_name
+from dorothie_gym.dialogue.formulas import formula_move
 from dorothie_gym.dialogue.lexicon import load_lexicon, split_words
-from dorothie_gym.dialogue.move_decision import formula_move
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import Slot, SlotValue
