@@ -15,7 +15,8 @@ import numpy as np
 
 from dorothie_gym.dialogue import AsrChannel, Wording, draw_style, word_acts
 from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans
-from dorothie_gym.dialogue.span_features import SpanFeatures, span_features
+from dorothie_gym.dialogue.span_features import span_features
+from dorothie_gym.dialogue.span_inputs import SpanFeatures
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
 from dorothie_gym.ontology.spellings import parse_move
@@ -97,7 +98,7 @@ def example(sentence: Sentence) -> Example:
     for text, move in sentence.spans:
         label = 2 * moves.index(move)
         labels += [label, *[label + 1] * (len(text.split()) - 1)]
-    features = span_features(rule_spans(sentence.text, sentence.after), sentence.after)
+    features = span_features(rule_spans(sentence.text, sentence.after))
     return Example(features, tuple(labels))
 
 

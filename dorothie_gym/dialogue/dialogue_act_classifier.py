@@ -24,6 +24,7 @@ from dorothie_gym.dialogue.move_decision import (
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import behind_signs
+from dorothie_gym.dialogue.span_features import span_features
 from dorothie_gym.dialogue.span_tagger import retagged
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import OntologyError, PhraseFileError
@@ -310,7 +311,7 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     spans = rule_spans(text, after)
     if not spans or all(formula_move(_plain_words(span.text)) is not None for span in spans):
         return spans  # formulas have no other move
-    found = retagged(spans, after)
+    found = retagged(spans, span_features(spans))
     if found is None or (all(move is DialogueMove.REPLY_N for _, move in found) and understand(text).plan):
         return spans  # "no, not right, left!" orders something
     if any(_joins_sentences(part, spans) for part, _ in found):

@@ -8,36 +8,29 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.entity_recognition import known_words, nearest_name
 from dorothie_gym.dialogue.formulas import formula_move
 from dorothie_gym.dialogue.lexicon import load_lexicon, split_words
 from dorothie_gym.dialogue.nlu import understand
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.dialogue.span_inputs import (
+    CONTINUED,
+    LANDMARK,
+    MARKS,
+    MOODS,
+    NO_WORD,
+    NUMBER,
+    SIGNS,
+    STREET,
+    SpanFeatures,
+)
 from dorothie_gym.ontology.slots import Slot, SlotValue
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.clause_moods import ClauseMood
     from dorothie_gym.dialogue.conversation import Span
-
-MARKS: Final = ("", ",", ".", "?", "!", "other")
-"""Marks behind a word."""
-
-MOODS: Final = tuple(ClauseMood)
-
-SIGNS: Final = 2 * (1 + len(MOODS)) + 10
-"""Number of signs of a span: its first and its last mood, each with "none", and ten yes-or-no questions."""
-
-_LANDMARK: Final = "#landmark"
-_STREET: Final = "#street"
-_CONTINUED: Final = "#+"
-_NUMBER: Final = "#number"
-NO_WORD: Final = "-"
-"""Mask of a token without letters and digits, such as a dash."""
-
-MASKS: Final = (_LANDMARK, _STREET, _CONTINUED, _NUMBER, NO_WORD)
+    from dorothie_gym.ontology.dialogue_acts import DialogueMove
 
 _SHORTEST: Final = 4
 """Shortest word that may be a misheard name [letters]."""
@@ -46,33 +39,11 @@ _LEADING: Final = re.compile(r"^[.?!,;:'\"\u2026(\u2014-]+")
 _TRAILING: Final = re.compile(r"[.?!,;:\u2026\u2014-]+$")
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpanFeatures:
-    """Features of an utterance, by word.
-
-    Attributes:
-        words: words in lower case without marks; names and numbers are masked.
-        marks: the mark behind each word, as an index of `MARKS`.
-        begins: whether a span of the rules begins at the word.
-        moves: move of the rules' span.
-        signs: signs of the rules' span, `SIGNS` zeros and ones.
-        after: move of the other speaker before the utterance.
-    """
-
-    words: tuple[str, ...]
-    marks: tuple[int, ...]
-    begins: tuple[bool, ...]
-    moves: tuple[DialogueMove, ...]
-    signs: tuple[tuple[int, ...], ...]
-    after: DialogueMove | None
-
-
-def span_features(spans: Sequence[Span], after: DialogueMove | None) -> SpanFeatures:
+def span_features(spans: Sequence[Span]) -> SpanFeatures:
     """Returns the features of an utterance.
 
     Args:
-        spans: its spans by the rules.
-        after: move of the other speaker before it.
+        spans: its spans by the rules, which know the move before it.
     """
     tokens: list[str] = []
     begins: list[bool] = []
@@ -90,7 +61,6 @@ def span_features(spans: Sequence[Span], after: DialogueMove | None) -> SpanFeat
         begins=tuple(begins),
         moves=tuple(moves),
         signs=tuple(signs),
-        after=None,  # the rules know it: as an input of its own it outweighs the words
     )
 
 
@@ -141,9 +111,9 @@ def masked_words(words: Sequence[str]) -> list[str]:
         place = len(masked)
         value, length = _name_at(words, place)
         if value is not None:
-            masked += [_LANDMARK if value.slot is Slot.LANDMARK else _STREET, *[_CONTINUED] * (length - 1)]
+            masked += [LANDMARK if value.slot is Slot.LANDMARK else STREET, *[CONTINUED] * (length - 1)]
         else:
-            masked.append(_NUMBER if words[place][:1].isdigit() else words[place])
+            masked.append(NUMBER if words[place][:1].isdigit() else words[place])
     return masked
 
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.dialogue.span_features import MASKS, SIGNS, SpanFeatures, span_features
+from dorothie_gym.dialogue.span_inputs import MASKS, SIGNS, SpanFeatures
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.spellings import parse_move
 from dorothie_gym.support.compilation import compiled
@@ -79,7 +79,7 @@ class SpanTagger:
         vectors: vectors of words (n, d), int32.
         groups: vectors of letter groups (BUCKETS, g).
         marks, begins, rules, afters, places: vectors of marks, of the begin of a rules' span, of the rules' moves, of
-            the moves before (0 is none), and of places (inner, first, last).
+            the context (the first is none, and the only one in use), and of places (inner, first, last).
         convolutions: weights (KERNEL, inputs, h) of each convolution.
         biases: their biases (h,).
         shifts: binary places by which their sums are too long.
@@ -123,7 +123,7 @@ class SpanTagger:
                 before, self.convolutions[layer], self.biases[layer], dilation, self.shifts[layer], layer > 0, held
             )
             before, held = held, values[layer + 1]
-        after = self.afters[self._after(features)] << (HIDDEN_BITS - INPUT_BITS)
+        after = self.afters[0] << (HIDDEN_BITS - INPUT_BITS)
         summary = np.empty(hidden, np.int32)
         _summarise(before, after, self.pooled, self.pooled_bias, self.pooled_shift, summary)
         scores = np.empty((number, 2 * len(self.moves)), np.int32)
@@ -131,9 +131,6 @@ class SpanTagger:
         labels, rules = np.empty(number, np.int32), self._rules_labels(features)
         best, said = _decode(scores, self.pairs, rules, np.empty((number, len(self.moves)), np.int32), labels)
         return labels.tolist(), int(best), int(said)
-
-    def _after(self, features: SpanFeatures) -> int:
-        return 0 if features.after is None else 1 + self.moves.index(features.after)
 
     def _rules_labels(self, features: SpanFeatures) -> Whole:
         pairs = zip(features.moves, features.begins, strict=True)
@@ -144,7 +141,7 @@ class SpanTagger:
         number = len(features.words)
         places = np.zeros(number, np.int64)
         places[0], places[-1] = 1, 2
-        after = np.broadcast_to(self.afters[self._after(features)], (number, self.afters.shape[1]))
+        after = np.broadcast_to(self.afters[0], (number, self.afters.shape[1]))
         signs = np.array(features.signs, np.int32).reshape(number, SIGNS) << INPUT_BITS
         return np.ascontiguousarray(
             np.concatenate(
@@ -239,15 +236,14 @@ def unpack(data: bytes) -> SpanTagger:
     )
 
 
-def retagged(spans: Sequence[Span], after: DialogueMove | None) -> list[tuple[str, DialogueMove]] | None:
+def retagged(spans: Sequence[Span], features: SpanFeatures) -> list[tuple[str, DialogueMove]] | None:
     """Returns the spans of an utterance where the tagger is surer than the rules, and None elsewhere.
 
     Args:
         spans: spans of the rules, at least one.
-        after: move of the other speaker before the utterance.
+        features: features of the utterance.
     """
     tagger = load_tagger()
-    features = span_features(spans, after)
     labels, best, rules = tagger.tag(features)
     if best - rules <= tagger.margin:
         return None

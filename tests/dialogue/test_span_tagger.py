@@ -16,7 +16,8 @@ import pytest
 
 from dorothie_gym.dialogue import guess_spans
 from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans
-from dorothie_gym.dialogue.span_features import MARKS, SpanFeatures, masked_words, span_features
+from dorothie_gym.dialogue.span_features import masked_words, span_features
+from dorothie_gym.dialogue.span_inputs import MARKS, SpanFeatures
 from dorothie_gym.dialogue.span_tagger import (
     DILATIONS,
     HIDDEN_BITS,
@@ -44,7 +45,7 @@ SAID = [
 
 
 def features_of(text: str, after: DialogueMove | None = None) -> SpanFeatures:
-    return span_features(rule_spans(text, after), after)
+    return span_features(rule_spans(text, after))
 
 
 def sentences(number: int) -> list[tuple[str, list[str]]]:
@@ -133,7 +134,7 @@ def test_features_mask_names_and_numbers_and_keep_marks() -> None:
     features = features_of("Left, at the Shell!", DialogueMove.QUERY_W)
     assert features.words == ("left", "at", "the", "#landmark")
     assert [MARKS[mark] for mark in features.marks] == [",", "", "", "!"]
-    assert features.begins[0] and features.after is None
+    assert features.begins[0]
     assert features_of("\u2014 \u2026").words == ("-", "-")
 
 
