@@ -73,7 +73,7 @@ assert words == "power failure: 3 sensors fail", words
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_kind_of_exception(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 

@@ -54,7 +54,7 @@ assert "| utterances |" in leaderboard_page(read_entries([folder])), "not on the
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_metric(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 

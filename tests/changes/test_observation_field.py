@@ -44,7 +44,7 @@ assert "progress" not in engine.observations["participant"]
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_field(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 
