@@ -50,7 +50,6 @@ def test_labels_begin_where_spans_begin() -> None:
     found = example(SENTENCE)
     explain, instruct = 2 * DialogueMove.EXPLAIN, 2 * DialogueMove.INSTRUCT
     assert found.labels == (explain, explain + 1, explain + 1, instruct, instruct + 1, instruct + 1)
-    assert found.features.after is DialogueMove.CONFIRM
     assert len(found.features.words) == len(found.labels)
 
 
