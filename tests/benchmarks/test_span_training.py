@@ -74,7 +74,7 @@ def test_grammar_sentences_are_equal_for_equal_seeds() -> None:
 @pytest.mark.long
 def test_weights_are_reproducible_and_learn() -> None:
     training = pytest.importorskip("benchmarks.span_training")
-    config = replace(training.TrainingConfig(), epochs=4, composed=10, sampled=10, seed=4)
+    config = replace(training.TrainingConfig(), epochs=8, composed=10, sampled=10, seed=4)
     sentences = grammar_sentences(60, 2)
     examples, weights = training.training_examples(sentences, config)
     table = training.shipped_vectors()
