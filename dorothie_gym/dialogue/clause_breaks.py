@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.dialogue.lexicon import YamlMapping, plain_word, read_data, strings
-from dorothie_gym.dialogue.route_grammar import Match, PhraseIndex, route_grammar
+from dorothie_gym.dialogue.lexicon import plain_word, read_data, word_set
+from dorothie_gym.dialogue.route_grammar import Match, PhraseIndex, phrase_index, route_grammar
 
 _FILE: Final = "clause_breaks.yaml"
 _MARKS: Final = (",", ".", "?", "!", ";", ":", "\u2026", "\u2014", "\u2013", "-")
@@ -120,29 +120,15 @@ class _Breaks:
 @functools.cache
 def _breaks() -> _Breaks:
     data = read_data(_FILE)
-    starts = [
-        ("starts", kind, text)
-        for kind, phrases in data.get("starts", {}).items()
-        for text in strings(f"{_FILE}: starts.{kind}", phrases)
-    ]
     return _Breaks(
-        starts=PhraseIndex(starts, adverbs=False),
-        tags=_index(data, "tags"),
-        answers=_index(data, "answers"),
-        phrases=_index(data, "phrases"),
-        joining=_words(data, "joining"),
-        antecedents=_words(data, "antecedents"),
-        subordinate=_words(data, "subordinate"),
+        starts=phrase_index(_FILE, data, "starts", adverbs=False),
+        tags=phrase_index(_FILE, data, "tags", adverbs=False),
+        answers=phrase_index(_FILE, data, "answers", adverbs=False),
+        phrases=phrase_index(_FILE, data, "phrases", adverbs=False),
+        joining=word_set(_FILE, data, "joining"),
+        antecedents=word_set(_FILE, data, "antecedents"),
+        subordinate=word_set(_FILE, data, "subordinate"),
     )
-
-
-def _index(data: YamlMapping, name: str) -> PhraseIndex:
-    phrases = strings(f"{_FILE}: {name}", data.get(name))
-    return PhraseIndex([(name, name, text) for text in phrases], adverbs=False)
-
-
-def _words(data: YamlMapping, name: str) -> frozenset[str]:
-    return frozenset(strings(f"{_FILE}: {name}", data.get(name)))
 
 
 @functools.lru_cache(maxsize=4096)

@@ -85,6 +85,11 @@ YamlMapping: TypeAlias = Mapping[str, Any]
 """Mapping read from a data file, before its values are checked."""
 
 
+def word_set(file: str, data: YamlMapping, name: str) -> frozenset[str]:
+    """Returns a list of words of a data file; raises `PhraseFileError` if it is missing or malformed."""
+    return frozenset(strings(f"{file}: {name}", data.get(name)))
+
+
 def split_words(text: str) -> list[str]:
     """Returns lower-case tokens: "?" and "," are tokens, other stops become ",", hyphens and contractions are split."""
     words = _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))

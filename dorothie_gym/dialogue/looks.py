@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
+from dorothie_gym.dialogue.realization_context import enumeration
 from dorothie_gym.support.copying import shared
 
 COLOURS: Final = (
@@ -68,7 +69,7 @@ class Appearance:
     @property
     def listed(self) -> str:
         """Features as one phrase: "a yellow facade and two storeys"; empty without any."""
-        return _listed(self.features)
+        return enumeration(self.features)
 
     @property
     def house(self) -> str:
@@ -79,7 +80,7 @@ class Appearance:
         parts = [f"the {self.roof} roof"] if self.roof is not None else []
         parts += ["the tree beside it"] if self.tree else []
         parts += [f"the {self.frames} window frames"] if self.frames is not None else []
-        return f"the {self.facade} {size}house" + (f" with {_listed(parts)}" if parts else "")
+        return f"the {self.facade} {size}house" + (f" with {enumeration(parts)}" if parts else "")
 
 
 def distinguishing(target: Appearance, others: Sequence[Appearance]) -> Appearance:
@@ -162,9 +163,3 @@ def _article(value: object) -> str:
 
 def _storeys(value: object) -> str:
     return f"{_COUNTS.get(value, value)} storey{'' if value == 1 else 's'}"
-
-
-def _listed(phrases: Sequence[str]) -> str:
-    if len(phrases) < 2:
-        return "".join(phrases)
-    return f"{', '.join(phrases[:-1])} and {phrases[-1]}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,12 @@ from dorothie_gym.ontology.slots import LandmarkName, SlotValue, StreetName
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.propositions import Proposition  # noqa: TC004 (propositions have directions)
+
+
+def enumeration(phrases: Sequence[str]) -> str:
+    """Returns different phrases as one: "a, b and c"; empty for none."""
+    unique = list(dict.fromkeys(phrases))
+    return "".join(unique) if len(unique) < 2 else f"{', '.join(unique[:-1])} and {unique[-1]}"
 
 
 class Direction(enum.StrEnum):

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeAlias
 
-from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, strings
+from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, strings, word_set
 from dorothie_gym.errors import PhraseFileError
 
 FILE: Final = "route_talk.yaml"
@@ -180,38 +180,49 @@ def route_grammar() -> RouteGrammar:
     """
     data = read_data(FILE)
     return RouteGrammar(
-        terminals=PhraseIndex([row for group in _TERMINALS for row in _phrases(data, group)]),
-        references=PhraseIndex(list(_phrases(data, "references"))),
-        opportunities=PhraseIndex(list(_phrases(data, "opportunities"))),
-        openers=PhraseIndex(list(_phrases(data, "openers")), adverbs=False),
-        fillers=PhraseIndex(list(_phrases(data, "fillers")), adverbs=False),
-        lights=PhraseIndex(list(_phrases(data, "lights"))),
-        leaving=PhraseIndex(list(_phrases(data, "leaving"))),
-        contingencies=PhraseIndex(list(_phrases(data, "contingencies")), adverbs=False),
-        modifiers=_words(data, "modifiers"),
-        determiners=_words(data, "determiners"),
-        junction_words=_words(data, "junction_words"),
-        subjects=_words(data, "subjects"),
-        subordinators=_words(data, "subordinators"),
-        people=_words(data, "people"),
-        finite=_words(data, "finite"),
-        last_words=_words(data, "last_words"),
+        terminals=PhraseIndex([row for group in _TERMINALS for row in _phrases(FILE, data, group)]),
+        references=phrase_index(FILE, data, "references"),
+        opportunities=phrase_index(FILE, data, "opportunities"),
+        openers=phrase_index(FILE, data, "openers", adverbs=False),
+        fillers=phrase_index(FILE, data, "fillers", adverbs=False),
+        lights=phrase_index(FILE, data, "lights"),
+        leaving=phrase_index(FILE, data, "leaving"),
+        contingencies=phrase_index(FILE, data, "contingencies", adverbs=False),
+        modifiers=word_set(FILE, data, "modifiers"),
+        determiners=word_set(FILE, data, "determiners"),
+        junction_words=word_set(FILE, data, "junction_words"),
+        subjects=word_set(FILE, data, "subjects"),
+        subordinators=word_set(FILE, data, "subordinators"),
+        people=word_set(FILE, data, "people"),
+        finite=word_set(FILE, data, "finite"),
+        last_words=word_set(FILE, data, "last_words"),
         metres=_factors(data, "metres"),
         speeds=_factors(data, "speeds"),
         hours=_factors(data, "hours"),
     )
 
 
-def _phrases(data: YamlMapping, group: str) -> Iterator[tuple[str, str, str]]:
+def phrase_index(file: str, data: YamlMapping, group: str, *, adverbs: bool = True) -> PhraseIndex:
+    """Returns the phrases of a group of a data file, which are a list, or lists by kind.
+
+    Args:
+        file: name of the file, for messages.
+        data: content of the file.
+        group: name of the group.
+        adverbs: whether adverbs may stand inside the phrases.
+
+    Raises:
+        PhraseFileError: the group is missing or malformed.
+    """
+    return PhraseIndex(list(_phrases(file, data, group)), adverbs=adverbs)
+
+
+def _phrases(file: str, data: YamlMapping, group: str) -> Iterator[tuple[str, str, str]]:
     listed = data.get(group)
     kinds = listed if isinstance(listed, dict) else {group: listed}
     for kind, phrases in kinds.items():
-        for text in strings(f"{FILE}: {group}.{kind}", phrases):
+        for text in strings(f"{file}: {group}.{kind}", phrases):
             yield group, kind, text
-
-
-def _words(data: YamlMapping, name: str) -> frozenset[str]:
-    return frozenset(strings(f"{FILE}: {name}", data.get(name)))
 
 
 def _factors(data: YamlMapping, name: str) -> Mapping[str, float]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
-from dorothie_gym.dialogue.route_grammar import PhraseIndex
+from dorothie_gym.dialogue.lexicon import read_data, split_words
+from dorothie_gym.dialogue.route_grammar import PhraseIndex, phrase_index
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.dialogue_acts import DialogueMove
@@ -42,10 +42,7 @@ _DETERMINING: Final = frozenset(
 @functools.cache
 def _signs() -> dict[str, PhraseIndex]:
     data = read_data(_FILE)
-    return {
-        kind: PhraseIndex([(kind, kind, text) for text in strings(f"{_FILE}: {kind}", data.get(kind))], adverbs=False)
-        for kind in ("always", "opening")
-    }
+    return {kind: phrase_index(_FILE, data, kind, adverbs=False) for kind in ("always", "opening")}
 
 
 def is_mere_sign(text: str) -> bool:

@@ -16,7 +16,7 @@ from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import cardinal, duration, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext, enumeration
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, in_label_order
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, GoalStatus, LandmarkName, Slot, SlotValue
@@ -143,7 +143,7 @@ class SlotRealizer:
             keys = manners.get(value) or manners[_OTHERS]
             key = next(key for key in keys if ("do", key) in phrases or (form, key) in phrases)
             spoken.append((phrases.get((form, key)) or phrases["do", key]).say(self))
-        return _listed(spoken)
+        return enumeration(spoken)
 
     def landmark(self, named: bool = False) -> str:
         """Returns the names of the landmarks, or anaphoric references unless they must be `named`."""
@@ -159,7 +159,7 @@ class SlotRealizer:
         """Returns the words of the values of a slot in a form of the lexicon."""
         lexicon = load_lexicon()
         phrases = [self.pick(lexicon.forms(value, form)) for value in self.values[slot][: self._names]]
-        listed = _listed(phrases)
+        listed = enumeration(phrases)
         if slot is Slot.OBJECT and (len(phrases) > 1 or listed in lexicon.plurals):
             self._plurals.append(listed)
         return listed
@@ -259,7 +259,7 @@ class SlotRealizer:
         return self.place(self._wording.dropped)
 
     def _named(self, values: Sequence[SlotValue], named: bool) -> str:
-        listed = _listed([self._name(value, named) for value in values[: self._names]])
+        listed = enumeration([self._name(value, named) for value in values[: self._names]])
         if len(values[: self._names]) > 1:
             self._plurals.append(listed)
         return listed
@@ -404,10 +404,3 @@ def _bases(wording: Wording) -> dict[ActionValue, str]:
     if wording.lights is not None:
         bases[ActionValue.LIGHT_CHANGE] = "on" if wording.lights else "off"
     return bases
-
-
-def _listed(phrases: Sequence[str]) -> str:
-    if len(phrases) == 1:
-        return phrases[0]
-    unique = list(dict.fromkeys(phrases))
-    return unique[0] if len(unique) == 1 else ", ".join(unique[:-1]) + " and " + unique[-1]

@@ -16,10 +16,11 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
 from dorothie_gym.policies.co_wizard.goals import aim
-from dorothie_gym.policies.observation_parser import IN_VIEW, SeenLandmark, landmarks_in_view
+from dorothie_gym.policies.observation_parser import IN_VIEW, SeenLandmark, landmarks_in_view, scalar
 from dorothie_gym.policies.place_looks import look_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
+from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
@@ -104,12 +105,13 @@ def compare_looks(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def _in_view(view: CoWizardView) -> list[SeenLandmark]:
-    """Returns the landmarks of the map that are in the picture, or else those that are near."""
+    """Returns the landmarks of the map that are in the picture, or else those that are near enough to be seen."""
     shown = landmarks_in_view(view.raw, view.landmarks)
-    x, y = view.position
     if shown is not None:
         return list(shown)
-    return [mark for mark in view.landmarks if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
+    x, y = view.position
+    reach = min(IN_VIEW, scalar(view.raw, "sight"))
+    return [mark for mark in view.landmarks if pm.hypot(mark.x - x, mark.y - y) < reach]
 
 
 def _kind_of(look: Appearance) -> LandmarkName:

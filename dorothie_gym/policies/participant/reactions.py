@@ -25,7 +25,7 @@ from dorothie_gym.policies.observation_parser import (
     weather,
 )
 from dorothie_gym.policies.participant.goals import purpose_of_target
-from dorothie_gym.policies.participant.trip_talk import note_said, trip_questions, trip_remarks
+from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.speech import Remark, intend
@@ -286,7 +286,7 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     state.conversation = state.conversation.with_next_chat(next_chat)
     options = _chat_options(state, view, rng)
     chosen = options[int(rng.integers(len(options)))]
-    note_said(state, chosen)
+    note_told(state, chosen)
     state.say(*chosen)
 
 

@@ -85,7 +85,7 @@ def trip_questions(state: ParticipantState) -> list[tuple[Remark, ...]]:
     return [(item,) for item in found]
 
 
-def note_said(state: ParticipantState, remarks: tuple[Remark, ...]) -> None:
+def note_told(state: ParticipantState, remarks: tuple[Remark, ...]) -> None:
     """Remembers that statements about the trip were made."""
     for item in remarks:
         for content in item.meaning:

@@ -92,8 +92,10 @@ def test_a_house_out_of_sight_is_not_judged() -> None:
     ride = Ride(4)
     view, houses = beside_houses(ride, 1)
     far = replace(view, raw={**view.raw, "pose": [houses[0].x + 300.0, houses[0].y, 0.0]})
+    in_fog = replace(view, raw={**view.raw, "sight": [3.0]})
     state = believing(ride, houses[0], Appearance(roof="gray"))
     compare_looks(state, far)
+    compare_looks(state, in_fog)
     assert state.beliefs.exact
     compare_looks(state, view)
     assert not state.beliefs.exact
