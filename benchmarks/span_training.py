@@ -143,14 +143,14 @@ class SpanNetwork(nn.Module):
         self.groups = nn.EmbeddingBag(BUCKETS, config.letters, mode="mean")
         nn.init.normal_(self.groups.weight, std=0.3)
         self.marks, self.begins = nn.Embedding(len(MARKS), 6), nn.Embedding(2, 4)
-        self.rules, self.afters, self.places = nn.Embedding(moves, 12), nn.Embedding(1 + moves, 10), nn.Embedding(3, 4)
-        inputs = vectors.shape[1] + config.letters + 6 + 4 + 12 + 10 + 4 + SIGNS
+        self.rules, self.places = nn.Embedding(moves, 12), nn.Embedding(3, 4)
+        inputs = vectors.shape[1] + config.letters + 6 + 4 + 12 + 4 + SIGNS
         self.convolutions = [
             nn.Conv1d(inputs if layer == 0 else hidden, hidden, KERNEL, padding=dilation, dilation=dilation)
             for layer, dilation in enumerate(DILATIONS)
         ]
         self.registered = nn.ModuleList(self.convolutions)  # torch finds no parameters in a list
-        self.pooled = nn.Linear(2 * hidden + 10, hidden)
+        self.pooled = nn.Linear(2 * hidden, hidden)
         self.output = nn.Linear(2 * hidden, LABELS)
         self.pairs = nn.Parameter(torch.zeros(1 + moves, moves))
         self.dropout = nn.Dropout(config.dropout)
@@ -158,7 +158,6 @@ class SpanNetwork(nn.Module):
     def scores(self, batch: Mapping[str, Any]) -> Tensor:
         """Returns scores (b, n, 2 m) of the labels."""
         number = batch["rows"].shape[1]
-        after = self.afters(batch["after"])
         inputs = torch.cat(
             (
                 self.vectors(batch["rows"]),
@@ -166,7 +165,6 @@ class SpanNetwork(nn.Module):
                 self.marks(batch["marks"]),
                 self.begins(batch["begins"]),
                 self.rules(batch["rules"]),
-                after[:, None].expand(-1, number, -1),
                 self.places(batch["places"]),
                 batch["signs"],
             ),
@@ -178,7 +176,7 @@ class SpanNetwork(nn.Module):
             found = F.relu(convolution(self.dropout(values) if layer else values)) * mask
             values = found + values if layer else found
         largest = (values + (mask - 1.0) * 1e4).max(dim=2)[0]
-        summary = F.relu(self.pooled(torch.cat((largest, values[:, :, 0], after), dim=-1)))
+        summary = F.relu(self.pooled(torch.cat((largest, values[:, :, 0]), dim=-1)))
         both = torch.cat((values, summary[:, :, None].expand(-1, -1, number)), dim=1)
         scores: Tensor = self.output(self.dropout(both.transpose(1, 2)))
         return scores
@@ -229,7 +227,6 @@ def collate(network: SpanNetwork, examples: Sequence[Example], rng: random.Rando
             offsets.append(len(groups))
             groups += letter_groups(features.words[place]) if place < length else (0,)
     batch["groups"], batch["offsets"] = torch.tensor(groups), torch.tensor(offsets)
-    batch["after"] = torch.zeros(size, dtype=torch.int64)
     return batch
 
 
@@ -279,7 +276,7 @@ def packed(network: SpanNetwork) -> bytes:
         "moves": _text(move.label for move in MOVES),
         "vectors": _nibbles(network.vectors.weight),
     }
-    for name in ("groups", "marks", "begins", "rules", "afters", "places"):
+    for name in ("groups", "marks", "begins", "rules", "places"):
         arrays[name] = _whole(getattr(network, name).weight, INPUT_BITS)
     shifts = []
     for layer, convolution in enumerate(network.convolutions):

@@ -78,8 +78,8 @@ class SpanTagger:
         words: row of each word in `vectors`; masks come behind the words, and then unknown words.
         vectors: vectors of words (n, d), int32.
         groups: vectors of letter groups (BUCKETS, g).
-        marks, begins, rules, afters, places: vectors of marks, of the begin of a rules' span, of the rules' moves, of
-            the context (the first is none, and the only one in use), and of places (inner, first, last).
+        marks, begins, rules, places: vectors of marks, of the begin of a rules' span, of the rules' moves, and of
+            places (inner, first, last).
         convolutions: weights (KERNEL, inputs, h) of each convolution.
         biases: their biases (h,).
         shifts: binary places by which their sums are too long.
@@ -99,7 +99,6 @@ class SpanTagger:
     marks: Whole
     begins: Whole
     rules: Whole
-    afters: Whole
     places: Whole
     convolutions: tuple[Whole, ...]
     biases: tuple[Whole, ...]
@@ -123,9 +122,8 @@ class SpanTagger:
                 before, self.convolutions[layer], self.biases[layer], dilation, self.shifts[layer], layer > 0, held
             )
             before, held = held, values[layer + 1]
-        after = self.afters[0] << (HIDDEN_BITS - INPUT_BITS)
         summary = np.empty(hidden, np.int32)
-        _summarise(before, after, self.pooled, self.pooled_bias, self.pooled_shift, summary)
+        _summarise(before, self.pooled, self.pooled_bias, self.pooled_shift, summary)
         scores = np.empty((number, 2 * len(self.moves)), np.int32)
         _score(before, summary, self.output, self.output_bias, scores)
         labels, rules = np.empty(number, np.int32), self._rules_labels(features)
@@ -141,7 +139,6 @@ class SpanTagger:
         number = len(features.words)
         places = np.zeros(number, np.int64)
         places[0], places[-1] = 1, 2
-        after = np.broadcast_to(self.afters[0], (number, self.afters.shape[1]))
         signs = np.array(features.signs, np.int32).reshape(number, SIGNS) << INPUT_BITS
         return np.ascontiguousarray(
             np.concatenate(
@@ -150,7 +147,6 @@ class SpanTagger:
                     self.marks[list(features.marks)],
                     self.begins[[int(begins) for begins in features.begins]],
                     self.rules[[self.moves.index(move) for move in features.moves]],
-                    after,
                     self.places[places],
                     signs,
                 ),
@@ -221,7 +217,6 @@ def unpack(data: bytes) -> SpanTagger:
         marks=whole["marks"],
         begins=whole["begins"],
         rules=whole["rules"],
-        afters=whole["afters"],
         places=whole["places"],
         convolutions=tuple(whole[f"convolution{number}"] for number in range(len(DILATIONS))),
         biases=tuple(whole[f"bias{number}"] for number in range(len(DILATIONS))),
@@ -279,8 +274,8 @@ def _convolve(
 
 
 @compiled
-def _summarise(values: Whole, after: Whole, weights: Whole, bias: Whole, shift: int, found: Whole) -> None:
-    """Writes a rectified summary (h,) of values (n, h), of their maxima, the first ones and the move before."""
+def _summarise(values: Whole, weights: Whole, bias: Whole, shift: int, found: Whole) -> None:
+    """Writes a rectified summary (h,) of values (n, h), of their maxima and the first ones."""
     width = values.shape[1]
     for j in range(len(bias)):
         found[j] = bias[j]
@@ -290,9 +285,6 @@ def _summarise(values: Whole, after: Whole, weights: Whole, bias: Whole, shift: 
             largest = max(largest, values[at, i])
         for j in range(len(bias)):
             found[j] += largest * weights[i, j] + values[0, i] * weights[width + i, j]
-    for i in range(len(after)):
-        for j in range(len(bias)):
-            found[j] += after[i] * weights[2 * width + i, j]
     for j in range(len(bias)):
         found[j] = max(found[j] + (1 << (shift - 1)), 0) >> shift
 

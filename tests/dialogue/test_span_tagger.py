@@ -20,8 +20,6 @@ from dorothie_gym.dialogue.span_features import masked_words, span_features
 from dorothie_gym.dialogue.span_inputs import MARKS, SpanFeatures
 from dorothie_gym.dialogue.span_tagger import (
     DILATIONS,
-    HIDDEN_BITS,
-    INPUT_BITS,
     WEIGHTS_FILE,
     SpanTagger,
     load_tagger,
@@ -58,7 +56,7 @@ def sentences(number: int) -> list[tuple[str, list[str]]]:
     ][:number]
 
 
-def scores_of(tagger: SpanTagger, inputs: np.ndarray, after: np.ndarray) -> np.ndarray:
+def scores_of(tagger: SpanTagger, inputs: np.ndarray) -> np.ndarray:
     """Returns the scores of the labels, in whole numbers of 64 bits, a word and a layer at a time."""
     values = inputs.astype(np.int64)
     number = len(values)
@@ -70,8 +68,7 @@ def scores_of(tagger: SpanTagger, inputs: np.ndarray, after: np.ndarray) -> np.n
         )
         found = np.maximum(total + (1 << (shift - 1)), 0) >> shift
         values = found if layer == 0 else values + found
-    after = after.astype(np.int64) << (HIDDEN_BITS - INPUT_BITS)
-    everything = np.concatenate((values.max(axis=0), values[0], after))
+    everything = np.concatenate((values.max(axis=0), values[0]))
     summary = tagger.pooled_bias + np.einsum("k,kh->h", everything, tagger.pooled.astype(np.int64))
     summary = np.maximum(summary + (1 << (tagger.pooled_shift - 1)), 0) >> tagger.pooled_shift
     both = np.concatenate((values, np.broadcast_to(summary, (number, len(summary)))), axis=1)
@@ -113,8 +110,7 @@ def test_labels_are_the_best_of_all_by_independent_sums() -> None:
     for text, after in (("turn left then stop", None), ("yes please", DialogueMove.QUERY_YN), ("hm", None)):
         features = features_of(text, after)
         labels, best, said = tagger.tag(features)
-        row = 0
-        scores = scores_of(tagger, tagger.inputs(features), tagger.afters[row])
+        scores = scores_of(tagger, tagger.inputs(features))
         moves = np.argsort(-scores.reshape(len(scores), -1, 2).max(axis=(0, 2)), kind="stable")[:5]
         likely = [2 * int(move) + inside for move in moves for inside in (0, 1)]
         paths = itertools.product(likely, repeat=len(scores))
