@@ -389,6 +389,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=TARGET)
     parser.add_argument("--minilm", action="store_true", help="make the vectors of words from MiniLM")
     asked = parser.parse_args()
+    if asked.folds == 1 or asked.folds < 0:
+        parser.error(f"--folds is {asked.folds}; give at least 2, or 0 to train the weights")
     sentences, config = read_training_sentences(), TrainingConfig()
     table = minilm_vectors(_seen(sentences), config) if asked.minilm else shipped_vectors()
     if asked.folds:
