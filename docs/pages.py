@@ -5,6 +5,7 @@ python docs/pages.py frames               # their pictures
 python docs/pages.py transcripts          # simulates sessions until three fit; a few seconds each
 python docs/pages.py figures CORPUS       # statistics of a corpus made by `dorothie-gym generate`
 python docs/pages.py understanding        # `understanding.md`, from the parser
+python docs/pages.py modules              # `modules.md`, from the docstrings of all modules
 python docs/pages.py models               # the shipped models in `models.md`, from their cards
 python docs/pages.py curves ppo=DIR,DIR maskable_ppo=DIR,DIR   # one run of `dorothie-gym train-rl` per seed
 """
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import environment_pages
+import module_page
 import understanding_page
 
 from dorothie_gym.archive import Corpus
@@ -289,6 +291,7 @@ def main(arguments: list[str]) -> None:
     commands.add_parser("transcripts").add_argument("--first-seed", type=int, default=1)
     commands.add_parser("figures").add_argument("corpus", type=Path)
     commands.add_parser("models")
+    commands.add_parser("modules")
     commands.add_parser("understanding")
     commands.add_parser("curves").add_argument("runs", nargs="+", metavar="NAME=DIR,DIR,...")
     given = parser.parse_args(arguments)
@@ -298,6 +301,9 @@ def main(arguments: list[str]) -> None:
         return
     if given.command == "understanding":
         understanding_page.PAGE.write_text(understanding_page.understanding(), encoding="utf-8", newline="\n")
+        return
+    if given.command == "modules":
+        module_page.PAGE.write_text(module_page.modules(), encoding="utf-8", newline="\n")
         return
     if given.command == "frames":
         environment_pages.draw_pictures()

@@ -272,8 +272,9 @@ def _talk(corpus: archive.Corpus, *, as_json: bool) -> None:
         print_json({"sessions": len(corpus), **found.to_json()})
         return
     shown = Table(box=None, pad_edge=False)
-    for title in ("what is said", "right", "of"):
-        shown.add_column(title, justify="left" if title == "what is said" else "right", no_wrap=True)
+    shown.add_column("what is said")  # folds on narrow terminals, where figures are not cut
+    for title in ("right", "of"):
+        shown.add_column(title, justify="right", no_wrap=True)
     for title, right, cases in found.rows():
         shown.add_row(title, "-" if right is None else f"{100.0 * right:.1f} %", str(cases))
     console = stdout()

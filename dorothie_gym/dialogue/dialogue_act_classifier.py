@@ -39,6 +39,17 @@ _WORD_LISTS = ("domain", "small_talk", "reports")
 _HEADS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.EXPLAIN})
 """Moves after which a command is a separate act: "no, stop"; "I can hardly see, slow down"."""
 
+_ANSWERING = frozenset(
+    {
+        DialogueMove.REPLY_Y,
+        DialogueMove.REPLY_N,
+        DialogueMove.REPLY_U,
+        DialogueMove.REPLY_W,
+        DialogueMove.CLARIFY,
+    }
+)
+"""Moves that need an utterance of the other speaker before them."""
+
 _QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
 _BEFORE_QUESTIONS = frozenset(
     {DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_N}
@@ -314,6 +325,8 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     found = retagged(spans, span_features(spans))
     if found is None or (all(move is DialogueMove.REPLY_N for _, move in found) and understand(text).plan):
         return spans  # "no, not right, left!" orders something
+    if after is None and {move for _, move in found} & _ANSWERING - {span.act.move for span in spans}:
+        return spans  # nothing was said that could be answered or corrected
     if any(_joins_sentences(part, spans) for part, _ in found):
         return spans
     ruled = {(span.text, span.act.move): span for span in spans}

@@ -55,6 +55,13 @@ def corpus() -> Path:
     return Path("corpus")
 
 
+def test_figures_of_talk_are_whole_on_a_narrow_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    shown = stats(corpus(), "--talk").stdout
+    assert "…" not in shown
+    assert "sessions that mention somebody or something" in shown and " %" in shown
+
+
 def test_corpus_is_shown_beside_that_of_the_paper() -> None:
     shown = stats(corpus()).stdout
     assert "8,415" in shown and "18.70" in shown and "vocabulary" in shown

@@ -28,7 +28,7 @@ def cast(env: DuoWizardEnv, driver: Any) -> dict[Role, Any]:
     return {**others, Role.CO_WIZARD: NavigationPolicy(driver, env.limits)}
 
 
-@pytest.mark.parametrize(("seed", "observe_acts"), [(1, True), (4, True), (17, False)])
+@pytest.mark.parametrize(("seed", "observe_acts"), [(1, True), (4, True), (5, False)])
 def test_obedient_driver_completes_tasks_by_dialogue(seed: int, observe_acts: bool) -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(observe_acts=observe_acts))
     summary = play_session(env, cast(env, obey), seed=seed)
