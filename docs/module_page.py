@@ -1,4 +1,4 @@
-"""Page of all modules with the first sentence of each, `docs/modules.md`."""
+"""Page of all modules with the first sentence of each and what it defines, `docs/modules.md`."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ TOP = f"""# All modules
 
 {GENERATED.replace("environments", "modules")}
 
-One line for each file of the package and of the benchmarks, the first of its docstring. [Architecture](architecture.md)
-describes how the folders depend on each other, and [What a change costs](changes.md) where common changes begin.
+One line for each file of the package and of the benchmarks: the first of its docstring, and the public classes and
+functions that it defines. [Architecture](architecture.md) describes how the folders depend on each other, and [What a
+change costs](changes.md) where common changes begin.
 """
 
 
@@ -42,8 +43,17 @@ def _introduced(files: Iterator[tuple[str, str, str]]) -> Iterator[tuple[str, st
 
 
 def _rows(package: Path) -> Iterator[tuple[str, str, str]]:
-    """Yields folder, file name and first sentence of each module, folder by folder."""
+    """Yields folder, file name, and first sentence with public names of each module, folder by folder."""
     for path in sorted(package.rglob("*.py"), key=lambda path: (path.parent.parts, path.name)):
-        docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-        first = " ".join(docstring.split("\n\n")[0].split())
-        yield path.parent.relative_to(package.parent).as_posix(), path.name, first
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        text = " ".join((ast.get_docstring(tree) or "").split("\n\n")[0].split())
+        if path.name != "__init__.py" and (defined := list(_public_names(tree))):
+            text = f"{text} *({', '.join(defined)})*" if text else text
+        yield path.parent.relative_to(package.parent).as_posix(), path.name, text
+
+
+def _public_names(tree: ast.Module) -> Iterator[str]:
+    """Yields the public classes and functions of a module, as code."""
+    for statement in tree.body:
+        if isinstance(statement, ast.ClassDef | ast.FunctionDef) and not statement.name.startswith("_"):
+            yield f"`{statement.name}`"
