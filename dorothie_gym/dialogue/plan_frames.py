@@ -227,6 +227,13 @@ class PlanState:
                 self.frame, self.fresh, self.repaired = None, True, True
                 return
 
+    def defer_last(self) -> None:
+        """Puts the errand named last behind the others; without errands, the step named last."""
+        acting = [frame for frame in self.frames if frame.action is not None]
+        errands = [frame for frame in acting if frame.action is StepAction.VISIT]
+        for frame in (errands or acting)[-1:]:
+            frame.deferred, frame.mood = True, ClauseMood.COMMAND
+
     def open_action(self, frame: Frame) -> None:
         """Sets what the words in front of an action say of it: whether it waits, and whether it is told."""
         if frame.action is StepAction.VISIT:

@@ -11,6 +11,7 @@ from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.route_grammar import Match
 
+_ONE: Final = frozenset({"a", "one", "another"})
 _POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
@@ -83,6 +84,8 @@ class NounReader(TokenReader):
             and isinstance(value, LandmarkName | StreetName | ObjectClass)
         ):
             return self._named(place, value, ordinal)
+        if self.word_at(place + 1) == "block" and self.word_at(place) in _ONE:
+            return NounPhrase(None, 1, blocks=True), place + 2
         match = self.grammar.opportunities.longest(self.words, place) if place < len(self.words) else None
         if match is None:
             return None, place
@@ -95,7 +98,10 @@ class NounReader(TokenReader):
             return None, place
         if self.word_at(end) == "after" and self.word_at(end + 1) in ("it", "that", "next"):
             return NounPhrase(None, 2 if self.word_at(end + 1) == "next" else 1), end + 2
-        return NounPhrase(None, ordinal, self.words[place] in ("block", "blocks")), end
+        blocks = self.words[place] in ("block", "blocks")
+        if blocks and ordinal is None and self.word_at(place - 1) in _ONE:
+            ordinal = 1
+        return NounPhrase(None, ordinal, blocks), end
 
     def _named(
         self, place: int, value: LandmarkName | StreetName | ObjectClass, ordinal: int | None

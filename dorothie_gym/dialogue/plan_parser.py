@@ -112,6 +112,8 @@ _OPPOSITE: Final = {StepChange.FASTER: StepChange.SLOWER, StepChange.SLOWER: Ste
 _AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
 _DEGREES: Final = frozenset({"too", "less"})
 _HERE: Final = frozenset({"here", "here's"})
+_TAKING: Final = frozenset({"take", "make", "turn"})
+_AFTERWARDS: Final = frozenset({"after", "once"})
 _IT: Final = frozenset({"it", "that", "them", "those"})
 _TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "straight"})
 _WAYS: Final = frozenset({"to", "down", "up", "on", "over", "along", "straight"})
@@ -201,7 +203,7 @@ class _Builder(TurnReader, PlaceReader):
             for step in self.steps_of(frame):
                 described.append(step)
                 if frame.mood in ORDERED:
-                    named = bool(frame.word) and step.action is StepAction.TURN
+                    named = bool(frame.word or frame.verb in _TAKING) and step.action is StepAction.TURN
                     append_step(contingent if frame.contingent else ordered, step, named=named)
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
@@ -329,10 +331,10 @@ class _Builder(TurnReader, PlaceReader):
 
     def _action(self, item: ActionItem) -> None:
         if item.kind in ("accept", "defer"):
-            (self._accept if item.kind == "accept" else self._defer)()
+            (self._accept if item.kind == "accept" else self.defer_last)()
             return
-        if item.kind == "after_that":
-            self._defer()
+        if item.kind == "after_that" or self._follows_errand(item):
+            self.defer_last()
         action = _ACTIONS.get(item.kind) or StepAction(item.kind)
         change = _CHANGES.get(item.kind)
         if action is StepAction.GO and not self._ends(item.end):
@@ -411,12 +413,13 @@ class _Builder(TurnReader, PlaceReader):
                 return
         self.take_last_place()
 
-    def _defer(self) -> None:
-        """Puts the errand named last behind the others."""
-        for frame in reversed(self.frames):
-            if frame.action is StepAction.VISIT:
-                frame.deferred, frame.mood = True, ClauseMood.COMMAND
-                return
+    def _follows_errand(self, item: ActionItem) -> bool:
+        """Returns whether the errand said before comes after the next one: "the KFC, once we've been to the Shell"."""
+        if item.kind != "visit" or self.clauses.words[item.place] not in _AFTERWARDS:
+            return False
+        before = self.clauses.words[item.place - 1] if item.place else "then"
+        errands = (frame for frame in self.frames[self.begun :] if frame.action is StepAction.VISIT)
+        return before not in ("then", "and") and any(frame.place is not None for frame in errands)
 
     def _change(self, change: StepChange, item: ActionItem) -> None:
         before = self.clauses.words[item.place - 1] if item.place else ""

@@ -346,7 +346,10 @@ class PlaceReader(PlanState):
         frame = self.replaced(StepAction.TURN)
         if frame is None:
             frame = self.frame if self.frame is not None and not self.fresh else None
-        if frame is not None and frame.action in (StepAction.TURN, StepAction.STOP):
+        turned = frame is not None and frame.action is StepAction.TURN and frame.direction is not None
+        if blocks and turned and self.mood in ORDERED:
+            self.open_step(StepAction.STRAIGHT).ordinal = ordinal  # "right at the KFC, two blocks, then left"
+        elif frame is not None and frame.action in (StepAction.TURN, StepAction.STOP):
             frame.ordinal = ordinal if self.repaired or frame.ordinal is None else frame.ordinal
         elif frame is not None and frame.action is None and frame.verb in _INITIAL and not blocks:
             frame.action, frame.ordinal = StepAction.TURN, ordinal
@@ -354,6 +357,8 @@ class PlaceReader(PlanState):
             frame.ordinal = ordinal  # "straight over two junctions"
         elif blocks and frame is not None and frame.action is None:
             frame.action, frame.ordinal = StepAction.STRAIGHT, ordinal
+        elif blocks and self.mood in ORDERED and self.pending.at is None:
+            self.open_step(StepAction.STRAIGHT).ordinal = ordinal  # "two blocks, then left"
         else:
             self.pending.ordinal = None if blocks else ordinal
 

@@ -184,6 +184,8 @@ class TurnReader(PlanState):
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame.action in (StepAction.STOP, StepAction.WAIT):
             frame.side = item.direction
+        elif frame.action is None and frame.verb in ("need", "want") and not self.fresh:
+            frame.action, frame.side, frame.implied = StepAction.STOP, item.direction, True  # "I need the left kerb"
         elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
             frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.STRAIGHT and frame.word in _DOWN and counting and frame.at is None:
