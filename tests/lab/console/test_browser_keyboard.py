@@ -295,7 +295,7 @@ def documented(page: str) -> set[str]:
     """Returns the keys in the table of a page of the documentation, without those that need a microphone."""
     text = (Path(__file__).parents[3] / "docs" / page).read_text(encoding="utf-8").partition("\n## Keys\n")[2]
     keys: set[str] = set()
-    for key, label in re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", text, flags=re.MULTILINE):
+    for key, label in re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", text, flags=re.MULTILINE)[1:]:  # without the heading
         for each in key.split(", ") if "microphone" not in label else ():
             first, _, last = each.partition(" to ")
             before = first[:-1] if last else first
