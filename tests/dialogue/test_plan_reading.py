@@ -476,3 +476,48 @@ BEAL, FULLER = {"street": "Beal"}, {"street": "Fuller"}
 )
 def test_wordings_of_passengers(text, steps):
     matches(text, *steps)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("we need the Ikea, but first the KFC", ["KFC", "Ikea"]),
+        ("take me to the Shell, but before that to the Panera", ["Panera", "Shell"]),
+        ("drive to the Ikea once we've been to the Shell", ["Shell", "Ikea"]),
+        ("Drive to the Ikea. Once we've been to the Shell, drive to the KFC.", ["Ikea", "Shell", "KFC"]),
+    ],
+)
+def test_errands_told_in_reverse_are_put_in_order(text, names):
+    assert [each.place.landmark.label for each in planned(text).steps] == names
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        ("turn right, three blocks, then left", ["right", 3, "left"]),
+        ("another block and then right", [1, "right"]),
+        ("it is four blocks to the lake", []),
+    ],
+)
+def test_blocks_between_turns_are_driven_straight(text, steps):
+    said = [each.direction.value if each.direction else each.ordinal for each in planned(text).steps]
+    assert said == steps
+
+
+def test_a_turn_behind_a_change_of_lane_is_no_side_of_the_lane():
+    matches("get into the left lane, take the left", step("lane", direction="left"), step("turn", direction="left"))
+    matches("the left lane, the left", step("lane", direction="left"))
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        ("we want the right-hand kerb by the Shell", [step("stop", "beside", SHELL, side="right")]),
+        ("I wouldn't go near Fuller today", [step("avoid", place={"street": "Fuller"})]),
+        ("is it necessary to drive so quickly?", [step("speed", change="slower")]),
+        ("this is where we leave you", [step("stop", AT, {"reference": "here"})]),
+    ],
+)
+def test_wishes_and_refusals_order_what_they_mean(text, steps):
+    matches(text, *steps)
+    assert guess_spans(text)[0].act.move is DialogueMove.INSTRUCT

@@ -113,7 +113,7 @@ def find_point(state: CoWizardState, view: CoWizardView, road: RoadAhead, step: 
     spot: _Spot | None = None
     if step.condition is not None:
         place = step.condition.place
-        if place.object is not None and not _is_on_map(place.object):
+        if place.object is not None and place.object not in _SIGNALS | _EVERYWHERE:
             return Landing(DuePoint(object=place.object), None)
         found = _locate(state, view, road, place)
         if isinstance(found, Objection):
@@ -131,17 +131,19 @@ def find_point(state: CoWizardState, view: CoWizardView, road: RoadAhead, step: 
 # --- places of conditions ---------------------------------------------------------------------------------------------
 
 
-def _is_on_map(kind: ObjectClass) -> bool:
-    return kind in _SIGNALS
-
-
 _SIGNALS: Final = frozenset({ObjectClass.TRAFFIC_LIGHT, ObjectClass.TRAFFIC_SIGN})
+"""Objects that the map has."""
+
+_EVERYWHERE: Final = frozenset({ObjectClass.SIDE_WALK, ObjectClass.ROAD, ObjectClass.ROAD_LINE, ObjectClass.GROUND})
+"""Objects that are where the car is: "as soon as there is a kerb"."""
 
 
 def _locate(state: CoWizardState, view: CoWizardView, road: RoadAhead, place: PlaceReference) -> _Spot | Objection:
     """Returns where on a road a place is, or that it is not there."""
     if place.landmark is not None:
         return _locate_landmark(state, view, road, place.landmark, place.street)
+    if place.object in _EVERYWHERE:
+        return _Spot(0.0)
     if place.object is not None:
         return _locate_signal(road, place.object, place.ordinal or 1)
     if place.street is not None:

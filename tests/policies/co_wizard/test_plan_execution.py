@@ -126,6 +126,14 @@ def test_step_at_sight_of_an_object_waits_for_it() -> None:
     assert ride.state.intentions.halted and any(sightings)
 
 
+def test_what_is_everywhere_is_not_waited_for() -> None:
+    ride = Ride(RING)
+    ride.order({"action": "stop", "condition": at("seen", object="SideWalk")})
+    for _ in range(40):
+        ride.step()
+    assert ride.state.intentions.halted and ride.speed < 0.5
+
+
 def test_errands_are_visited_in_the_order_of_the_plan() -> None:
     ride = Ride(2)
     first, second = (name for name in sorted(ride.marks(), key=lambda name: name.value)[:2])
