@@ -167,6 +167,13 @@ class TurnReader(PlanState):
         told = (frame for frame in self.frames[self.begun :] if frame.mood is ClauseMood.STATEMENT)
         return any(frame.action is StepAction.VISIT and frame.place is not None for frame in told)
 
+    def _wants_side(self, frame: Frame) -> bool:
+        """Makes a stop of a wish for a side, and returns whether it is one: "I need the left kerb"."""
+        if frame.action is not None or frame.verb not in ("need", "want") or self.fresh:
+            return False
+        frame.action, frame.implied = StepAction.STOP, True
+        return True
+
     def _place_side(self, item: SideItem) -> None:
         frame = self.replaced()
         if frame is not None and frame.side is not None:
@@ -182,10 +189,8 @@ class TurnReader(PlanState):
             frame.direction = item.direction
         elif counting and frame.action is not StepAction.STRAIGHT:
             self.open_step(StepAction.TURN).direction = item.direction
-        elif frame.action in (StepAction.STOP, StepAction.WAIT):
+        elif frame.action in (StepAction.STOP, StepAction.WAIT) or self._wants_side(frame):
             frame.side = item.direction
-        elif frame.action is None and frame.verb in ("need", "want") and not self.fresh:
-            frame.action, frame.side, frame.implied = StepAction.STOP, item.direction, True  # "I need the left kerb"
         elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
             frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.STRAIGHT and frame.word in _DOWN and counting and frame.at is None:

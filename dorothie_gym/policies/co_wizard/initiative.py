@@ -19,7 +19,7 @@ from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
 from dorothie_gym.policies.co_wizard.intentions import Wish
-from dorothie_gym.policies.co_wizard.proposals import propose_way
+from dorothie_gym.policies.co_wizard.proposals import go_on_unanswered, propose_way
 from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -40,6 +40,9 @@ _HANDLED = frozenset(
 
 HAZARD_EXPIRES = 4.0
 """Time within which the reason for a standstill is mentioned [s]."""
+
+UNANSWERED = 3
+"""Number of questions about the way without a word of the participant after which the car goes on by itself."""
 
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 
@@ -111,6 +114,9 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     asked = dialogue.asked_lane == choice.lane
     silence = view.time - max(dialogue.asked_at, dialogue.heard_at)
     if (asked and not waiting) or silence < config.ask_interval * asked:
+        return
+    if waiting and dialogue.way_asks >= UNANSWERED:
+        go_on_unanswered(state, choice)
         return
     guided = state.beliefs.goal is not None and progress is None
     straight = any(way.type is LinkType.STRAIGHT for way in choice.exits)

@@ -34,3 +34,14 @@ def propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: n
     first = plan_remark(state, view, rng)
     question = intend(function, content, wording=Wording(direction=direction), joined=bool(first))
     state.say(*first, question)
+
+
+def go_on_unanswered(state: CoWizardState, choice: Choice) -> None:
+    """Takes the way that turns least, and says so: the participant has left several questions unanswered."""
+    way = min(choice.exits, key=lambda way: abs(way.angle))
+    direction = direction_of(way)
+    state.intentions = state.intentions.turning(Directive(direction=direction, junction=choice.junction))
+    action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
+    state.dialogue = state.dialogue.with_proposal(None)
+    announced = act_builders.action(action, direction=direction)
+    state.say(intend(Function.INFORM, announced, wording=Wording(direction=direction)))

@@ -31,6 +31,7 @@ class DialogueState:
         heard_at: time of the last utterance of the participant [s].
         asked_at: time of the last question of the Co-Wizard [s].
         asked_lane: lane before the junction that the last question about the way referred to, -1 for none.
+        way_asks: number of questions about the way since the participant was last heard.
         considered_lane: lane before the last junction for which the Co-Wizard has decided whether to ask, -1 for none.
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
@@ -55,6 +56,7 @@ class DialogueState:
     heard_at: float = -math.inf
     asked_at: float = -math.inf
     asked_lane: int = -1
+    way_asks: int = 0
     considered_lane: int = -1
     idle_since: float = 0.0
     steered_at: float = -math.inf
@@ -77,7 +79,7 @@ class DialogueState:
 
     def after_hearing(self, now: float) -> DialogueState:
         """Records an utterance of the participant at `now` [s]."""
-        return replace(self, heard_at=now, idle_since=now)
+        return replace(self, heard_at=now, idle_since=now, way_asks=0)
 
     def after_asking(self, now: float) -> DialogueState:
         """Records a question of the Co-Wizard at `now` [s]."""
@@ -89,7 +91,7 @@ class DialogueState:
 
     def after_asking_way(self, lane: int, now: float) -> DialogueState:
         """Records a question about the way at the end of a lane."""
-        return replace(self, asked_lane=lane, asked_at=now)
+        return replace(self, asked_lane=lane, asked_at=now, way_asks=self.way_asks + 1)
 
     def asking_way_again(self) -> DialogueState:
         """Allows another question about the way at the current junction at once."""
