@@ -176,7 +176,8 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
         return False
     before = words[place - 1]
     joined = before in breaks.joining and (found is None or before not in _ENDS.get(found.kind, ()))
-    if joined or breaks.phrases.longest(words, place) is not None:
+    ordering = found is not None and found.kind == "order" and words[place] == "stop"
+    if joined or (breaks.phrases.longest(words, place) is not None and not ordering):
         return False
     head = words[begin:place]
     if len(head) < 2 or all(word in _OPENS for word in head):
@@ -204,7 +205,8 @@ def _has_subject(words: Sequence[str], place: int) -> bool:
 def _is_subordinate(head: Sequence[str]) -> bool:
     """Returns whether a clause depends on the one to come: "when you see the KFC"."""
     subordinate = _breaks().subordinate
-    return not subordinate.isdisjoint(head[:2]) or not (subordinate - _ALSO_PREPOSITIONS).isdisjoint(head)
+    last = max((place for place, word in enumerate(head) if word in ("so", "but")), default=-1)
+    return not subordinate.isdisjoint(head[:2]) or not (subordinate - _ALSO_PREPOSITIONS).isdisjoint(head[last + 1 :])
 
 
 def _asks_for_agreement(words: Sequence[str]) -> bool:

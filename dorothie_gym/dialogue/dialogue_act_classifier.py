@@ -50,6 +50,9 @@ _ANSWERING = frozenset(
 )
 """Moves that need an utterance of the other speaker before them."""
 
+_OTHER_SIDE = re.compile(r"\b(other|opposite|wrong) (side|kerb|curb)\b")
+"""Sides by which a place to stop is corrected."""
+
 _QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
 _BEFORE_QUESTIONS = frozenset(
     {DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_N}
@@ -298,7 +301,11 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
         elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
             values -= set(parsed.denied)  # "don't turn, keep going"
     implied = parsed.parse is not None and StepAction.STOP in parsed.parse.implied
-    if implied and move is DialogueMove.REPLY_W and not parsed.objects:
+    if move is DialogueMove.CLARIFY and not parsed.actions and _OTHER_SIDE.search(parsed.masked):
+        values.add(ActionValue.STOP)
+    if implied and move in _QUESTIONS:
+        values.discard(ActionValue.STOP)  # "what is that on the right?"
+    if implied and move is DialogueMove.REPLY_W and not parsed.objects and not parsed.landmarks:
         values.discard(ActionValue.STOP)  # "on the left": a side, where the question has named the action
     if move is DialogueMove.INSTRUCT and not parsed.landmarks:
         values.discard(GoalStatus.COMPLETE)  # "right, then left, done"

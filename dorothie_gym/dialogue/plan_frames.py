@@ -38,6 +38,7 @@ PASSING: Final = frozenset({"pass", "ignore", "skip"})
 _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP, StepAction.STRAIGHT})
 """Actions with an ordinal."""
 
+_PLAIN_WAIT: Final = PlanStep(action=StepAction.WAIT)
 _NEXT_JUNCTION: Final = PlaceReference(ordinal=1)
 _MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
 _STARTING: Final = frozenset({"go", "move", "drive"})
@@ -341,6 +342,9 @@ def append_step(steps: list[PlanStep], step: PlanStep, *, named: bool = False) -
         if told and steps[-1].condition is None and step.condition is None:
             steps[-1] = PlanStep(action=StepAction.SPEED, speed=speed, change=change)
             return
+    if steps and (steps[-1].action, step.action) == (StepAction.WAIT, StepAction.STOP) and steps[-1] == _PLAIN_WAIT:
+        steps[-1] = step  # "hold it, stop"
+        return
     if steps and not named and _is_side_of_lane(steps[-1], step):
         steps[-1] = step if step.action is StepAction.LANE else steps[-1]
         return

@@ -166,7 +166,8 @@ class TokenReader:
         while self.word_at(place) in self.grammar.determiners or self.word_at(place) == "very":
             place += 1
         word = self.word_at(place).removesuffix("'s")
-        number = read_ordinal(word)
+        counted = word == "following" and self.word_at(place - 1) in self.grammar.determiners
+        number = 1 if counted else read_ordinal(word)
         if number is None and (word in NUMBER_WORDS or word[:1].isdigit()):
             counts = read_cardinals([word])
             number = counts[0] if counts and 2 <= counts[0] <= 9 else None

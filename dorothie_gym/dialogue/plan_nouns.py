@@ -121,6 +121,7 @@ class NounReader(TokenReader):
 
     def _street_of(self, place: int) -> tuple[StreetName | None, int]:
         """Returns the street of a place, as in "on Beal" behind "the house", and the token behind it."""
+        place += self.word_at(place) == "somewhere"
         street = self.names.get(place + 1) if self.word_at(place) in _POSTPOSITIONS else None
         named = isinstance(street, StreetName) and street is not StreetName.QUERIED
         return (street, place + 2) if named and isinstance(street, StreetName) else (None, place)

@@ -268,6 +268,8 @@ class PlaceReader(PlanState):
         if place.reference is not None or place.object is not None:
             if self.mood is ClauseMood.STATEMENT and self.frame is None:
                 return
+            if self.fresh and self.mood is ClauseMood.STATEMENT:
+                return  # "don't stop, I'm scared round here"
             if place.reference in (Anaphor.HERE, Anaphor.THERE) and self.frame is not None and self.frame.at is None:
                 self.frame.relation, self.frame.at = ConditionRelation.AT, self._resolved(place)
             elif place.reference is Anaphor.WAY_WE_CAME:

@@ -32,6 +32,10 @@ _BEHIND_SPEED: Final = frozenset(
 )
 """Words behind a number that is a speed."""
 _LEAST_SPEED: Final = 5
+_THOUSANDS: Final = frozenset({"k", "ks", "k's"})
+"""Units of distance that are short for kilometres an hour behind an order of speed."""
+
+_LIMITING: Final = frozenset({"over", "under", "above", "below"})
 
 
 class QuantityReader(TokenReader):
@@ -49,6 +53,9 @@ class QuantityReader(TokenReader):
         unit = self.grammar.speeds.get(self.word_at(end))
         if unit is not None:
             self._speed(number * unit, unit=True)
+            return end + 1
+        if self.word_at(end) in _THOUSANDS and (aimed or self._changes_speed()):
+            self._speed(number, unit=True)  # "not over fifty k"
             return end + 1
         metres = self.grammar.metres.get(self.word_at(end))
         if metres is not None:
@@ -70,9 +77,14 @@ class QuantityReader(TokenReader):
         word, following = self.word_at(end), self.word_at(place - 2)
         if word in self.grammar.speeds or (word in self.grammar.metres and self._per_hour(end + 1)[0] is not None):
             return True
+        if word in _THOUSANDS and self.word_at(place - 1) in _LIMITING:
+            return True
+        return self._changes_speed() and word in _BEHIND_SPEED and following != "the"
+
+    def _changes_speed(self) -> bool:
+        """Returns whether the last item is an order to drive faster or slower."""
         last = self.items[-1] if self.items else None
-        changing = isinstance(last, ActionItem) and last.kind in ("slower", "faster", "speed")
-        return changing and word in _BEHIND_SPEED and following != "the"
+        return isinstance(last, ActionItem) and last.kind in ("slower", "faster", "speed")
 
     def _speed(self, speed: float, *, unit: bool) -> None:
         self.items.append(SpeedItem(max(1, round(speed)), unit))
