@@ -191,7 +191,7 @@ def _announce_place(state: ParticipantState, view: ParticipantView, left: float,
             wording = Wording(distance=distance)
             words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
         said = (words, *(replace(item, urgent=True) for item in end))
-    elif left > 3.0 * speed + 12.0:
+    elif left > 3.0 * speed + 12.0 and not state.guidance.slowed_early:
         said = (order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True),)
     else:
         return
@@ -224,6 +224,12 @@ def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay:
     return out and not warned and view.speed < state.config.soon_speed
 
 
+def _is_about_to_slow_down(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has just been told that the place is near, and drives too fast for its end."""
+    told = state.guidance.approach_announced and state.speech.has_just_spoken(view.time, REACTION)
+    return told and view.speed > state.config.slow_speed
+
+
 def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
     """Returns the distance before the place at which the car stops [m]: instructed now, and at the next decision.
 
@@ -235,6 +241,8 @@ def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) ->
     gain = min(max((view.speed - state.motion.speed) / interval, GAIN_RANGE[0]), GAIN_RANGE[1])
     if _is_about_to_speed_up(state, view, delay):
         gain = config.pull
+    elif _is_about_to_slow_down(state, view):
+        gain = GAIN_RANGE[0]
     slow = state.guidance.slowed_early or state.guidance.approach_announced
     now, top = view.speed, max(config.soon_speed if slow else config.top_speed, view.speed)
     soon = min(max(now + gain * interval, 0.0), top)
