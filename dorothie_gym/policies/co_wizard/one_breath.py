@@ -51,6 +51,8 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
+    plans = [k for k, item in enumerate(answers) if _tells_plan(item)]
+    answers = [item for k, item in enumerate(answers) if k not in plans[1:]]  # one of them is enough
     plain = list(map(is_plain_sign, answers))
     leads = [following.joined for following in answers[1:]]
     kept = [item for k, item in enumerate(answers) if not plain[k] or (k == 0 and (all(plain) or leads[0]))]
