@@ -296,7 +296,8 @@ def _explanation(
             state.say(sign_of_hearing("near"))
     elif _is_here(state, view, words):
         do_stop(state, view, act, words)
-        acknowledge(state, view, ActionValue.STOP, words, rng, answers=True)
+        stops = act_builders.action(ActionValue.STOP)
+        state.say(intend(Function.ACCEPT, stops, wording=Wording(topic="taken")))
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)

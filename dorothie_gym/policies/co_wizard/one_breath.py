@@ -60,8 +60,9 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
 
 
 def is_plain_sign(item: Remark) -> bool:
-    """Returns whether a remark is a mere "okay"."""
-    return item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots
+    """Returns whether a remark is a mere "okay" or "will do"."""
+    taken = item.act.move is DialogueMove.CONFIRM and item.wording.topic == "taken"
+    return (taken or item.act.move is DialogueMove.ACKNOWLEDGE) and not item.act.slots
 
 
 def _tells_plan(item: Remark) -> bool:

@@ -213,7 +213,7 @@ def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float
     if state.guidance.approach_announced and left > state.config.slow_distance and slow:
         return False  # the car is slowing down
     room, after = room_to_stop(state, view, left)
-    return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
+    return room <= (state.config.short_stop if state.route.misses else state.config.aim) or room < -after
 
 
 def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay: float) -> bool:

@@ -63,6 +63,7 @@ class ParticipantConfig(GuidanceConfig):
         slow_speed: speed below which the participant does not ask for less speed [m/s].
         soon_speed: speed expected of a car that has just started or turned [m/s].
         short_stop: distance before the goal at which the car is stopped after a miss [m].
+        aim: the same at first: a car that stops too late has to turn round twice [m].
         pull: expected acceleration of a car after a turn [m/s^2].
         ready_time: standstill after which a car near the goal gets its next instruction [s].
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
@@ -121,7 +122,8 @@ class ParticipantConfig(GuidanceConfig):
     slow_distance: float = 20.0
     slow_speed: float = 5.0
     soon_speed: float = 8.0
-    short_stop: float = 1.0
+    short_stop: float = 2.0
+    aim: float = 0.8
     pull: float = 3.0
     ready_time: float = 1.6
     distance_reserve: float = 8.0

@@ -354,7 +354,7 @@ def _send_on(state: ParticipantState, view: ParticipantView) -> None:
     waited = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end)
     if view.standing and waited > state.config.ready_time and view.time > state.motion.excused_until:
         note_step(state, view, ("on", view.lane, 0))
-        state.say(order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
+        state.say(order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, Wording(topic="run_up")))
 
 
 def note_step(state: ParticipantState, view: ParticipantView, key: StepKey) -> None:

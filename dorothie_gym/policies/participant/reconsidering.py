@@ -105,7 +105,7 @@ def _contradicts(former: Remark, order: Remark) -> bool:
     actions = [next(iter(_WAYS & item.act.slots), None) for item in (former, order)]
     if None in actions:
         return False
-    if former.wording.topic == "further" or former.wording.distance is not None:
+    if former.wording.topic in ("further", "run_up") or former.wording.distance is not None:
         return False  # a little way to the place, before anything else
     other_side = {former.wording.direction, order.wording.direction} >= _SIDES
     turns_round = actions[0] is not actions[1] and ActionValue.U_TURN in actions

@@ -67,8 +67,8 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
 
 
 def _just_passed(state: ParticipantState, view: ParticipantView) -> tuple[Remark, ...]:
-    """Returns the remark that the car has just driven past the place; nothing if it stands, or never came close."""
-    if state.task.goal is None or not state.guidance.passes or view.standing:
+    """Returns the remark that the car has just driven past the place; nothing if it never came close."""
+    if state.task.goal is None or not state.guidance.passes:
         return ()
     passed = Proposition.of(Predicate.PASSED, place=state.task.goal.name)
     wording = Wording(topic="passed_just")
@@ -106,7 +106,7 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     if manoeuvre is None or state.motion.moved_at <= guidance.step_at:
         return  # a car that has not moved since the last order does not circle
     turns = manoeuvre[0] is LaneEntry.U_TURN
-    turns_again = turns and rounds_told(state) >= IN_VAIN
+    turns_again = turns and rounds_told(state) >= (IN_VAIN if state.route.misses else IN_VAIN + 1)
     changes_again = not turns and times_told(state, ActionValue.LANE_SWITCH, view.lane) >= IN_VAIN
     if not turns_again and not changes_again:
         return

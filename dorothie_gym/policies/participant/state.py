@@ -304,7 +304,7 @@ class GuidanceState:
 
     def for_new_route(self, left: float) -> GuidanceState:
         """Restarts step and minimum distance on a route around a roadblock."""
-        return replace(self, best=left, step=None, way=())
+        return replace(self, best=left, step=None, way=(), given=())
 
     def after_step(self, step: StepKey, now: float, return_time: float) -> GuidanceState:
         """Records a step announced at `now` [s].
