@@ -40,6 +40,12 @@ PASSED = 15.0
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
 
+SLOWS_WITHIN = 3.0
+"""Time after the announcement of the place within which the car begins to slow down [s]."""
+
+OVERSHOOT = 3.0
+"""Number of metres before the place that one metre past it is worth: the car cannot back up."""
+
 GAIN_RANGE = (-2.0, 3.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
@@ -210,10 +216,11 @@ def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
 def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
     slow = view.speed < max(state.motion.speed - BRAKING, state.config.slow_speed)
-    if state.guidance.approach_announced and left > state.config.slow_distance and slow:
-        return False  # the car is slowing down
+    told = state.speech.has_just_spoken(view.time, SLOWS_WITHIN) and view.speed > state.config.slow_speed
+    if state.guidance.approach_announced and left > state.config.slow_distance and (slow or told):
+        return False  # the car is slowing down, or is about to
     room, after = room_to_stop(state, view, left)
-    return room <= (state.config.short_stop if state.route.misses else state.config.aim) or room < -after
+    return room <= (state.config.short_stop if state.route.misses else state.config.aim) or room < -OVERSHOOT * after
 
 
 def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay: float) -> bool:
