@@ -183,11 +183,13 @@ def take_up_confirmation(
     turns = _turns(heard.words.plan)
     if _OPENS.match(heard.words.text) is not None and turns[1:] == wanted:
         turns = wanted
+    several = len(heard.words.plan) > 1  # which are no single turn that may be to the wrong side
     if len(turns) != len(wanted):
-        return False  # parts of the repetition were not understood
+        return several  # parts of the repetition were not understood
+    if len(wanted) < 2 and turns == wanted:
+        state.guidance = state.guidance.after_taking_up()
     if len(wanted) < 2:
-        state.guidance = state.guidance.after_taking_up() if turns == wanted else state.guidance
-        return False
+        return several and turns == wanted
     if turns != wanted:
         if told[0].act.move is DialogueMove.CLARIFY:
             return False  # it was said twice
