@@ -18,6 +18,7 @@ from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.participant.given_orders import note_said, rounds_told, turned_round_lately
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.reconsidering import own_up
+from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.retrying import remark_on_miss, stop_circling
 from dorothie_gym.policies.participant.telling_way import take_up_confirmation
 from dorothie_gym.policies.speech import Remark, intend
@@ -144,6 +145,16 @@ def test_only_another_way_is_corrected(words, corrects):
     assert confirmed(Guide(60.0, speed=6.0), words, *way) is corrects
     newer = order(M.INSTRUCT, A.U_TURN)
     assert not confirmed(Guide(60.0, speed=6.0), words, *way, newer), "another order was given since"
+
+
+def test_turn_behind_a_u_turn_is_no_turn_to_the_wrong_side():
+    human = Guide(60.0, speed=6.0)
+    told = order(M.INSTRUCT, A.U_TURN), turn(LEFT, "way_nth", joined=True)
+    human.state.speech = replace(human.state.speech, said=told, last=told[-1], last_end=human.view.time - 2.0)
+    act = DialogueAct.of(M.CONFIRM, A.J_TURN, A.U_TURN)
+    human.observation |= with_words(human.observation, Role.CO_WIZARD, "Turn around, then the next left, sure.", act)
+    listen(human.state, human.view, human.rng)
+    assert M.CLARIFY not in human.moves()
 
 
 def test_way_that_no_longer_holds_is_replaced_with_a_word_of_why():

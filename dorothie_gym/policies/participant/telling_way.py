@@ -183,7 +183,8 @@ def take_up_confirmation(
     turns = _turns(heard.words.plan)
     if _OPENS.match(heard.words.text) is not None and turns[1:] == wanted:
         turns = wanted
-    several = len(heard.words.plan) > 1  # which are no single turn that may be to the wrong side
+    # several steps are no single turn that may be to the wrong side
+    several = len(heard.words.plan) > 1 and heard.acts[0].move is not DialogueMove.CHECK
     if len(turns) != len(wanted):
         return several  # parts of the repetition were not understood
     if len(wanted) < 2 and turns == wanted:
