@@ -162,7 +162,9 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         return
     key, distance, words = step
     turns_round = key[0] == "round"
-    if _slow_down_early(state, view, rng) or (turns_round and (_is_kept(state, view) or _takes_run_up(state, view))):
+    if _slow_down_early(state, view, rng) or (
+        turns_round and (_turns_later(state, view) or _takes_run_up(state, view))
+    ):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
     if _has_told_way(state, view, key, distance, rng):
@@ -336,9 +338,10 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
     return True
 
 
-def _is_kept(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car has not moved since the last order and has said what keeps it, so that it waits."""
-    return state.motion.moved_at <= state.guidance.step_at and view.time < state.motion.excused_until
+def _turns_later(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether a U-turn is not ordered yet: in a junction, or while the car says what keeps it."""
+    kept = state.motion.moved_at <= state.guidance.step_at and view.time < state.motion.excused_until
+    return kept or state.town.lanes[view.lane].in_junction
 
 
 def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:
