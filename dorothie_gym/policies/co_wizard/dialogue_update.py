@@ -301,7 +301,7 @@ def _explanation(
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
-        if rng.random() < 0.5:
+        if rng.random() < 0.8:
             state.say(sign_of_hearing("done"))
     elif GoalStatus.ABANDONED in statuses:
         abandon(state, name)
@@ -357,7 +357,7 @@ def _statement(
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
-    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
         sees = words.told is not None and camera_fault(view.raw) is None
         state.say(sign_of_hearing("seen" if sees else "told"))
 
