@@ -67,7 +67,7 @@ MORE_THAN_USUAL: Final = 1.5
 USUAL_TIME: Final = 30.0
 """Time over which the usual number of objects is averaged [s]."""
 
-CROWD_INTERVAL: Final = 60.0
+CROWD_INTERVAL: Final = 180.0
 """Time between remarks about crowds of a kind [s]."""
 
 
@@ -138,8 +138,11 @@ class Noticed:
         parameter = told.get("parameter")
         if isinstance(parameter, W):
             return self.with_mention(parameter, high=told.get("high") is True)
-        kind = next((thing for thing in words.objects if thing in CROWDS), None)
-        return self.with_crowd(kind, now) if told.predicate is Predicate.CROWDED and kind is not None else self
+        if told.predicate is not Predicate.CROWDED:
+            return self
+        # "look at that traffic" names no object
+        kind = next((thing for thing in words.objects if thing in CROWDS), ObjectClass.VEHICLES)
+        return self.with_crowd(kind, now)
 
 
 def notice(

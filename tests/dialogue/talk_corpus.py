@@ -35,7 +35,7 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.policies.participant.goals import LONGEST_REASON
+from dorothie_gym.policies.participant.messages import LONGEST_REASON
 from dorothie_gym.tasks import load_template, template_names
 from dorothie_gym.tasks.catalogue import catalogue
 from dorothie_gym.tasks.purposes import in_first_person, read_purpose

@@ -71,7 +71,7 @@ def acknowledge(
         state.say(*_repeated(wanted, wording, rng))
     else:
         more = plan_remark(state, view, rng, joined=True) if state.beliefs.exact and action not in _AT_ONCE else ()
-        state.say(taken_on(state, wanted, rng), *more)
+        state.say(taken_on(state, wanted, rng, promises=action in _AT_ONCE), *more)
 
 
 def what_keeps(state: CoWizardState, view: CoWizardView, action: ActionValue) -> Remark | None:
@@ -103,27 +103,32 @@ def sign_of_hearing(topic: str) -> Remark:
     """Returns an acknowledgement.
 
     Args:
-        topic: kind of the utterance: an order ("ordered"), news ("told"), something visible ("seen"), an answer
-            ("answered"), a completed errand ("done"), small talk ("chat"), or a question whether it was understood
-            ("align") or heard at all ("hears").
+        topic: kind of the utterance: an order ("ordered"), news ("told"), a place close ahead ("near"), something
+            visible ("seen"), an answer ("answered"), a completed errand ("done"), small talk ("chat"), or a question
+            whether it was understood ("align") or heard at all ("hears").
     """
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 
-def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:
-    """Returns an acceptance of the request ("will do") or an acknowledgement ("okay"), drawn at random."""
-    accepts = rng.random() < state.config.accepts
-    function, topic = (Function.ACCEPT, "taken") if accepts else (Function.POSITIVE_FEEDBACK, "ordered")
-    return intend(function, wanted, elided=act_builders.arguments_of(wanted), wording=Wording(topic=topic))
+def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator, *, promises: bool = False) -> Remark:
+    """Returns an acceptance of the request ("will do") or an acknowledgement ("okay"), drawn at random.
+
+    Args:
+        state: working copy of the state.
+        wanted: the request.
+        rng: random generator of the decision.
+        promises: whether it is accepted in any case.
+    """
+    if rng.random() < state.config.accepts or promises:
+        return intend(Function.ACCEPT, wanted, elided=act_builders.arguments_of(wanted), wording=Wording(topic="taken"))
+    return sign_of_hearing("ordered")
 
 
 def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Accepts an instruction by repeating it: "turning left", or "okay, I'm turning left"."""
     if rng.random() < 0.35:
         return (intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")),)
-    elided = act_builders.arguments_of(wanted)
-    okay = intend(Function.POSITIVE_FEEDBACK, wanted, elided=elided, wording=Wording(topic="ordered"))
-    return okay, intend(Function.INFORM, wanted, wording=wording, joined=True)
+    return sign_of_hearing("ordered"), intend(Function.INFORM, wanted, wording=wording, joined=True)
 
 
 def plan_remark(

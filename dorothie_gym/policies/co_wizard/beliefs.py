@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dorothie_gym.dialogue.looks import Appearance
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.actions import MentalAction
-from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
 
@@ -30,6 +31,8 @@ class BeliefState:
         sent_goal: landmark of the last goal update with a guessed place.
         owner: person whose house is the goal, according to the participant; None if it is not a house, or a house
             without a named owner.
+        friend: name of the person who is the goal, according to the participant; None without one.
+        streets: streets on which the goal that is not on the map lies, according to the participant.
         look: look of the goal as the participant has described it.
     """
 
@@ -44,6 +47,8 @@ class BeliefState:
     told: tuple[Proposition, ...] = ()
     sent_goal: LandmarkName | None = None
     owner: str | None = None
+    friend: str | None = None
+    streets: tuple[StreetName, ...] = ()
     look: Appearance | None = None
 
     @property
@@ -63,6 +68,10 @@ class BeliefState:
         """Sets the person whose house is the goal."""
         return replace(self, owner=owner)
 
+    def with_friend(self, friend: str | None) -> BeliefState:
+        """Sets the name of the person who is the goal."""
+        return replace(self, friend=friend)
+
     def after_sending(self) -> BeliefState:
         """Removes the first queued update."""
         return replace(self, updates=self.updates[1:])
@@ -78,11 +87,13 @@ class BeliefState:
         look = self.look if landmark is self.goal else None
         return replace(self, goal=landmark, place=place, exact=True, sent_goal=None, look=look)
 
-    def with_unknown_goal(self, landmark: LandmarkName) -> BeliefState:
-        """Sets a goal whose place is not on the map; a description of the same goal stays valid."""
+    def with_unknown_goal(self, landmark: LandmarkName, streets: Sequence[StreetName] = ()) -> BeliefState:
+        """Sets a goal whose place is not on the map, and its streets; a description of the same goal stays valid."""
         again = self.goal is landmark and not self.exact
         described, look = again and self.described, self.look if again else None
-        return replace(self, goal=landmark, place=None, exact=False, described=described, plan=(), look=look)
+        told = tuple(streets) or (self.streets if again else ())
+        goal = replace(self, goal=landmark, place=None, exact=False, described=described, plan=(), look=look)
+        return replace(goal, streets=told)
 
     def with_goal_ahead(self, landmark: LandmarkName | None) -> BeliefState:
         """Marks the goal as close ahead at a place that is not exactly known; `landmark` renames it."""

@@ -26,7 +26,7 @@ from dorothie_gym.policies.co_wizard.answers import (
 )
 from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.described_looks import looks_heard, take_up_look, without_looks
-from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
+from dorothie_gym.policies.co_wizard.errand_memory import note_friend, note_owner, remember, without_purposes
 from dorothie_gym.policies.co_wizard.goals import (
     COMMON,
     abandon,
@@ -74,6 +74,9 @@ if TYPE_CHECKING:
 NEAR = 100
 """Distance up to which a place that is said to be ahead is approached slowly [m]."""
 
+FAR = 150
+"""Distance up to which the car is sent to a place ahead, rather than along a road [m]."""
+
 _STEERING = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
 )
@@ -97,13 +100,13 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         state.commands = state.commands.reacting_until(view.time + reaction)
     done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
     state.speech = state.speech.without_told(heard.words.told)
-    before = () if done else still_due(state)
+    before = () if done else still_due(state, heard.acts)
     state.speech = state.speech.cleared()
     unclear = is_unclear(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
     looks = looks_heard(state, heard)
-    heard = without_looks(heard, looks)
+    heard = without_purposes(without_looks(heard, looks))
     planned = planned_acts(state, heard) - looks.keys()
     if unclear or (_mishears(state, view, heard, rng) and not planned and not looks):
         ask_back(state, view, heard.words)
@@ -111,6 +114,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
     note_owner(state, heard)
+    note_friend(state, heard)
     for number, act in enumerate(heard.acts):
         if number in looks:
             take_up_look(state, looks[number], rng)
@@ -152,7 +156,7 @@ def _instruction(
         state.say(intend(Function.REQUEST, wording=Wording(topic="tell_if")))  # "stop as soon as the rain stops"
     elif not actions and landmarks:
         _instructed_place(state, view, act, words, rng)
-    elif words.distance is not None and not view.standing and _STOP_AHEAD & set(actions):
+    elif words.distance is not None and not view.standing and _STOP_AHEAD & set(actions) and words.distance <= FAR:
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
         approach_stop(state, view, name, float(words.distance))
         if state.speech.idle:
@@ -289,14 +293,15 @@ def _explanation(
     elif words.distance is not None and name is not None and name is state.beliefs.goal and _is_near(state, words):
         approach_stop(state, view, name, float(words.distance))
         if rng.random() > state.style.silent:
-            state.say(sign_of_hearing("told"))
+            state.say(sign_of_hearing("near"))
     elif _is_here(state, view, words):
         do_stop(state, view, act, words)
-        acknowledge(state, view, ActionValue.STOP, words, rng, answers=True)
+        stops = act_builders.action(ActionValue.STOP)
+        state.say(intend(Function.ACCEPT, stops, wording=Wording(topic="taken")))
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
-        if rng.random() < 0.5:
+        if rng.random() < 0.8:
             state.say(sign_of_hearing("done"))
     elif GoalStatus.ABANDONED in statuses:
         abandon(state, name)
@@ -352,7 +357,7 @@ def _statement(
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
-    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
         sees = words.told is not None and camera_fault(view.raw) is None
         state.say(sign_of_hearing("seen" if sees else "told"))
 

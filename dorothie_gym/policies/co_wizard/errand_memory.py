@@ -14,6 +14,7 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.purposes import read_purpose
 
@@ -25,10 +26,13 @@ _TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.
 _CLAUSE = re.compile(
     r"\bI(?:'m| am)? (?:have to|need to|want to|supposed to) (?P<errand>(?:[^,.?]|(?<=\b(?:Mr|Ms|Dr))\.|(?<=\bMrs)\.)+)"
 )
-_OF_SPEAKER = re.compile(r"^(my|our) ")
+_OF_SPEAKER = re.compile(r"\b(?:my|our) ")
 _OWNER = re.compile(
     r"\b(?P<owner>(?:(?:Mr|Mrs|Ms|Dr|Se.ora)\.? )?(?:[A-Z]\w+ ){0,2}[A-Z]\w+(?:'s [a-z]+)?|my \w+)'s "
     r"(?:house|home|place)\b"
+)
+_FRIEND = re.compile(
+    r"\b(?:my friend|our passenger) (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle )?[A-Z][\w-]+)(?!\w|'s)"
 )
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
@@ -65,6 +69,28 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
         state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", name))
     elif done or state.beliefs.goal is not LandmarkName.HOUSE:
         state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
+
+
+def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:
+    """Records the name of the person that the participant wants to go to: "Priya" of "go to my friend Priya"."""
+    about = [act.slots for act in heard.acts if LandmarkName.PERSON in act.slots]
+    if not any(GoalStatus.PENDING not in slots and not _OVER & slots for slots in about):
+        return
+    found = _FRIEND.search(heard.words.text)
+    if found is not None:
+        state.beliefs = state.beliefs.with_friend(found["friend"])
+    elif any(_OVER & act.slots for act in heard.acts) or state.beliefs.goal is not LandmarkName.PERSON:
+        state.beliefs = state.beliefs.with_friend(None)  # somebody else than the last one
+
+
+def without_purposes(heard: HeardUtterance) -> HeardUtterance:
+    """Returns an utterance without the steps that a purpose seems to ask for: "I have to collect Mila"."""
+    tells = any(act.move is DialogueMove.EXPLAIN and not act.slots for act in heard.acts)
+    clause = _CLAUSE.search(heard.words.text) if tells and heard.words.plan else None
+    if clause is None:
+        return heard
+    rest = f"{heard.words.text[: clause.start()]} {heard.words.text[clause.end() :]}"
+    return replace(heard, words=replace(heard.words, plan=understand(rest.strip(" ,.")).plan))
 
 
 def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:

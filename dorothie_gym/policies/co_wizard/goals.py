@@ -127,11 +127,14 @@ def _set_unknown_goal(
     """Adopts a destination that is not on the map and says so; the car then needs guidance."""
     again = state.beliefs.goal is name and not state.beliefs.exact
     where = act_builders.located(name, StreetName.QUERIED)
-    state.beliefs = state.beliefs.with_unknown_goal(name).with_status(name, GoalStatus.UNKNOWN)
+    state.dialogue = state.dialogue if again else state.dialogue.with_orders_settled()
+    state.beliefs = state.beliefs.with_unknown_goal(name, streets).with_status(name, GoalStatus.UNKNOWN)
     state.route = state.route.with_progress(None)
     state.intentions = state.intentions.for_unknown_goal()
     if again:
-        state.say(intend(Function.SET_QUESTION, where, elided=("street",)))
+        way = act_builders.action(ActionValue.QUERIED)
+        asked = intend(Function.SET_QUESTION, way if state.beliefs.streets else where, elided=("street",))
+        state.say(asked)
         return
     unknown = Proposition.of(Predicate.KNOWS, negated=True, place=name)
     unmarked = act_builders.errand(name, GoalStatus.UNKNOWN)

@@ -44,6 +44,8 @@ HAZARD_EXPIRES = 4.0
 UNANSWERED = 3
 """Number of questions about the way without a word of the participant after which the car goes on by itself."""
 
+_ANNOUNCES_U_TURN = 0.85  # probability that a car that turns round on its own says so
+_JUST_SAID = 8.0  # time for which a manoeuvre that was named need not be announced [s]
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 
 _WISHED = {
@@ -91,6 +93,7 @@ def scene_of(state: CoWizardState, view: CoWizardView) -> WordingContext:
         landmark=landmark.name if landmark is not None else None,
         exception=state.dialogue.detour_asked_at is not None or blocked,
         owner=state.beliefs.owner if state.beliefs.goal is LandmarkName.HOUSE else None,
+        friend=state.beliefs.friend if state.beliefs.goal is LandmarkName.PERSON else None,
     )
 
 
@@ -205,7 +208,7 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
     if unheard and draw < 0.5:
         state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="hearing")))
     elif lost:
-        street = draw < 0.75 and not state.beliefs.described
+        street = draw < 0.75 and not (state.beliefs.described or state.beliefs.streets)
         asked = act_builders.located(goal, StreetName.QUERIED) if street else act_builders.action(ActionValue.QUERIED)
         state.say(intend(Function.SET_QUESTION, asked))
     elif state.beliefs.statuses and draw < 0.25:
@@ -335,7 +338,11 @@ def announce_action(
     if physical is None or spoken or state.intentions.directive is not None:
         return
     action = NAMED_ACTIONS.get(physical.action)
-    if action is None or state.intentions.wish is not None or rng.random() > state.style.announces:
+    chance = max(state.style.announces, _ANNOUNCES_U_TURN) if action is ActionValue.U_TURN else state.style.announces
+    if action is None or state.intentions.wish is not None or rng.random() > chance:
+        return
+    named = any(action in item.act.slots for item in state.speech.said[-2:])
+    if named and state.speech.has_just_spoken(view.time, _JUST_SAID):
         return
     street: StreetName | None = None
     direction = Direction.LEFT if physical.angle > 0 else Direction.RIGHT

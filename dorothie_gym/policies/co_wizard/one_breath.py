@@ -6,25 +6,35 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
+from dorothie_gym.ontology.slots import GoalStatus, Slot
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.policy import replace
 
 if TYPE_CHECKING:
+    from dorothie_gym.ontology.dialogue_acts import DialogueAct
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.speech import Remark
 
 _SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
+_ORDERING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+_ANSWERS = MoveGroup.REPLY.moves
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 
 
-def still_due(state: CoWizardState) -> tuple[Remark, ...]:
-    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled."""
+def still_due(state: CoWizardState, acts: Sequence[DialogueAct]) -> tuple[Remark, ...]:
+    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled.
+
+    Args:
+        state: working copy of the state.
+        acts: acts of the utterance; after an order only answers are still due.
+    """
+    ordered = any(act.move in _ORDERING and act.values(Slot.ACTION) for act in acts)
     kept: list[Remark] = []
     dropped = False
     for item in state.speech.queue:
         idle = item.act.move in _SETTLED or any(said.predicate in _PLANS for said in item.meaning)
+        idle = idle or (ordered and item.act.move not in _ANSWERS)
         dropped = dropped if item.joined else idle and not item.urgent
         if not dropped:
             kept.append(item)
@@ -41,19 +51,18 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
+    plans = [k for k, item in enumerate(answers) if _tells_plan(item)]
+    answers = [item for k, item in enumerate(answers) if k not in plans[1:]]  # one of them is enough
     plain = list(map(is_plain_sign, answers))
     leads = [following.joined for following in answers[1:]]
-    kept = [
-        item
-        for k, item in enumerate(answers)
-        if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
-    ]
+    kept = [item for k, item in enumerate(answers) if not plain[k] or (k == 0 and (all(plain) or leads[0]))]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
 
 
 def is_plain_sign(item: Remark) -> bool:
-    """Returns whether a remark is a mere "okay"."""
-    return item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots
+    """Returns whether a remark is a mere "okay" or "will do"."""
+    taken = item.act.move is DialogueMove.CONFIRM and item.wording.topic == "taken"
+    return (taken or item.act.move is DialogueMove.ACKNOWLEDGE) and not item.act.slots
 
 
 def _tells_plan(item: Remark) -> bool:

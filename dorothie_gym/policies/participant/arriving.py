@@ -40,6 +40,12 @@ PASSED = 15.0
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
 
+SLOWS_WITHIN = 3.0
+"""Time after the announcement of the place within which the car begins to slow down [s]."""
+
+OVERSHOOT = 3.0
+"""Number of metres before the place that one metre past it is worth: the car cannot back up."""
+
 GAIN_RANGE = (-2.0, 3.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
@@ -191,7 +197,7 @@ def _announce_place(state: ParticipantState, view: ParticipantView, left: float,
             wording = Wording(distance=distance)
             words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
         said = (words, *(replace(item, urgent=True) for item in end))
-    elif left > 3.0 * speed + 12.0:
+    elif left > 3.0 * speed + 12.0 and not state.guidance.slowed_early:
         said = (order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True),)
     else:
         return
@@ -210,10 +216,11 @@ def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
 def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
     slow = view.speed < max(state.motion.speed - BRAKING, state.config.slow_speed)
-    if state.guidance.approach_announced and left > state.config.slow_distance and slow:
-        return False  # the car is slowing down
+    told = state.speech.has_just_spoken(view.time, SLOWS_WITHIN) and view.speed > state.config.slow_speed
+    if state.guidance.approach_announced and left > state.config.slow_distance and (slow or told):
+        return False  # the car is slowing down, or is about to
     room, after = room_to_stop(state, view, left)
-    return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
+    return room <= (state.config.short_stop if state.route.misses else state.config.aim) or room < -OVERSHOOT * after
 
 
 def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay: float) -> bool:
@@ -222,6 +229,12 @@ def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay:
     out = lane.length - view.station < delay * view.speed if lane.in_junction else view.station < BEHIND_CORNER
     warned = state.guidance.slowed_early or state.guidance.approach_announced
     return out and not warned and view.speed < state.config.soon_speed
+
+
+def _is_about_to_slow_down(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has just been told that the place is near, and drives too fast for its end."""
+    told = state.guidance.approach_announced and state.speech.has_just_spoken(view.time, REACTION)
+    return told and view.speed > state.config.slow_speed
 
 
 def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
@@ -235,6 +248,8 @@ def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) ->
     gain = min(max((view.speed - state.motion.speed) / interval, GAIN_RANGE[0]), GAIN_RANGE[1])
     if _is_about_to_speed_up(state, view, delay):
         gain = config.pull
+    elif _is_about_to_slow_down(state, view):
+        gain = GAIN_RANGE[0]
     slow = state.guidance.slowed_early or state.guidance.approach_announced
     now, top = view.speed, max(config.soon_speed if slow else config.top_speed, view.speed)
     soon = min(max(now + gain * interval, 0.0), top)

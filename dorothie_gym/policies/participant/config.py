@@ -63,6 +63,7 @@ class ParticipantConfig(GuidanceConfig):
         slow_speed: speed below which the participant does not ask for less speed [m/s].
         soon_speed: speed expected of a car that has just started or turned [m/s].
         short_stop: distance before the goal at which the car is stopped after a miss [m].
+        aim: the same at first: a car that stops too late has to turn round twice [m].
         pull: expected acceleration of a car after a turn [m/s^2].
         ready_time: standstill after which a car near the goal gets its next instruction [s].
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
@@ -121,7 +122,8 @@ class ParticipantConfig(GuidanceConfig):
     slow_distance: float = 20.0
     slow_speed: float = 5.0
     soon_speed: float = 8.0
-    short_stop: float = 4.0
+    short_stop: float = 2.0
+    aim: float = 0.8
     pull: float = 3.0
     ready_time: float = 1.6
     distance_reserve: float = 8.0
@@ -210,10 +212,10 @@ class ParticipantStyle:
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(205.0, 100.0, (persona.talkativeness + persona.humour) / 2.0, rng),
-            waits=within(0.15, 0.5, persona.patience, rng) + 0.4 * vague,
+            chat=within(140.0, 70.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            waits=within(0.15, 0.5, persona.patience, rng) * (1.0 - 0.5 * landmarks) + 0.4 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
-            reasons=within(0.15, 0.4, persona.talkativeness, rng) + 0.15 * landmarks,
+            reasons=within(0.2, 0.55, persona.talkativeness, rng) + 0.15 * landmarks,
             aligns=within(0.15, 0.0, persona.certainty, rng),
             nods=within(0.65, 0.95, persona.politeness, rng),
             curious=within(0.02, 0.25, persona.attention, rng),
@@ -222,7 +224,9 @@ class ParticipantStyle:
             thanks=within(0.4, 0.9, persona.politeness, rng),
             verifies=within(0.3, 0.05, persona.certainty, rng),
             leads=within(0.3, 0.8, persona.knowledge, rng) if plans else 0.1,
-            foresight=within(2.0, 4.9, persona.knowledge, rng) if plans else within(1.0, 2.5, persona.knowledge, rng),
+            foresight=within(2.0, 4.9, persona.knowledge, rng) + 0.8 * landmarks
+            if plans
+            else within(1.0, 2.5, persona.knowledge, rng),
             manner=persona.directions,
             corrects=within(0.8, 0.2, persona.patience, rng),
             recalls=within(0.3, 0.9, persona.attention, rng),

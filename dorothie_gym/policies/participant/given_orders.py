@@ -35,6 +35,12 @@ TURNED: Final = 40.0
 ONE_BREATH: Final = 15.0
 """Time within which equal orders that are joined belong to one description of the way [s]."""
 
+OBEYED: Final = 40.0
+"""Time after an order to turn round within which the car obeys it [s]."""
+
+ROUND_TIME: Final = 7.0
+"""Time that a car is given to begin a U-turn, before it is guided in another way [s]."""
+
 _GIVING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OWNING_UP: Final = frozenset({Predicate.TRIED, Predicate.PASSED})
 
@@ -75,7 +81,7 @@ def note_said(state: ParticipantState, view: ParticipantView, said: Remark) -> N
         little = said.wording.distance is not None or said.wording.topic == "further"
         counted = guidance.after_nudging(view.time, left)
         state.guidance = replace(counted, planned_nudge=None, sent_straight_on=not little)
-    if any(meant.predicate in _OWNING_UP for meant in said.meaning):
+    if any(meant.predicate in _OWNING_UP and meant.get("times") for meant in said.meaning):
         state.guidance = replace(state.guidance, given=())
     elif said.act.move in _GIVING and said.act.values(Slot.ACTION):
         order = _given_now(view, said)
@@ -129,6 +135,31 @@ def has_turned_since(view: ParticipantView, order: GivenOrder) -> bool:
 def times_told(state: ParticipantState, action: ActionValue, lane: int | None = None) -> int:
     """Returns how often an action was ordered, in any words; on one lane, if that is given."""
     return sum(action in order.act.slots and lane in (None, order.lane) for order in state.guidance.given)
+
+
+def is_about_to_turn_round(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car was just told to turn round, and has not done so yet."""
+    last = last_given(state)
+    if last is None or ActionValue.U_TURN not in last.act.slots or not state.guidance.guiding:
+        return False
+    return view.time - last.time < ROUND_TIME and not has_turned_since(view, last)
+
+
+def turned_round_lately(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car was told to turn round a moment ago, so that it does what it was told."""
+    return any(
+        ActionValue.U_TURN in order.act.slots and view.time - order.time < OBEYED for order in state.guidance.given
+    )
+
+
+def rounds_told(state: ParticipantState) -> int:
+    """Returns how often the car was told to turn round; a repetition before it has turned does not count."""
+    headings: list[float] = []
+    for order in state.guidance.given:
+        turns = ActionValue.U_TURN in order.act.slots
+        if turns and not (headings and abs(pm.wrap_degrees(order.heading - headings[-1])) <= TURNED):
+            headings.append(order.heading)
+    return len(headings)
 
 
 def _given_now(view: ParticipantView, order: Remark) -> GivenOrder:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,17 +16,12 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
-from dorothie_gym.policies.participant.messages import (
-    LONGEST_REASON,
-    message_remark,
-    refers_back,
-    seconds_to_take_in,
-)
+from dorothie_gym.policies.participant.messages import message_remark, seconds_to_take_in
+from dorothie_gym.policies.participant.stories import as_afterthought, purpose_of, story_remark
 from dorothie_gym.policies.participant.trip_talk import recollection
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.tasks.purposes import Purpose, read_purposes
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
@@ -99,6 +93,9 @@ def _report_added(
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
+    if not state.task.announced and _is_nearest(state, view, subgoal, landmark):
+        _go_now(state, view, subgoal, landmark, rng)
+        return
     on_the_way = _is_on_the_way(state, view, subgoal, landmark) and rng.random() < state.config.goes_first
     if on_the_way or _has_to_wait(state, view, subgoal, landmark):
         _go_first(state, view, subgoal, landmark, rng)
@@ -113,6 +110,33 @@ def _report_added(
         state.say(stop, replace(news, joined=True))
     else:
         state.say(news, *message_remark(state, view, landmark, rng))
+
+
+def _is_nearest(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
+    """Returns whether no other subgoal that may be done now is nearer than a new one."""
+    if not subgoal.allowed:
+        return False
+    others = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.allowed]
+    lengths = [route_length(state, view, mark) for mark in others if mark is not None]
+    return route_length(state, view, landmark) <= min(lengths, default=math.inf)
+
+
+def _go_now(
+    state: ParticipantState,
+    view: ParticipantView,
+    subgoal: SeenSubgoal,
+    landmark: SeenLandmark,
+    rng: np.random.Generator,
+) -> None:
+    """Announces a subgoal that was just added as the next target, rather than first for later and then for now."""
+    state.forget_target()
+    _aim_at(state, view, subgoal, landmark)
+    state.task = state.task.after_announcement(view.time)
+    street = None if view.unique(landmark) else landmark.street
+    now = act_builders.errand(landmark.name, GoalStatus.ONGOING, street)
+    state.say(
+        intend(Function.REQUEST, now, wording=Wording(topic="added")), *message_remark(state, view, landmark, rng)
+    )
 
 
 def _has_to_wait(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
@@ -324,70 +348,6 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     return intend(Function.REQUEST, goal)
 
 
-_SPOKEN_OF = 15.0
-"""Time for which "she" refers to the person mentioned last [s]."""
-
-
-PURPOSES = 0.75
-"""Probability that an errand is explained by its purpose rather than by its reason."""
-
-
-def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns the purpose of the target, or its reason, from the story; nothing if the story has neither."""
-    told, goal = purpose_of_target(state, view), state.task.goal
-    if told is None or goal is None:
-        return ()
-    options = {
-        topic: text
-        for topic, text in (("purpose", told.action), ("reason", told.reason))
-        if text is not None and len(text) <= LONGEST_REASON
-    }
-    if told.reason is not None and refers_back(told.reason) and not _has_told_purpose(state, view, goal):
-        options.pop("reason", None)  # the antecedent of "she" must be mentioned first
-    if not options:
-        return ()
-    prefers = "purpose" if rng.random() < PURPOSES else "reason"
-    item = told.items[0] if told.items else None
-    for topic in sorted(options, key=lambda name: name != prefers):
-        purpose, reason = (options[topic] if topic == name else None for name in ("purpose", "reason"))
-        said = Proposition.of(
-            Predicate.PURPOSE, place=goal.name, person=told.person, item=item, purpose=purpose, reason=reason
-        )
-        if said not in state.task.told:
-            break
-    else:
-        return ()  # everything has been stated
-    state.task = state.task.after_telling(said)
-    return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
-
-
-def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> bool:
-    """Returns whether a recent remark has stated the target's purpose, and thereby the person or item in question."""
-    if not state.speech.has_just_spoken(view.time, _SPOKEN_OF):
-        return False
-    recent = (said for item in state.speech.said[-3:] for said in item.meaning)
-    purposes = (said for said in recent if said.predicate is Predicate.PURPOSE and said.get("place") is goal.name)
-    return any(said.get("purpose") is not None for said in purposes)
-
-
-def _as_afterthought(item: Remark) -> Remark:
-    """Returns the wording of a reason after the clause that it explains: "because ..."."""
-    if item.wording.topic != "reason":
-        return item
-    return replace(item, wording=dataclasses.replace(item.wording, topic="reason_after"))
-
-
-def purpose_of_target(state: ParticipantState, view: ParticipantView) -> Purpose | None:
-    """Returns the purpose of the target; None without a target, or if the list does not name it."""
-    return None if state.task.target is None else purpose_of(view, state.task.target)
-
-
-def purpose_of(view: ParticipantView, index: int) -> Purpose | None:
-    """Returns the purpose of a subgoal, by its index; None if the list does not name it."""
-    live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
-    return dict(zip(live, read_purposes(str(view.raw["tasks"])), strict=False)).get(index)
-
-
 def _say_announcement(
     state: ParticipantState, view: ParticipantView, same_breath: bool, rng: np.random.Generator
 ) -> None:
@@ -398,7 +358,7 @@ def _say_announcement(
     if draw < state.style.reasons and reason:
         state.say(replace(reason[0], joined=same_breath), replace(words, joined=True))
     else:
-        state.say(words, *(_as_afterthought(item) for item in reason))
+        state.say(words, *(as_afterthought(item) for item in reason))
     if not reason:
         state.say(*recollection(state, view, rng))
     goal, target = state.task.goal, state.task.target
@@ -441,7 +401,14 @@ def announce_target(state: ParticipantState, view: ParticipantView, rng: np.rand
 # --- description of the target --------------------------------------------------------------------------------------
 
 
-def describe(state: ParticipantState, view: ParticipantView, function: Function, rng: np.random.Generator) -> None:
+def describe(
+    state: ParticipantState,
+    view: ParticipantView,
+    function: Function,
+    rng: np.random.Generator,
+    *,
+    asks_street: bool = False,
+) -> None:
     """Describes the place of the target by street, a landmark nearby and an object; guidance follows now or later."""
     goal = state.task.destination
     no_street = goal.street is StreetName.UNKNOWN
@@ -450,7 +417,8 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     looks = looks_remark(state, view, goal, rng) if rng.random() < state.config.describes_looks else ()
     looks = looks or recollection(state, view, rng)
     corner = corner_fact(state, view, goal)
-    named = any(goal.street in item.act.slots for item in state.speech.said)  # the street need not be said again
+    # the street need not be said again, unless it was asked for
+    named = not asks_street and any(goal.street in item.act.slots for item in state.speech.said)
     if named and corner is not None and corner not in state.task.told:
         state.task = state.task.after_telling(corner)
         elided = () if goal.name is LandmarkName.PERSON else ("place",)
@@ -467,8 +435,13 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     if named and beside is None:
         state.set_guiding(True)
         known = Proposition.of(Predicate.KNOWS, place=goal.name)
-        state.say_first(intend(Function.INFORM, known, elided=("place",), wording=Wording(topic="guides")), *looks)
-        return
+        if known not in state.task.told:
+            state.task = state.task.after_telling(known)
+            state.say_first(intend(Function.INFORM, known, elided=("place",), wording=Wording(topic="guides")), *looks)
+            return
+        if function is Function.INFORM:
+            state.say_first(*looks)  # that it will be guided was said before
+            return
     if not facts:
         state.say_first(intend(Function.UNCERTAIN_ANSWER), *looks)
         return

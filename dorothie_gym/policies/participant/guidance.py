@@ -20,7 +20,7 @@ from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach, repeat_stop
-from dorothie_gym.policies.participant.given_orders import has_turned_since, last_given
+from dorothie_gym.policies.participant.given_orders import is_about_to_turn_round, turned_round_lately
 from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
@@ -55,9 +55,6 @@ ANNOUNCING_TIME = 1.5
 U_TURN_WAIT = 4.0
 """Standstill on the lane of a U-turn after which the U-turn is announced although it is not near [s]."""
 
-ROUND_TIME = 7.0
-"""Time that a car is given to begin a U-turn, before it is guided in another way [s]."""
-
 WRONG_WAY_EXPIRES = 4.0
 """Time within which a wrong turn is pointed out [s]."""
 
@@ -75,7 +72,7 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         away = pm.hypot(state.task.goal.x - x, state.task.goal.y - y)
         state.guidance = state.guidance.near_place(away)
     former = former.followed(state.town, view.lane, view.station)
-    if _is_about_to_turn_round(state, view):
+    if is_about_to_turn_round(state, view):
         return  # the way is looked at again when the car has turned, or has failed to
     if former.astray and _is_changing_for_turn(state, view):
         former = replace(former, astray=0)
@@ -99,14 +96,6 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
             # the car does not know yet that it has arrived
             state.guidance = state.guidance.for_new_route(state.route.to_goal.left(view.station))
     state.guidance = state.guidance.with_distance(state.route.to_goal.left(view.station))
-
-
-def _is_about_to_turn_round(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car was just told to turn round, and has not done so yet."""
-    last = last_given(state)
-    if last is None or ActionValue.U_TURN not in last.act.slots or not state.guidance.guiding or view.standing:
-        return False
-    return view.time - last.time < ROUND_TIME and not has_turned_since(view, last)
 
 
 def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> bool:
@@ -151,7 +140,9 @@ def watch(state: ParticipantState, view: ParticipantView) -> None:
         return
     lost = left > state.guidance.best + config.lost_detour
     if lost:
-        state.say(_wrong_way(state))
+        state.guidance = replace(state.guidance, best=left)  # it is said once of one detour
+        if not turned_round_lately(state, view):
+            state.say(_wrong_way(state))
     stuck = state.motion.standstill(view.time) > config.lost_standstill and view.time > state.motion.excused_until
     if lost or stuck:
         state.set_guiding(True)
@@ -162,15 +153,18 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     progress, config = state.route.progress, state.config
     if progress is None or not state.task.announced or view.turning or _is_astray(state, view):
         return
+    turns = is_about_to_turn_round(state, view)
     stop_circling(state, view)
-    if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding:
+    if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding or turns:
         return
-    step = None if _is_about_to_turn_round(state, view) else next_step(state, view, DialogueMove.INSTRUCT, rng)
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     if step is None:
         return
     key, distance, words = step
     turns_round = key[0] == "round"
-    if _slow_down_early(state, view, rng) or (turns_round and (_is_kept(state, view) or _takes_run_up(state, view))):
+    if _slow_down_early(state, view, rng) or (
+        turns_round and (_turns_later(state, view) or _takes_run_up(state, view))
+    ):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
     if _has_told_way(state, view, key, distance, rng):
@@ -344,9 +338,10 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
     return True
 
 
-def _is_kept(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether the car has not moved since the last order and has said what keeps it, so that it waits."""
-    return state.motion.moved_at <= state.guidance.step_at and view.time < state.motion.excused_until
+def _turns_later(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether a U-turn is not ordered yet: in a junction, or while the car says what keeps it."""
+    kept = state.motion.moved_at <= state.guidance.step_at and view.time < state.motion.excused_until
+    return kept or state.town.lanes[view.lane].in_junction
 
 
 def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:
@@ -362,7 +357,7 @@ def _send_on(state: ParticipantState, view: ParticipantView) -> None:
     waited = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end)
     if view.standing and waited > state.config.ready_time and view.time > state.motion.excused_until:
         note_step(state, view, ("on", view.lane, 0))
-        state.say(order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
+        state.say(order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, Wording(topic="run_up")))
 
 
 def note_step(state: ParticipantState, view: ParticipantView, key: StepKey) -> None:

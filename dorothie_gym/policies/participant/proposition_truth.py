@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 LEFT_TO_THE_CAR: Final = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
 """Actions that the participant leaves to the car."""
 
+_STILL_AWAY: Final = 4.0  # distance at which a car that claims to have arrived is told otherwise [m]
+
 JUST_DONE: Final = 12.0
 """Time for which the question "are we there?" refers to the last errand [s]."""
 
@@ -42,6 +44,12 @@ def is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
     progress = state.route.progress
     far = progress is not None and progress.left(view.station) > state.config.elsewhere_distance
     return view.standing and far
+
+
+def is_near_by(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car stands close to the target, but too far to have arrived."""
+    progress = state.route.progress
+    return view.standing and progress is not None and abs(progress.left(view.station)) > _STILL_AWAY
 
 
 def believes(state: ParticipantState, view: ParticipantView, said: Proposition) -> bool | None:

@@ -24,7 +24,8 @@ from dorothie_gym.policies.observation_parser import (
     street_of,
     weather,
 )
-from dorothie_gym.policies.participant.goals import purpose_of_target
+from dorothie_gym.policies.participant.given_orders import turned_round_lately
+from dorothie_gym.policies.participant.stories import purpose_of_target
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
@@ -265,6 +266,8 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
     if not stands and not view.turning:
         return
     state.conversation = conversation.after_wondering(view.time)
+    if view.turning and turned_round_lately(state, view):
+        return
     if rng.random() < state.style.curious:
         turning = Proposition.of(Predicate.DOES, action=ActionValue.U_TURN)
         state.say(_why(turning if view.turning else Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))

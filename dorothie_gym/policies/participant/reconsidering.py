@@ -11,6 +11,7 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.given_orders import has_turned_since, last_given, times_given
 from dorothie_gym.policies.participant.retrying import IN_VAIN
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import LONGEST_BREATH, intend
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def admit_repetition(state: ParticipantState, view: ParticipantView) -> None:
     if not queue or queue[0].joined or view.speaking > 0.0:
         return
     breath = queue[: 1 + next((number for number, item in enumerate(queue[1:]) if not item.joined), len(queue))]
-    if any(said.predicate in _ADMITTING for item in breath for said in item.meaning):
+    if any(said.predicate in _ADMITTING and said.get("times") for item in breath for said in item.meaning):
         return
     for item in breath[:LONGEST_BREATH]:
         action = next(iter(_COUNTED & item.act.slots), None)
@@ -52,13 +53,14 @@ def admit_repetition(state: ParticipantState, view: ParticipantView) -> None:
 def own_up(state: ParticipantState, view: ParticipantView) -> None:
     """Puts "sorry, change of plan" in front of an order that contradicts the one before.
 
-    An order that is already preceded by a word of why, or that follows a turn of the car, needs none.
+    An order that is already preceded by a word of why, or that follows a turn of the car, needs none. The first order
+    after a described way that was left begins with "okay, from here".
     """
+    queue = state.speech.queue
+    if not queue or queue[0].joined or view.speaking > 0.0 or view.turning or _goes_another_way(state, queue[0]):
+        return
     last = last_given(state)
     if last is not None and has_turned_since(view, last):
-        return
-    queue = state.speech.queue
-    if not queue or queue[0].joined or view.speaking > 0.0 or view.turning:
         return
     if not state.speech.has_just_spoken(view.time, JUST_ORDERED) or state.town.lanes[view.lane].in_junction:
         return
@@ -69,6 +71,23 @@ def own_up(state: ParticipantState, view: ParticipantView) -> None:
 
 
 _ADMITTING: Final = frozenset({Predicate.TRIED, Predicate.PASSED})
+_EXPLAINS_WAY: Final = _ADMITTING | {Predicate.RIGHT_WAY, Predicate.BLOCKED}
+
+
+def _goes_another_way(state: ParticipantState, first: Remark) -> bool:
+    """Leads the first order after a described way no longer holds; returns whether it did, or needs no word of why."""
+    if not state.guidance.rerouted:
+        return False
+    explained = any(said.predicate in _EXPLAINS_WAY for said in first.meaning)
+    orders = first.act.move in _ORDERS and bool(_WAYS & first.act.slots)
+    if not (explained or orders):
+        return False
+    state.guidance = replace(state.guidance, rerouted=False)
+    described = any((item.wording.topic or "").startswith("way_") for item in state.speech.said)
+    if described and orders and not explained and first.act.move is DialogueMove.INSTRUCT:
+        wording = Wording(topic="from_here")
+        state.speech = state.speech.led_by(intend(CommunicativeFunction.INFORM, wording=wording))
+    return True
 
 
 def _last_order(state: ParticipantState) -> Remark | None:
@@ -86,7 +105,7 @@ def _contradicts(former: Remark, order: Remark) -> bool:
     actions = [next(iter(_WAYS & item.act.slots), None) for item in (former, order)]
     if None in actions:
         return False
-    if former.wording.topic == "further" or former.wording.distance is not None:
+    if former.wording.topic in ("further", "run_up") or former.wording.distance is not None:
         return False  # a little way to the place, before anything else
     other_side = {former.wording.direction, order.wording.direction} >= _SIDES
     turns_round = actions[0] is not actions[1] and ActionValue.U_TURN in actions

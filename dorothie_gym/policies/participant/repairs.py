@@ -8,6 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue.conversation import is_partly_inaudible, resembles_request_to_repeat, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
@@ -122,6 +123,9 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         return
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
     ordered = last is not None and last.act.move is DialogueMove.INSTRUCT and bool(last.act.slots)
+    if last is not None and goal is not None and any(said.predicate is Predicate.PURPOSE for said in last.meaning):
+        state.say_first(intend(CommunicativeFunction.REQUEST, act_builders.destination(goal.name, goal.street)))
+        return  # the purpose came with the destination, which has to be understood
     if last is not None and lately and (not ordered or _is_of_the_moment(last)):
         again = ordered and max(times_told(state, action) for action in _actions(last)) >= IN_VAIN
         said = repeated(last, CommunicativeFunction.CORRECTION) if again else replace(last, text="", joined=False)

@@ -29,7 +29,7 @@ from dorothie_gym.policies.participant.arriving import about_to_arrive, straight
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn
 from dorothie_gym.policies.participant.goals import announcement, describe
 from dorothie_gym.policies.participant.guidance import next_step, note_step
-from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere
+from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere, is_near_by
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
 from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
@@ -61,6 +61,9 @@ _REPLIES = frozenset(
 
 _POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
 """Remarks of a car with a poor view."""
+
+_VISIBLE = _POOR_VIEW | {Predicate.WEATHER, Predicate.CROWDED, Predicate.SEES, Predicate.BLOCKED, Predicate.LIGHTS_ON}
+"""Remarks on something that both can see."""
 
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 """Moves that may follow an acknowledgement in the same breath."""
@@ -149,7 +152,7 @@ def _open_question(
             state.set_guiding(True)
             _name_step(state, view, DialogueMove.REPLY_W, rng)
     elif landmarks or act.values(Slot.STREET) or words.asked is not None:
-        describe(state, view, Function.ANSWER, rng)
+        describe(state, view, Function.ANSWER, rng, asks_street=bool(act.values(Slot.STREET)))
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
@@ -182,12 +185,17 @@ def _was_just_named(state: ParticipantState, view: ParticipantView) -> bool:
     goal = state.task.goal
     if goal is None or not state.speech.has_just_spoken(view.time, state.config.just_said):
         return False
-    return any(goal.name in item.act.values(Slot.LANDMARK) for item in state.speech.said[-LONGEST_BREATH:])
+    for item in reversed(state.speech.said[-LONGEST_BREATH:]):
+        if goal.name in item.act.values(Slot.LANDMARK):
+            return True
+        if not item.joined:
+            break  # the beginning of the last utterance
+    return False
 
 
 def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
     """Announces the next step, unless a stop instruction or the same answer is being spoken."""
-    step = next_step(state, view, move, rng)
+    step = None if view.turning else next_step(state, view, move, rng)
     if step is None:
         return
     key, distance, words = step
@@ -230,6 +238,13 @@ def _explanation(
         return
     if claims and names_goal and is_elsewhere(state, view) and not has_just_finished(state, view, landmarks):
         deny_arrival(state)
+        return
+    if claims and names_goal and is_near_by(state, view) and not has_just_finished(state, view, landmarks):
+        state.set_guiding(True)
+        if is_just_short(state, view):
+            correct_arrival(state, view)
+        else:
+            deny_arrival(state)
         return
     if act.values(Slot.OBJECT):
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
@@ -276,9 +291,10 @@ def _answer_to_why(
 def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
     """Returns an acknowledgement of an explanation: of a reason for a stop, of something visible, or in general."""
     said = {value for act in heard.acts for value in act.slots}
-    objects = any(isinstance(value, ObjectClass) for value in said)
-    reason = ActionValue.STOP in said or (objects and view.standing)
-    topic = "why" if reason else "seen" if objects or heard.words.told is not None else None
+    objects, told = any(isinstance(value, ObjectClass) for value in said), heard.words.told
+    visible = told is not None and told.predicate in _VISIBLE
+    reason = objects and not visible and (view.standing or ActionValue.STOP in said)
+    topic = "why" if reason else "seen" if visible or objects else None
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 

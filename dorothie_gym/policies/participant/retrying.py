@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies.participant.given_orders import times_told
+from dorothie_gym.policies.participant.given_orders import is_about_to_turn_round, rounds_told, times_told
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
@@ -48,9 +48,11 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
         state.guidance = state.guidance.after_passing()
     passes, goal = state.guidance.passes, state.task.goal
     if state.route.misses < IN_VAIN or goal is None:
-        slower = _more_slowly(state, view) if passed else ()
-        if slower:
-            state.say_only(*slower)
+        if passed:
+            just = _just_passed(state, view)
+            slower = tuple(replace(item, joined=bool(just)) for item in _more_slowly(state, view))
+            if just or slower:
+                state.say_only(*just, *slower)
         return
     if passed and passes >= IN_VAIN:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
@@ -62,6 +64,15 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
         reason = _in_vain(view, None, "been_here" if been_here else "tried")
     _try_another_way(state, view, reason)
     state.say(*(replace(slower, joined=True) for slower in _more_slowly(state, view)))
+
+
+def _just_passed(state: ParticipantState, view: ParticipantView) -> tuple[Remark, ...]:
+    """Returns the remark that the car has just driven past the place; nothing if it never came close."""
+    if state.task.goal is None or not state.guidance.passes:
+        return ()
+    passed = Proposition.of(Predicate.PASSED, place=state.task.goal.name)
+    wording = Wording(topic="passed_just")
+    return (intend(CommunicativeFunction.INFORM, passed, elided=("place",), wording=wording, expires=_soon(view)),)
 
 
 def _more_slowly(state: ParticipantState, view: ParticipantView) -> tuple[Remark, ...]:
@@ -89,13 +100,13 @@ def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView, step: S
 def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     """Chooses another route after U-turns or lane changes that brought no progress."""
     progress, guidance = state.route.to_goal, state.guidance
-    if any(item.act.move in _ANSWERS for item in state.speech.queue):
+    if is_about_to_turn_round(state, view) or any(item.act.move in _ANSWERS for item in state.speech.queue):
         return  # questions of the car are answered first
     manoeuvre = progress.next_manoeuvre(view.station)
     if manoeuvre is None or state.motion.moved_at <= guidance.step_at:
         return  # a car that has not moved since the last order does not circle
     turns = manoeuvre[0] is LaneEntry.U_TURN
-    turns_again = turns and times_told(state, ActionValue.U_TURN) >= IN_VAIN
+    turns_again = turns and rounds_told(state) >= (IN_VAIN if state.route.misses else IN_VAIN + 1)
     changes_again = not turns and times_told(state, ActionValue.LANE_SWITCH, view.lane) >= IN_VAIN
     if not turns_again and not changes_again:
         return

@@ -252,6 +252,7 @@ class GuidanceState:
         considered: last step for which it was decided whether to wait for a question of the car.
         left_to_ask: result of that decision.
         corrected: last turn before which the car was corrected.
+        rerouted: whether a described way no longer holds, which has not been remarked on.
     """
 
     guiding: bool = False
@@ -286,6 +287,7 @@ class GuidanceState:
     considered: StepKey | None = None
     left_to_ask: bool = False
     corrected: StepKey | None = None
+    rerouted: bool = False
 
     def with_guiding(self, guiding: bool) -> GuidanceState:
         """Begins or ends the guidance."""
@@ -302,7 +304,7 @@ class GuidanceState:
 
     def for_new_route(self, left: float) -> GuidanceState:
         """Restarts step and minimum distance on a route around a roadblock."""
-        return replace(self, best=left, step=None, way=())
+        return replace(self, best=left, step=None, way=(), given=())
 
     def after_step(self, step: StepKey, now: float, return_time: float) -> GuidanceState:
         """Records a step announced at `now` [s].
@@ -335,7 +337,7 @@ class GuidanceState:
 
     def without_way(self) -> GuidanceState:
         """Forgets the description of a way that is not the present route."""
-        return self if not self.way else replace(self, way=())
+        return self if not self.way else replace(self, way=(), rerouted=True)
 
     def after_reminding(self) -> GuidanceState:
         """Counts a repetition."""

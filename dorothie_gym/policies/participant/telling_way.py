@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,6 +11,8 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import Slot
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.approach_end import ending_behind
 from dorothie_gym.policies.participant.way_ahead import WayStep, way_ahead, way_behind_u_turn, way_remarks
@@ -40,6 +43,7 @@ _SIDE: Final = 0.4  # probability that the end of the way is told with the side 
 _ROOM: Final = 3  # number of acts in one breath behind which there is room for another one
 _BRIEF: Final = 12.0  # time within which the car takes up directions [s]
 _SIGNS: Final = frozenset({DialogueMove.CONFIRM, DialogueMove.ACKNOWLEDGE, DialogueMove.CHECK})
+_OPENS: Final = re.compile(r"right\b[, ]", re.IGNORECASE)  # "right, the next left" asks for no turn to the right
 _OWN_WORDS: Final = frozenset({Directions.LANDMARKS, Directions.STREETS, Directions.COMPASS})
 """Manners in which even a single turn is described in words of their own."""
 
@@ -171,10 +175,23 @@ def take_up_confirmation(
         rng: random generator of the decision.
     """
     told = _last_way(state, view)
-    if not told or not heard.acts or heard.acts[0].move not in _SIGNS or len(heard.words.plan) < 2:
+    if not told or not heard.acts or heard.acts[0].move not in _SIGNS or not heard.words.plan:
         return False
+    if any(act.move in act_builders.QUESTIONS for act in heard.acts[1:]):
+        return False  # the car has an objection, and asks for another way
     wanted = [str(item.wording.direction) for item in told if item.wording.direction is not None]
-    if _turns(heard.words.plan) != wanted:
+    turns = _turns(heard.words.plan)
+    if _OPENS.match(heard.words.text) is not None and turns[1:] == wanted:
+        turns = wanted
+    # several steps are no single turn that may be to the wrong side
+    several = len(heard.words.plan) > 1 and heard.acts[0].move is not DialogueMove.CHECK
+    if len(turns) != len(wanted):
+        return several  # parts of the repetition were not understood
+    if len(wanted) < 2 and turns == wanted:
+        state.guidance = state.guidance.after_taking_up()
+    if len(wanted) < 2:
+        return several and turns == wanted
+    if turns != wanted:
         if told[0].act.move is DialogueMove.CLARIFY:
             return False  # it was said twice
         state.feel(Happening.MISUNDERSTOOD, view.time)
@@ -196,8 +213,8 @@ def _last_way(state: ParticipantState, view: ParticipantView) -> tuple[Remark, .
     found: list[Remark] = []
     for item in reversed(state.speech.said):
         if not (item.wording.topic or "").startswith("way_"):
-            if found:
-                break
+            if found or (item.act.move is DialogueMove.INSTRUCT and item.act.values(Slot.ACTION)):
+                break  # another order was given since
             continue
         found.insert(0, item)
         if not item.joined:

@@ -15,11 +15,12 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, Slot, SlotValue, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
-from dorothie_gym.policies.participant.goals import announcement, route_length, story_remark, switch_target
+from dorothie_gym.policies.participant.goals import announcement, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.repairs import ask_back
+from dorothie_gym.policies.participant.stories import story_remark
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend

@@ -22,10 +22,10 @@ from dorothie_gym.maps.whereabouts import corner_of
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
-from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.route_steps import RouteStep, is_last_stretch
+from dorothie_gym.policies.participant.stories import purpose_of_target
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend

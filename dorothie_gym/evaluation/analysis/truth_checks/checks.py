@@ -17,6 +17,7 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     order_checks,
     repair_runs,
     reply_checks,
+    sense_checks,
 )
 from dorothie_gym.evaluation.analysis.truth_checks.directions import directions_of, manner_of
 from dorothie_gym.evaluation.analysis.truth_checks.loops import has_loop
@@ -78,6 +79,11 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "stale_remarks": "remarks on a repetition that has happened so often",
         "references": "houses and people named so that it is clear which is meant",
         "pronouns": "descriptions of people that do not call them it",
+        "signs": "acknowledgements of the car that are made once",
+        "orders_after_confirmation": "orders that are not given again right after they were confirmed",
+        "own_doing": "questions why the car turns round that follow no order to do so",
+        "arrivals_without_creeping": "guided arrivals with at most one order to drive on a little",
+        "crowds": "remarks on traffic and crowds that are news",
         "directions_ahead": "directions with two or more steps",
         "directions_by_places": "directions that name a landmark or an object",
     }
@@ -181,6 +187,11 @@ _PASSAGES: Final[Mapping[str, Callable[[Session], Iterator[Case]]]] = MappingPro
         "stale_remarks": mention_checks.stale_remarks,
         "references": mention_checks.references,
         "pronouns": mention_checks.pronouns,
+        "signs": sense_checks.signs,
+        "orders_after_confirmation": sense_checks.orders_after_confirmation,
+        "own_doing": sense_checks.own_doing,
+        "arrivals_without_creeping": sense_checks.arrivals_without_creeping,
+        "crowds": sense_checks.crowds,
     }
 )
 """Checks of passages that need no map, by figure."""
