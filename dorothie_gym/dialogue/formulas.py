@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -29,9 +30,15 @@ OPENING_YES: Final = frozenset({"yeah", "aye", "yep", "yes", "righto", "ya"})
 """Words for yes at the beginning of an utterance."""
 
 
+_SENT_ON: Final = re.compile(r"\byou (?:can|may|could) (?:go|carry|drive) (?:on|ahead)\b")
+"""Permission to drive on, of which formulas would make two signs: "you can", "go on"."""
+
+
 def formula_move(words: Sequence[str]) -> DialogueMove | None:
     """Returns the move of words that consist of formulas only ("right, okay, thank you"); None of other words."""
     words = [word for word in words if word != ","]
+    if _SENT_ON.search(" ".join(words)):
+        return None
     formulas, place = _formulas(), 0
     found: DialogueMove | None = None
     while place < len(words):

@@ -61,6 +61,9 @@ _ROAD: Final = re.compile(
 _KERB: Final = re.compile(r"^(?!.*\b(?:pavement|sidewalks?|side walk|path|see)\b).*\b(?:kerb|curb)")
 """A kerb by which one stops, rather than one that is seen."""
 
+_REMINDED: Final = re.compile(r"\b(?:don't|do not|never|mustn't|not) forget\b")
+"""Reminder of an errand, which is not dropped."""
+
 _WITHDRAWN: Final = re.compile(r"(?:scratch|strike|forget|never mind|cancel) (?:that|it) ,")
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
@@ -112,6 +115,8 @@ def _with_status(
     landmarks = any(isinstance(value, LandmarkName) for value in found)
     if parse.cancelled and _TICKED.search(spoken):
         found = [GoalStatus.COMPLETE, *(value for value in found if value is not GoalStatus.ABANDONED)]
+    if _REMINDED.search(spoken):
+        found = [value for value in found if value is not GoalStatus.ABANDONED]  # "don't forget the KFC"
     if parse.cancelled and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
         found.append(GoalStatus.ABANDONED)  # "drop the KFC"
     driving = bool(actions) or any(isinstance(value, StreetName) for value in found)

@@ -388,7 +388,7 @@ class _Builder(TurnReader, PlaceReader):
     def _ends(self, place: int) -> bool:
         """Returns whether the clause ends at a token, apart from "now" and the like."""
         words = self.clauses.words
-        return place >= len(words) or words[place] in route_grammar().last_words
+        return place >= len(words) or words[place] in route_grammar().last_words or words[place] == "it's"
 
     def _is_complete(self, frame: Frame, action: StepAction) -> bool:
         """Returns whether another action begins a step of its own behind the current one."""

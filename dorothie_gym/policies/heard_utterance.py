@@ -21,11 +21,13 @@ class HeardUtterance:
     Attributes:
         acts: acts in order; classified from the words where acts are not observed.
         words: parsed words.
+        classified: whether the acts are read from the words, because they are not observed.
         parts: parsed words of each act; empty if there is one act, or if the words do not divide into the acts.
     """
 
     acts: tuple[DialogueAct, ...]
     words: ParsedText
+    classified: bool = False
     parts: tuple[ParsedText, ...] = ()
 
     def words_of(self, number: int) -> ParsedText:
@@ -48,8 +50,9 @@ def heard_utterance(
     if not text and not acts:
         return None
     spans = guess_spans(text, after) if acts is None or len(acts) > 1 else ()
+    classified = acts is None
     if acts is None:
         acts = tuple(span.act for span in spans)
     divided = len(spans) == len(acts) > 1
     parts = tuple(understand(span.text) for span in spans) if divided else ()
-    return HeardUtterance(acts=acts, words=understand(text), parts=parts)
+    return HeardUtterance(acts=acts, words=understand(text), classified=classified, parts=parts)

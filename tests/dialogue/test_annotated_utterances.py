@@ -1,6 +1,5 @@
 """Understanding of hand-written utterances; docs/talk.md has the figures."""
 
-
 import pytest
 
 from dorothie_gym.dialogue import guess_spans

@@ -521,3 +521,29 @@ def test_a_turn_behind_a_change_of_lane_is_no_side_of_the_lane():
 def test_wishes_and_refusals_order_what_they_mean(text, steps):
     matches(text, *steps)
     assert guess_spans(text)[0].act.move is DialogueMove.INSTRUCT
+
+
+def test_a_reminder_of_an_errand_is_no_end_of_it():
+    (span,) = guess_spans("don't forget the Ikea")
+    assert "Abandoned" not in str(span.act)
+    matches("don't forget the Ikea", step("visit", place=IKEA))
+    assert "Abandoned" in str(guess_spans("forget the Ikea")[0].act)
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        ("I feel ill stop the car", [step("stop")]),
+        ("not over forty k please", [step("speed", speed=40)]),
+        ("draw up on the right by the trees", [step("stop", "beside", {"object": "Vegetation"}, side="right")]),
+        ("left at the following junction", [step("turn", direction="left", ordinal=1)]),
+        ("hold it, stop", [step("stop")]),
+        ("hang on, it's the second right", [step("turn", direction="right", ordinal=2)]),
+        ("I'd keep on Beal if I were you", [step("follow", place={"street": "Beal"})]),
+        ("your lights are off, you know", [step("lights", change="on")]),
+        ("my back doesn't like this speed", [step("speed", change="slower")]),
+        ("we'll never get there at this pace", [step("speed", change="faster")]),
+    ],
+)
+def test_run_on_speech_and_hints_order_what_they_mean(text, steps):
+    matches(text, *steps)

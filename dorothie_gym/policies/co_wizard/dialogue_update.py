@@ -135,9 +135,12 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
 
 
 def _mishears(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
-    """Returns whether an instruction is not understood; never an urgent one, nor one that would not be repeated."""
+    """Returns whether an instruction is not understood; never an urgent one, nor one that would not be repeated.
+
+    It is a fault that is acted where acts are observed; who reads words makes faults of its own.
+    """
     act = heard.acts[0]
-    if len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
+    if heard.classified or len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
         return False
     plain = ActionValue.J_TURN in act.values(Slot.ACTION) or bool(act.values(Slot.LANDMARK))
     overhears = plain and not act.values(Slot.ACTION)[1:] and rng.random() < state.style.mishears

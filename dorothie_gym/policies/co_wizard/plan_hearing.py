@@ -35,6 +35,19 @@ if TYPE_CHECKING:
 _GOES_ON: Final = re.compile(r"^(?:(?:okay|ok|yes|yeah|and|so|um|uh)[, ]+)*(?:then|after that|afterwards|next)\b", re.I)
 """Beginning of an utterance that goes on with the plan before."""
 
+_ADDS: Final = re.compile(
+    r"^(?:(?:oh|ah|okay|ok|yes|yeah|um|uh)[, ]+)*(?:and|also|plus)\b(?!.*\b(?:first|before|instead)\b)"
+    r"|\b(?:after that|afterwards|after this|on (?:the|our|my) list|as well|too|in addition)[ ,.!]*"
+    r"(?:please|thanks|mate|dear|love)?[.!]*$",
+    re.I,
+)
+"""Utterance that adds an errand to those that are known: "oh and the KFC after that"."""
+
+_SIDE_ALONE: Final = re.compile(
+    r"^\W*(?:on|at|to) (?:the|your|my|our) (?:left|right)\W*(?:please|mate|dear|love)?\W*$", re.I
+)
+"""Side of the street, of a stop that was asked for before."""
+
 _GO_AHEAD: Final = re.compile(r"^\W*(?:\w+\W+){0,4}?go ahead and\b", re.I)
 """Opening of an order that asks for nothing by itself."""
 
@@ -132,17 +145,29 @@ def _is_kept(state: CoWizardState, heard: HeardUtterance, acts: Sequence[Dialogu
     """Returns whether a plan has an order, conditions or steps that a single order cannot express."""
     steps = heard.words.plan.steps
     visits = sum(step.action is StepAction.VISIT for step in steps)
+    if _adds_errand(state, heard) or any(step.side is not None for step in steps):
+        return True
     named = any(act.values(Slot.LANDMARK) for act in acts) and not any(act.values(Slot.ACTION) for act in acts)
     if named and visits <= 1 and not any(step.action in STEERING for step in steps):
         return False  # "the Ikea, over on Beal" names a destination
     if _is_guided(state) and len(steps) == 1 and _guides(steps[0]):
         return False
+    if not _is_guided(state) and any(step.action is StepAction.STOP and step.distance is not None for step in steps):
+        return True
     if sum(step.action in _DRIVING for step in steps) > 1 or any(_has_to_wait(step) for step in steps):
         return True
     if any(step.action in _ALWAYS or _returns(step) for step in steps):
         return True
     under_way = bool(state.plan.steps) or state.intentions.directive is not None
-    return under_way and steps[0].action in STEERING and _GOES_ON.match(heard.words.text) is not None
+    return under_way and steps[0].action in _DRIVING and _GOES_ON.match(heard.words.text) is not None
+
+
+def _adds_errand(state: CoWizardState, heard: HeardUtterance) -> bool:
+    """Returns whether an utterance adds an errand behind the one that the car is on: "and the KFC after that"."""
+    goal, steps = state.beliefs.goal, heard.words.plan.steps
+    if goal is None or goal is LandmarkName.UNKNOWN or state.intentions.arrived or not _ADDS.search(heard.words.text):
+        return False
+    return all(step.action is StepAction.VISIT and _landmark(step) not in (None, goal) for step in steps)
 
 
 def _returns(step: PlanStep) -> bool:
@@ -215,6 +240,13 @@ def _take_over(
         state.intentions = state.intentions.directed(None)
         _confirm(state, state.plan.steps)
         return
+    if _adds_errand(state, heard):
+        waiting = state.plan.steps or (
+            PlanStep(action=StepAction.VISIT, place=PlaceReference(landmark=state.beliefs.goal)),
+        )
+        _begin(state, view, (*waiting, *steps))
+        _confirm(state, (*waiting, *steps))
+        return
     if len(steps) == 1 and steps[0].action is StepAction.VISIT and _landmark(steps[0]) is not None:
         _visit(state, view, steps[0], rng)
         return
@@ -230,7 +262,8 @@ def _take_over(
         found = None
     kept = possible if found is None else possible[: found[0]]
     _begin(state, view, kept)
-    if found is None and len(kept) == 1 and not _has_to_wait(kept[0]) and kept[0].action in _PLAIN:
+    plain = len(kept) == 1 and not _has_to_wait(kept[0]) and kept[0].side is None and kept[0].distance is None
+    if found is None and plain and kept[0].action in _PLAIN:
         _accept(state, view, kept[0])
         return
     if refused is not None:
@@ -382,7 +415,14 @@ def corrected_step(state: CoWizardState, heard: HeardUtterance) -> PlanStep | No
     A turn with another direction corrects the present turn if the words repair something: "not left, right".
     """
     present, steps = state.plan.present, heard.words.plan.steps
-    if present is None or len(steps) != 1 or {present.action, steps[0].action} != {StepAction.TURN}:
+    if present is None or len(steps) != 1:
+        return None
+    if present.action is StepAction.STOP:
+        sided = steps[0] == PlanStep(action=StepAction.STOP, side=steps[0].side)
+        side = steps[0].side if sided else steps[0].direction
+        if side is not None and (sided or _SIDE_ALONE.match(heard.words.text)):
+            return replace(present, side=side)  # "stop at the KFC", "on the left"
+    if {present.action, steps[0].action} != {StepAction.TURN}:
         return None
     repairs = any(act.move is DialogueMove.CLARIFY for act in heard.acts) or _REPAIRS.search(heard.words.text)
     if not repairs or steps[0].direction in (None, present.direction) or _has_to_wait(steps[0]):

@@ -43,7 +43,7 @@ def test_a_session_is_annotated_by_keyboard_alone(room: Room) -> None:
     press(page, "Enter", "Escape")
     room.until(lambda: LandmarkName.KFC in room.line("anna", 0)[0].slots)
     press(page, "x", "1", "e", "f", "Escape", "t", "1", "c", "Escape")
-    room.until(lambda: room.marks("anna").transactions[0].end is UnitEnd.COMPLETED)
+    room.until(lambda: [row.end for row in room.marks("anna").transactions.values()][:1] == [UnitEnd.COMPLETED])
     assert room.marks("anna").exchanges[0].exception == "environmental"
     press(page, "ArrowDown", "y", "p")
     room.until(lambda: room.line("anna", 0)[1].exchange == 0 and room.line("anna", 0)[1].move is DialogueMove.REPLY_Y)

@@ -8,6 +8,7 @@ import pytest
 
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -268,3 +269,41 @@ def test_go_ahead_and_opens_an_order_and_is_none(words: str, first: str) -> None
     meant = [content for item in updated.speech.queue for content in item.meaning]
     said = meant[0].get("action") if meant else None
     assert said is (ActionValue.LANE_FOLLOW if first == "straight" else ActionValue.J_TURN)
+
+
+def test_added_errand_waits_behind_the_present_one() -> None:
+    ride = Ride(2)
+    first, second = (name for name in sorted(ride.marks(), key=lambda name: name.value)[:2])
+    ride.say(f"take me to {first.label}")
+    ride.say(f"oh and {second.label} after that")
+    visited = [step.place.landmark for step in ride.state.plan.steps if step.place is not None]
+    assert ride.state.beliefs.goal is first and visited == [first, second]
+    ride.say(f"no, forget {second.label}")
+    assert ride.state.beliefs.goal is first
+
+
+@pytest.mark.parametrize("words", ["left side please", "on the left"])
+def test_side_told_afterwards_belongs_to_the_stop(words: str) -> None:
+    ride = Ride(RING)
+    ride.order({"action": "stop", "condition": {"relation": "before", "place": {"object": "TrafficLight"}}})
+    ride.say(words, seconds=4.0)
+    present = ride.state.plan.present
+    assert present is not None and present.condition is not None and present.side is Direction.LEFT
+
+
+def test_permission_to_go_on_moves_a_car_that_waits() -> None:
+    ride = Ride(RING)
+    ride.say("stop here please", seconds=10.0)
+    assert ride.speed < 0.5
+    ride.say("okay got it you can go on", seconds=8.0)
+    assert ride.speed > 2.0
+
+
+def test_instructions_in_words_are_never_misheard_on_purpose() -> None:
+    """Faults of hearing are acted where acts are observed, and there only."""
+    asked = []
+    for seed in range(12):
+        ride = Ride(seed)
+        ride.say("turn left please", seconds=5.0)
+        asked += [speech.act.move for speech in ride.said]
+    assert DialogueMove.CONFUSE not in asked
