@@ -49,7 +49,11 @@ class LinkType(enum.StrEnum):
     @property
     def is_lane_change(self) -> bool:
         """Whether the target lies beside the source instead of following it."""
-        return self in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+        return self in LANE_CHANGES
+
+
+LANE_CHANGES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+"""Types of the links between lanes side by side."""
 
 
 @shared

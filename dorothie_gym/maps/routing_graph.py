@@ -112,6 +112,7 @@ class RoutingLane:
     left: Int32  # lanes that one may change to
     right: Int32
     junction: Flag  # whether it is a connector through a junction
+    merge: Int32  # entry of the change by which the lane must be left as it ends, or -1
 
 
 class RoutingEdge:
@@ -201,6 +202,8 @@ def routing_graph(town: Town) -> RoutingGraph:
     for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
         beside = [town.neighbour(lane.id, side) for lane in town.lanes]
         lanes[name] = [NONE if lane is None else lane for lane in beside]
+    entries = {None: NONE, LinkType.LANE_CHANGE_LEFT: CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT: CHANGE_RIGHT}
+    lanes["merge"] = [entries[town.merge(lane.id)] for lane in town.lanes]
     near = [oncoming.candidates(lane.id) for lane in town.lanes]
     none, no_rows, no_edges = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64), empty_records(RoutingEdge, 0)
     bare = RoutingGraph(
@@ -365,7 +368,10 @@ def find_manoeuvres(graph: RoutingGraph, edges: RecordArray[RoutingEdge]) -> int
 def add_changes(
     graph: RoutingGraph, lane: int, entry: int, begin: float, edges: RecordArray[RoutingEdge], count: int
 ) -> int:
-    """Adds lane changes of three lengths to one side from a station [m]; returns the number of edges."""
+    """Adds lane changes of three lengths to one side from a station [m]; returns the number of edges.
+
+    A lane that ends can also be left close to its end: that change leads beyond it.
+    """
     row = graph.lanes[lane]
     beside = int(row.left) if entry == CHANGE_LEFT else int(row.right)
     if beside == NONE:
@@ -378,6 +384,8 @@ def add_changes(
             road = min(CHANGE_LENGTH, room)  # the longest is limited by the rest of the lane
         if SHORT_CHANGE <= road <= room:
             count = _add_change(graph, lane, beside, entry, begin, road, edges, count)
+    if row.merge == entry and row.length - begin < SHORT_CHANGE:
+        count = _add_change(graph, lane, beside, entry, begin, SHORT_CHANGE, edges, count)
     return count
 
 
@@ -393,11 +401,13 @@ def _add_change(
     count: int,
 ) -> int:
     """Adds a lane change of length `road` [m] if the lanes are adjacent there."""
-    leave, end = begin + CHANGE_LEAD, begin + road
+    length = graph.lanes[lane].length
+    leave, end = min(begin + CHANGE_LEAD, length), begin + road
     x, y = _position(graph, lane, leave)
     landing, first_gap = _project(graph, beside, x, y)
-    x, y = _position(graph, lane, end)
+    x, y = _position(graph, lane, min(end, length))
     land, last_gap = _project(graph, beside, x, y)
+    land = min(land + max(end - length, 0.0), graph.lanes[beside].length)
     if not (first_gap < MAX_ASIDE and last_gap < MAX_ASIDE):
         return count
     weight, edge = graph.lanes[lane].weight, edges[count]

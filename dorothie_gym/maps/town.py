@@ -14,6 +14,7 @@ import numpy as np
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
+    LANE_CHANGES,
     Crosswalk,
     Exit,
     Junction,
@@ -253,6 +254,33 @@ class Town:
             IndexError: no lane has this id.
         """
         return next((link.target for link in self._links_from[lane] if link.type is side), None)
+
+    @cached_property
+    def _merges(self) -> dict[int, LinkType]:
+        """Side of the lane change out of each lane without successors, by lane id; from the nearest way on backwards."""
+        found: dict[int, LinkType] = {}
+        ending = [lane.id for lane in self.lanes if not self.successors(lane.id)]
+        leading = {lane.id for lane in self.lanes} - set(ending)
+        while True:
+            new: dict[int, LinkType] = {}
+            for lane in ending:
+                if lane not in leading:
+                    sides = [side for side in LANE_CHANGES if self.neighbour(lane, side) in leading]
+                    new.update({lane: side for side in sides[:1]})
+            if not new:
+                return found
+            found.update(new)
+            leading.update(new)
+
+    def merge(self, lane: int) -> LinkType | None:
+        """Returns the lane change by which a lane that ends is left; None where lanes follow, or none is beside.
+
+        Of two sides the one with fewer changes to a lane that leads on, of equal ones the left.
+
+        Raises:
+            IndexError: no lane has this id.
+        """
+        return self._merges.get(self.lanes[lane].id)
 
     @cached_property
     def _lights(self) -> dict[int, tuple[LightProgramme, int]]:

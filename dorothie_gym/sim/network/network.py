@@ -14,7 +14,7 @@ from highway_env.road.road import RoadNetwork
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.maps.model import HEIGHT, Array, Exit, Lane, LaneTable, LinkType
+from dorothie_gym.maps.model import HEIGHT, LANE_CHANGES, Array, Exit, Lane, LaneTable, LinkType
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.lane_lookup import GridIndex
@@ -315,8 +315,7 @@ class TownNetwork(RoadNetwork):
         return RoadNetwork.from_config(config)
 
     def _find_side_lanes(self, lane_id: int) -> list[LaneIndex]:
-        sides = LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT
-        neighbours = (self.town.neighbour(lane_id, side) for side in sides)
+        neighbours = (self.town.neighbour(lane_id, side) for side in LANE_CHANGES)
         return [self.index_of(lane) for lane in neighbours if lane is not None]
 
 
@@ -341,10 +340,12 @@ def network_of(town: Town) -> TownNetwork:
 # --- Ways on from each lane -------------------------------------------------------------------------------------------
 # Tables of the continuations of each lane, built once for each town: exits, default successors, lanes beside, oncoming.
 
+NARROW = 2.3
+"""Width below which a lane that tapers away is too narrow for a car, which is 2 m wide [m]; nine tenths of the greatest
+width of a lane that is narrow everywhere."""
+
 ANOTHER_WAY = 15.0
 """Difference in angle at which exits count as different turns [degrees]."""
-
-SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 
 
 class LaneExits(NamedTuple):
@@ -373,6 +374,9 @@ def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
         exits += [(way.connector, way.lane, way.angle, lanes[way.connector].junction) for way in found]
         record.chooses = _is_choice(found)
         record.onward = NOBODY
+        record.end, record.merge = lane.length, NOBODY
+        if (side := town.merge(lane.id)) is not None:
+            record.end, record.merge = usable_length(lane), town.neighbour(lane.id, side)
         if found and not record.chooses:
             record.onward = min(found, key=lambda way: (abs(way.angle), way.connector)).connector
         beside, candidates = side_by_side(town, lane.id), oncoming.candidates(lane.id).tolist()
@@ -386,11 +390,21 @@ def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
     return LaneExits(ways, table, np.array(lists, dtype=np.int32))
 
 
+def usable_length(lane: Lane) -> float:
+    """Returns the station from which on a lane that tapers away is too narrow for a car [m]; else its length."""
+    least = min(NARROW, 0.9 * float(lane.widths.max()))
+    last = int(np.flatnonzero(lane.widths >= least)[-1])
+    if last == len(lane.widths) - 1:
+        return lane.length
+    ends, widths = lane.stations[last : last + 2], lane.widths[last : last + 2]
+    return float(ends[0] + (widths[0] - least) / (widths[0] - widths[1]) * (ends[1] - ends[0]))
+
+
 def side_by_side(town: Town, lane: int) -> list[int]:
     """Returns a lane and all that are reached from it by lane changes."""
     found = [lane]
     for known in found:
-        for side in SIDES:
+        for side in LANE_CHANGES:
             beside = town.neighbour(known, side)
             if beside is not None and beside not in found:
                 found.append(beside)

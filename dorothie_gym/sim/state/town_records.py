@@ -53,6 +53,8 @@ class LaneExitsRecord:
 
     exit: Int32  # rows of `exits`, from right to left
     exits: Int32
+    end: Float  # station up to which it is wide enough for a car [m]
+    merge: Int32  # of a lane that ends: the lane beside it to change to, or -1
     onward: Int32  # lane that follows by default, or -1: the only one, or outside junctions the straightest
     chooses: Flag  # whether a turn must be chosen at its end
     offers: Flag  # whether the junction at its end offers a turn, from this lane or from one beside it

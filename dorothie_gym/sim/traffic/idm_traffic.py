@@ -107,8 +107,9 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
         vehicle.blocked = world.nodes[front].body >= len(world.vehicles)
     if vehicle.lane != vehicle.plan[0]:
         found = min(found, free - _held_up_beside(town, world, i))
-    if town.lanes[vehicle.plan[vehicle.planned - 1]].successors == 0:
-        left = begin - 0.5 * vehicle.length - LINE_GAP
+    last = int(vehicle.plan[vehicle.planned - 1])
+    if town.lanes[last].successors == 0:
+        left = begin - (town.lanes[last].length - town.ways[last].end) - 0.5 * vehicle.length - LINE_GAP
         if left < vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING:
             stop = min(stop, brake_to(vehicle.speed, left))
     stop = min(stop, _give_way_to_turning(town, world, vehicle))

@@ -267,7 +267,10 @@ GIVING_UP = 1.0
 
 @inlined
 def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
-    """Considers a lane change, once in `LANE_CHANGE_DELAY`, or gives up a change that is in progress."""
+    """Considers a lane change, once in `LANE_CHANGE_DELAY`, or gives up a change that is in progress.
+
+    A lane that ends is left as soon as there is room beside it, also from a standstill at its end.
+    """
     vehicle = world.vehicles[i]
     if vehicle.lane != vehicle.plan[0]:
         lane = town.lanes[vehicle.lane]
@@ -281,11 +284,18 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
     vehicle.timer = 0.0
     lane = town.lanes[vehicle.lane]
     left = lane.length - vehicle.station
-    if lane.junction >= 0 or vehicle.claim >= 0 or vehicle.inside >= 0 or abs(vehicle.speed) < 1.0:
+    if lane.junction >= 0 or vehicle.claim >= 0 or vehicle.inside >= 0:
         return
-    if lane.successors > 0 and left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
+    if lane.successors == 0:
+        merge = int(town.ways[vehicle.lane].merge)
+        if merge >= 0:
+            _consider(town, world, i, lane, merge)
         return
-    if vehicle.kind == Kind.CYCLIST and lane.successors > 0:
+    if abs(vehicle.speed) < 1.0:
+        return
+    if left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
+        return
+    if vehicle.kind == Kind.CYCLIST:
         _move_over(town, world, i, lane)
         return
     if lane.left >= 0:
