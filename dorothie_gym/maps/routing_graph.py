@@ -112,6 +112,7 @@ class RoutingLane:
     left: Int32  # lanes that one may change to
     right: Int32
     junction: Flag  # whether it is a connector through a junction
+    end: Float  # station up to which it is wide enough for a car [m]
     merge: Int32  # entry of the change by which the lane must be left as it ends, or -1
 
 
@@ -203,6 +204,7 @@ def routing_graph(town: Town) -> RoutingGraph:
         beside = [town.neighbour(lane.id, side) for lane in town.lanes]
         lanes[name] = [NONE if lane is None else lane for lane in beside]
     entries = {None: NONE, LinkType.LANE_CHANGE_LEFT: CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT: CHANGE_RIGHT}
+    lanes["end"] = [lane.wide_until for lane in town.lanes]
     lanes["merge"] = [entries[town.merge(lane.id)] for lane in town.lanes]
     near = [oncoming.candidates(lane.id) for lane in town.lanes]
     none, no_rows, no_edges = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64), empty_records(RoutingEdge, 0)
@@ -410,6 +412,9 @@ def _add_change(
     land = min(land + max(end - length, 0.0), graph.lanes[beside].length)
     if not (first_gap < MAX_ASIDE and last_gap < MAX_ASIDE):
         return count
+    if graph.lanes[beside].merge != NONE and graph.lanes[lane].merge != entry:
+        if land + SHORT_CHANGE > graph.lanes[beside].end:
+            return count  # no room to leave the other lane again before it ends
     weight, edge = graph.lanes[lane].weight, edges[count]
     edge.source, edge.target = cell_at(graph, lane, begin), cell_at(graph, beside, land)
     edge.cost = road * weight + CHANGE_COST + 2.0 * (CHANGE_LENGTH - road) + LATE_CHANGE * begin

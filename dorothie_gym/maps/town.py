@@ -113,6 +113,9 @@ class LightProgramme:
 
 # --- Town -------------------------------------------------------------------------------------------------------------
 
+SLOW_CRUISE = 40.0
+"""Cruise speed in towns with slow traffic, such as the shipped ones [km/h]."""
+
 MAX_EXTENT = 20_000.0
 """Largest extent of a town along x and y [m]; the index of its lanes takes 250 MB there."""
 
@@ -160,10 +163,12 @@ class Town:
         crosswalks: marked pedestrian crossings.
         sidewalks: pavements.
         programmes: traffic light programmes, one for each junction with lights.
+        cruise: cruise speed of the ego without a request [km/h], in a town with slow traffic like the paper's; None for
+            a town where all drive as fast as lane, sight and weather allow.
 
     Attributes:
-        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes: the arguments;
-            sequences as tuples.
+        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, cruise: the
+            arguments; sequences as tuples.
     """
 
     def __init__(
@@ -179,6 +184,7 @@ class Town:
         crosswalks: Sequence[Crosswalk] = (),
         sidewalks: Sequence[Sidewalk] = (),
         programmes: Sequence[LightProgramme] = (),
+        cruise: float | None = SLOW_CRUISE,
     ) -> None:
         self.name = name
         self.lanes = tuple(lanes)
@@ -190,12 +196,13 @@ class Town:
         self.crosswalks = tuple(crosswalks)
         self.sidewalks = tuple(sidewalks)
         self.programmes = tuple(programmes)
+        self.cruise = cruise
 
     @cached_property
     def identity(self) -> TownIdentity:
         """Name and content: equal for towns with equal parts, which copies of a town in other processes are."""
         parts = [self.lanes, self.links, self.junctions, self.streets, self.sites]
-        beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes]
+        beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes, self.cruise]
         return TownIdentity(name=self.name, content=digest_of([*parts, *beside]))
 
     @property
@@ -257,16 +264,16 @@ class Town:
 
     @cached_property
     def _merges(self) -> dict[int, LinkType]:
-        """Side of the lane change out of each lane without successors, by lane id; from the nearest way on backwards."""
+        """Side of the lane change out of each lane without successors, by lane id."""
         found: dict[int, LinkType] = {}
         ending = [lane.id for lane in self.lanes if not self.successors(lane.id)]
         leading = {lane.id for lane in self.lanes} - set(ending)
         while True:
             new: dict[int, LinkType] = {}
             for lane in ending:
-                if lane not in leading:
-                    sides = [side for side in LANE_CHANGES if self.neighbour(lane, side) in leading]
-                    new.update({lane: side for side in sides[:1]})
+                side = next((side for side in LANE_CHANGES if self.neighbour(lane, side) in leading), None)
+                if side is not None and lane not in leading:
+                    new[lane] = side
             if not new:
                 return found
             found.update(new)

@@ -24,6 +24,7 @@ from dorothie_gym.policies.knowledge import TOLD_TO_STOP
 from dorothie_gym.policies.route_progress import default_lane_place
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import junction_meant
+from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.sim.state.codes import Motion
 
 STRAIGHT_ON_DISTANCE = 60.0
@@ -39,7 +40,7 @@ LIMIT_TOLERANCE = 3
 """Excess over the speed limit that is not remarked on [km/h]."""
 
 SPEED_RANGE = (10, 60)
-"""Range of cruise speeds that the Co-Wizard accepts [km/h]."""
+"""Range of cruise speeds that the Co-Wizard accepts in a town with slow traffic [km/h]; elsewhere up to the car's."""
 
 Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]
 """Reaction to an instruction: changes the state (working copy) by the observation, the act and its words."""
@@ -127,6 +128,8 @@ def asked_speed(state: CoWizardState, view: CoWizardView, speed: int | None, fas
     if asked is None:
         asked = round(view.cruise) + (ASKED_SPEED_CHANGE if faster else -ASKED_SPEED_CHANGE)
     low, high = SPEED_RANGE
+    if state.town.cruise is None:
+        high = int(MAX_CRUISE)
     return min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
 
 

@@ -22,6 +22,7 @@ from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
+from dorothie_gym.policies.scripted_agent_limits import reach_at
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     left = progress.left(view.station)
     if view.standing:
         return _guide_standing(state, view, left)
-    close = left < config.stop_distance
+    close = left < reach_at(config.stop_distance, view.speed, state.town)
     if not state.guidance.guiding or _is_sent_a_little(state, view):
         return close  # a car that was sent on a little stops by itself
     prepare_stop(state, view, left, rng)

@@ -1,7 +1,7 @@
 """Lanes of a manoeuvre, and the pieces of path along them (compiled).
 
-The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`. A search for a turn appends its search
-tree after them. Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
+The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`; a search for a turn follows them. Where
+the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ WAITING_ROOM = 4.5
 MOST_CHANGES = 3
 """Maximum number of lane changes before a turn."""
 
+MERGING, MERGING_TIMES = 60.0, 2.0
+"""Distance before the end of a lane at which the ego leaves it by itself [m], and in lengths of the lane switch."""
+
 WIDEST_GAP = 14.0
 """Distance beyond which no point of a lane is opposite [m]: more than the diagonal of `lane_neighbours`' limits."""
 
 ALMOST = 1e-3
 """Shortest piece of path [m]."""
-
-
-# --- Lists of lanes ---------------------------------------------------------------------------------------------------
 
 
 @compiled
@@ -246,6 +246,11 @@ def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, sta
         return False
     if changes == MOST_CHANGES or not _has_room(town, world, row, station):
         return True
+    # lanes that end lead nowhere
+    if left >= 0 and town.ways[left].merge >= 0:
+        left = -1
+    if right >= 0 and town.ways[right].merge >= 0:
+        right = -1
     if left >= 0 and not _is_seen(world, root, left) and not _reach(world, left, row, changes + 1, True):
         return False
     if right >= 0 and not _is_seen(world, root, right):
@@ -356,6 +361,16 @@ def may_merge(town: TownArrays, number: int, station: float) -> bool:
 
 
 @compiled
+def may_enter(town: TownArrays, number: int, target: int, station: float, speed: float) -> bool:
+    """Returns whether a switch from a station of a lane at a speed leads to a lane with room to leave it again."""
+    if town.ways[target].merge < 0:
+        return True
+    x, y = position_on(town.points, town.lanes[number], station)
+    there, _ = project_on(town, target, x, y)
+    return bool(there + 2.0 * LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + MIN_SWITCH <= town.ways[target].end)
+
+
+@compiled
 def _opposite_end(town: TownArrays, number: int, beside: int) -> float:
     """Returns the station of a lane beside the end of another one [m]."""
     x, y = position_on(town.points, town.lanes[number], town.lanes[number].length)
@@ -401,7 +416,10 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
             lead = LEAD + min(speed * speed / (2.0 * PLANNED_BRAKING), most)
         else:
             lead = min(max(spare, LEAD), SETTLE)
-        begin = min(at + lead, (max(end, at + distance) if ends else lane.length) - distance)
+        begin = at + lead
+        if ends and not world.plan[0].early:  # not long before the end, so that places on the lane can be reached
+            begin = max(begin, end - changes * max(MERGING_TIMES * distance, MERGING))
+        begin = min(begin, (max(end, at + distance) if ends else lane.length) - distance)
         if begin > at + ALMOST:
             follow(town, world, number, at, begin, write)
         at = switch(town, world, number, beside, max(begin, at), distance, write)

@@ -31,6 +31,7 @@ from dorothie_gym.sim.ego.manoeuvre_lanes import (
     grow,
     lay_head,
     lay_pieces,
+    may_enter,
     may_merge,
     take_course,
 )
@@ -122,6 +123,21 @@ def note_place(town: TownArrays, world: WorldArrays) -> None:
     if plan.action > 0 and world.car[0].s >= plan.end:
         plan.action = plan.angle = 0
     find_place(town, world)
+    if plan.off_line and plan.action == 0:
+        _note_merge(town, world)
+
+
+@compiled
+def _note_merge(town: TownArrays, world: WorldArrays) -> None:
+    """Makes the lane switch out of a lane that ends, which the ego has begun by itself, its present manoeuvre."""
+    plan, course, k = world.plan[0], world.course, int(world.plan[0].at)
+    while k + 1 < plan.points and course[k + 1].manoeuvre:
+        k += 1
+    left, right = town.lanes[plan.lane].left, town.lanes[plan.lane].right
+    from_left = left >= 0 and town.ways[left].merge == plan.lane
+    from_right = right >= 0 and town.ways[right].merge == plan.lane
+    if course[k].s > world.car[0].s and (from_left or from_right):
+        plan.action, plan.angle, plan.end = LANE_SWITCH, LEFT if from_right else -LEFT, course[k].s
 
 
 @compiled
@@ -178,7 +194,8 @@ def plan_switch(town: TownArrays, world: WorldArrays, left: bool, speed: float) 
     if target < 0:
         return Refusal.NO_LANE_LEFT if left else Refusal.NO_LANE_RIGHT, -1
     merges = target == town.ways[plan.lane].merge and may_merge(town, plan.lane, plan.station)
-    if not merges and not _has_room_to_switch(lane.length - plan.station):
+    enters = merges or may_enter(town, plan.lane, target, plan.station, speed)
+    if not enters or not (merges or _has_room_to_switch(lane.length - plan.station)):
         return Refusal.NO_ROOM_LEFT if left else Refusal.NO_ROOM_RIGHT, -1
     if plan.props > 0:
         x, y = position_on(town.points, lane, plan.station)
@@ -423,6 +440,7 @@ def _replace(
         `Refusal.NONE`, or `Refusal.NO_SPACE`; then nothing has changed.
     """
     plan, car, course = world.plan[0], world.car[0], world.course
+    plan.early = action == LANE_SWITCH
     open_end = grow(town, world, station)
     x, y = (0.0, 0.0) if fresh else place_of_ego(world)
     laid = -1 if open_end < 0 else _lay(town, world, station, speed, first, end, oncoming, start, open_end > 0)

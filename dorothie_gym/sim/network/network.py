@@ -340,10 +340,6 @@ def network_of(town: Town) -> TownNetwork:
 # --- Ways on from each lane -------------------------------------------------------------------------------------------
 # Tables of the continuations of each lane, built once for each town: exits, default successors, lanes beside, oncoming.
 
-NARROW = 2.3
-"""Width below which a lane that tapers away is too narrow for a car, which is 2 m wide [m]; nine tenths of the greatest
-width of a lane that is narrow everywhere."""
-
 ANOTHER_WAY = 15.0
 """Difference in angle at which exits count as different turns [degrees]."""
 
@@ -375,8 +371,10 @@ def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
         record.chooses = _is_choice(found)
         record.onward = NOBODY
         record.end, record.merge = lane.length, NOBODY
-        if (side := town.merge(lane.id)) is not None:
-            record.end, record.merge = usable_length(lane), town.neighbour(lane.id, side)
+        side = town.merge(lane.id)
+        beside_end = None if side is None else town.neighbour(lane.id, side)
+        if beside_end is not None:
+            record.end, record.merge = lane.wide_until, beside_end
         if found and not record.chooses:
             record.onward = min(found, key=lambda way: (abs(way.angle), way.connector)).connector
         beside, candidates = side_by_side(town, lane.id), oncoming.candidates(lane.id).tolist()
@@ -388,16 +386,6 @@ def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
     for name, column in zip(("connector", "lane", "angle", "junction"), zip(*exits, strict=True), strict=False):
         table[name] = column
     return LaneExits(ways, table, np.array(lists, dtype=np.int32))
-
-
-def usable_length(lane: Lane) -> float:
-    """Returns the station from which on a lane that tapers away is too narrow for a car [m]; else its length."""
-    least = min(NARROW, 0.9 * float(lane.widths.max()))
-    last = int(np.flatnonzero(lane.widths >= least)[-1])
-    if last == len(lane.widths) - 1:
-        return lane.length
-    ends, widths = lane.stations[last : last + 2], lane.widths[last : last + 2]
-    return float(ends[0] + (widths[0] - least) / (widths[0] - widths[1]) * (ends[1] - ends[0]))
 
 
 def side_by_side(town: Town, lane: int) -> list[int]:

@@ -15,6 +15,7 @@ class LaneRecord:
 
     length: Float  # [m]
     limit: Float  # speed limit [m/s]
+    pace: Float  # factor on the desired speeds of cars: the fastest drive at the limit; 1 where traffic is slow
     curve_speed: Float  # speed in its tightest bend [m/s]
     half_width: Float  # [m]
     cos_first: Float  # directions of its two ends

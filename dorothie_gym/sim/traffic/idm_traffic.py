@@ -30,6 +30,7 @@ from dorothie_gym.sim.traffic.parameters import (
 from dorothie_gym.sim.traffic.vehicle_models import (
     brake_to,
     change_lanes,
+    desired_on,
     extend,
     follow_road,
     following_acceleration,
@@ -78,7 +79,7 @@ def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
 def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
     """Returns the acceleration by all that is ahead on the planned lanes [m/s^2], not limited yet."""
     vehicle = world.vehicles[i]
-    target, stop = vehicle.desired, math.inf
+    target, stop = desired_on(town.lanes[vehicle.lane], vehicle), math.inf
     front, gap = NOBODY, math.inf
     begin = -vehicle.station  # of a lane, from the vehicle's centre
     junction, line = NOBODY, 0.0

@@ -148,6 +148,12 @@ def not_zero(x: float) -> float:
 
 
 @inlined
+def desired_on(lane: LaneRecord, vehicle: VehicleRecord) -> float:
+    """Returns the desired speed of a vehicle on a lane [m/s]."""
+    return float(vehicle.desired * lane.pace) if vehicle.kind == Kind.CAR else float(vehicle.desired)
+
+
+@inlined
 def free_acceleration(speed: float, target: float, limit: float) -> float:
     """Returns the acceleration towards a target speed on a free road, on a lane with a speed limit [m/s^2]."""
     share = max(speed, 0.0) / abs(not_zero(min(max(target, 0.0), limit)))
@@ -287,25 +293,21 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
     if lane.junction >= 0 or vehicle.claim >= 0 or vehicle.inside >= 0:
         return
     if lane.successors == 0:
-        merge = int(town.ways[vehicle.lane].merge)
-        if merge >= 0:
-            _consider(town, world, i, lane, merge)
+        _consider(town, world, i, lane, int(town.ways[vehicle.lane].merge))
         return
-    if abs(vehicle.speed) < 1.0:
-        return
-    if left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
+    if abs(vehicle.speed) < 1.0 or left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
         return
     if vehicle.kind == Kind.CYCLIST:
         _move_over(town, world, i, lane)
         return
-    if lane.left >= 0:
-        _consider(town, world, i, lane, int(lane.left))
-    if lane.right >= 0:
-        _consider(town, world, i, lane, int(lane.right))
+    _consider(town, world, i, lane, int(lane.left))
+    _consider(town, world, i, lane, int(lane.right))
 
 
 @compiled
 def _consider(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord, side: int) -> None:
+    if side < 0:
+        return
     vehicle = world.vehicles[i]
     beside = town.lanes[side]
     if beside.successors == 0 and lane.successors > 0:
@@ -346,7 +348,8 @@ def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: floa
     if rear >= 0 and world.nodes[rear].body < len(world.vehicles):
         follower = world.vehicles[world.nodes[rear].body]
         along = vehicle.speed * (vehicle.cos * follower.cos + vehicle.sin * follower.sin)
-        imposed = free_acceleration(follower.speed, follower.desired, town.lanes[follower.lane].limit)
+        behind_on = town.lanes[follower.lane]
+        imposed = free_acceleration(follower.speed, desired_on(behind_on, follower), behind_on.limit)
         imposed -= following_acceleration(follower.speed, along, behind, 0.5 * (vehicle.length + follower.length))
         if imposed < -LANE_CHANGE_BRAKING:
             return False
