@@ -30,7 +30,7 @@ FASTEST_STOP = 20.0
 # Smallest difference between the distances of a landmark to the nearest other lane and to its own [m].
 SITE_CLEARANCE = 0.5
 # Stretch before the end of a lane in which cars leave it, without sites [m].
-MERGING = 130.0
+MERGING_STRETCH = 130.0
 
 
 def lay_sites(
@@ -156,7 +156,7 @@ def _candidates(lanes: Iterable[Lane], margin: float, ending: Collection[int]) -
     """
     tables = [np.empty((0, 6))]
     for lane in lanes:
-        end = lane.length - (MERGING if lane.id in ending else 0.0)
+        end = lane.length - (MERGING_STRETCH if lane.id in ending else 0.0)
         room = end - 2.0 * margin
         if room <= 0.0:
             continue

@@ -20,6 +20,9 @@ FOG_LIMIT = 35.0
 RAIN_LIMIT = 55.0
 """Precipitation above which the agents call the rain heavy [%]."""
 
+FASTEST = 21.0
+"""Speed at which a car can stop within its view on a clear day [m/s]: none drives faster, whatever the limit."""
+
 USUAL_SPEED = 40
 """Default cruise speed on open road [km/h], which route costs assume."""
 

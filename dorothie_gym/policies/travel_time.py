@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
 from dorothie_gym.maps.town import LightColour, Town
-from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED, USUAL_SPEED
+from dorothie_gym.policies.scripted_agent_limits import FASTEST, STANDING_SPEED, USUAL_SPEED
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.route_progress import RouteProgress
@@ -23,7 +23,6 @@ _DELAYS: Final = (0.8, 0.9, 1.0, 1.1, 1.2)  # factors on the time of driving, eq
 _SETTING_OFF: Final = 2.0  # from a standstill, also before a light that turns green [s]
 _PULLING_UP: Final = 5.0  # at the goal [s]
 _LONGEST_RED: Final = 120.0  # [s]
-_FASTEST: Final = 75.0  # speed that the view allows on a clear day, where the limit is higher [km/h]
 _SLOWEST: Final = 10.0  # cruise speed below which cars are not set [km/h]
 
 
@@ -47,7 +46,7 @@ class CruiseSpeed(NamedTuple):
         speed = self.now if time < self.until else self.later
         if town.cruise is not None:
             return _PACE * min(max(speed, _SLOWEST) / USUAL_SPEED, 1.0)
-        limit = min(3.6 * town.lanes[lane].speed_limit, _FASTEST)
+        limit = 3.6 * min(town.lanes[lane].speed_limit, FASTEST)
         free = self.by_limit and speed >= self.later
         return _PACE * max(limit if free else min(speed, limit), _SLOWEST) / USUAL_SPEED
 

@@ -373,6 +373,8 @@ def _set_speed_and_lights(state: CoWizardState, view: CoWizardView) -> Physical 
     """Adjusts cruise speed and headlights."""
     intentions = state.intentions
     if not state.town.lanes[view.lane].in_junction:
+        if state.town.cruise is None and intentions.arrived:
+            intentions = intentions.unhurried()
         intentions = state.intentions = intentions.on_lane(usual_cruise(state.town, view.lane, state.style.pace))
     if intentions.speed < intentions.usual and view.time > intentions.slow_until and not intentions.creeping:
         intentions = state.intentions = intentions.with_speed(intentions.usual)

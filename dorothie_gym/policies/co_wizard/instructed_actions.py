@@ -80,6 +80,7 @@ def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
     # a car that was stopped for a place off the map and now must turn round has passed it
     guided = state.beliefs.goal is not None and not state.beliefs.exact
     creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
+    creeping = creeping and state.town.cruise is not None  # elsewhere the car drove fast, and the place is far behind
     state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
     state.dialogue = state.dialogue.with_detour_question(None).after_u_turn_instruction(view.time)
 

@@ -197,6 +197,10 @@ class Intentions:
             return replace(self, speed=speed, slow_until=until)
         return replace(self, speed=speed, usual=speed, slow_until=until, asked=True)
 
+    def unhurried(self) -> Intentions:
+        """Forgets that a speed was asked for, at the end of a trip."""
+        return replace(self, asked=False) if self.asked else self
+
     def on_lane(self, usual: int) -> Intentions:
         """Sets the cruise speed of a lane [km/h], unless another one was asked for; a temporary one stays."""
         if self.asked or usual == self.usual:

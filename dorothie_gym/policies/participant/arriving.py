@@ -22,7 +22,7 @@ from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
-from dorothie_gym.policies.scripted_agent_limits import reach_at
+from dorothie_gym.policies.scripted_agent_limits import FASTEST, reach_at, usual_cruise
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
@@ -237,13 +237,20 @@ def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) ->
     if _is_about_to_speed_up(state, view, delay):
         gain = config.pull
     slow = state.guidance.slowed_early or state.guidance.approach_announced
-    now, top = view.speed, max(config.soon_speed if slow else config.top_speed, view.speed)
+    now, top = view.speed, max(config.soon_speed if slow else _top_speed(state, view), view.speed)
     soon = min(max(now + gain * interval, 0.0), top)
     rooms = []
     for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * interval)):
         then = min(max(speed + gain * delay, 0.0), top)
         rooms.append(ahead - (speed + then) / 2 * delay - stopping_distance(then))
     return rooms[0], rooms[1]
+
+
+def _top_speed(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the largest speed expected of the car on its lane [m/s]."""
+    if state.town.cruise is not None:
+        return state.config.top_speed
+    return min(usual_cruise(state.town, view.lane) / 3.6, FASTEST)
 
 
 def _guide_standing(state: ParticipantState, view: ParticipantView, left: float) -> bool:

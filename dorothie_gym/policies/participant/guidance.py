@@ -43,7 +43,7 @@ from dorothie_gym.policies.participant.telling_way import (
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
-from dorothie_gym.policies.scripted_agent_limits import reach_at
+from dorothie_gym.policies.scripted_agent_limits import USUAL_SPEED, reach_at
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
 from dorothie_gym.support import portable_math as pm
@@ -60,6 +60,9 @@ U_TURN_WAIT = 4.0
 
 ROUND_TIME = 7.0
 """Time that a car is given to begin a U-turn, before it is guided in another way [s]."""
+
+FAST = 50.0
+"""Speed above which the car is asked to slow down long before the place [km/h]."""
 
 WRONG_WAY_EXPIRES = 4.0
 """Time within which a wrong turn is pointed out [s]."""
@@ -307,13 +310,14 @@ def _is_left_to_ask(
 def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Asks the car to slow down for a place that was missed before, or is easily missed after a manoeuvre."""
     progress, config = state.route.to_goal, state.config
-    far = progress.left(view.station) > reach_at(config.stop_distance, view.speed, state.town)
+    fast = state.town.cruise is None and 3.6 * view.speed > FAST
+    far = progress.left(view.station) > (1 + fast) * reach_at(config.stop_distance, view.speed, state.town)
     if state.guidance.slowed_early or far or view.speed < config.slow_speed:
         return False
-    if not state.route.misses and not _is_easily_missed(state, view):
+    if not state.route.misses and not fast and not _is_easily_missed(state, view):
         return False
     state.guidance = state.guidance.after_slowing_early()
-    speed = float(rng.choice(config.careful_speeds))
+    speed = float(rng.choice(config.careful_speeds)) if state.route.misses or not fast else float(USUAL_SPEED)
     if 3.6 * view.speed <= speed:
         return False
     wording = Wording(faster=False, speed=speed)

@@ -1,7 +1,7 @@
 """Lanes of a manoeuvre, and the pieces of path along them (compiled).
 
-The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`; a search for a turn follows them. Where
-the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
+The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`; a search for a turn follows them.
+Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
 """
 
 from __future__ import annotations

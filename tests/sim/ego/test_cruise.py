@@ -43,4 +43,6 @@ def test_speed_that_is_set_counts(tmp_path: Path) -> None:
     assert world.ego.apply(PhysicalAction.SPEED_CHANGE, up=False) is None
     world.step(60)
     assert world.ego.cruise == 45.0
-    assert world_on(tmp_path / "ring.xodr", WorldConfig(vehicles=0, pedestrians=0, cruise_speed=20.0)).ego.cruise == 20.0
+    assert (
+        world_on(tmp_path / "ring.xodr", WorldConfig(vehicles=0, pedestrians=0, cruise_speed=20.0)).ego.cruise == 20.0
+    )
