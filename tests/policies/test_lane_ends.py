@@ -12,11 +12,12 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ActionValue, ObjectClass
 from dorothie_gym.policies.co_wizard.intentions import Intentions
 from dorothie_gym.policies.co_wizard.proposition_truth import LANE_ENDS, reason_to_be_slow, reason_to_stand
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.route_progress import default_lane_distance, lanes_ahead, next_choice
 from dorothie_gym.policies.scripted_agent_limits import reach_at, usual_cruise
 from dorothie_gym.sim.state.codes import Motion
 from tests.maps.ending_lanes import ring
-from tests.policies.test_reasons import on_the_way, view_of
+from tests.policies.test_reasons import on_the_way
 
 
 @pytest.fixture
@@ -31,15 +32,21 @@ def ending(town: Town) -> int:
 def test_car_that_waits_to_leave_a_lane_gives_the_end_of_the_lane_as_reason(tapers: Town) -> None:
     talk, lane = on_the_way(), tapers.lanes[ending(tapers)]
     known = replace(talk.state.knowledge, town=tapers, halted=False, arrived=False)
+
+    def seen(**changes: object) -> CoWizardView:
+        observation = talk.observations["co_wizard"]
+        nothing = {name: np.zeros_like(observation[name]) for name in ("exits", "landmarks", "guesses")}
+        return CoWizardView.read({**observation, **nothing, **changes}, tapers)
+
     waiting = {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.VEHICLES.value), "speed": np.zeros(1)}
     here = {"lane": np.int64(lane.id), "station": np.full(1, lane.length - 30.0)}
-    assert reason_to_stand(known, view_of(talk, **waiting, **here)) == LANE_ENDS
-    assert reason_to_be_slow(known, view_of(talk, **waiting, **here)) == LANE_ENDS
+    assert reason_to_stand(known, seen(**waiting, **here)) == LANE_ENDS
+    assert reason_to_be_slow(known, seen(**waiting, **here)) == LANE_ENDS
     far = {"lane": np.int64(lane.id), "station": np.full(1, 10.0)}
     hinders = Proposition.of(Predicate.HINDERS, object=ObjectClass.VEHICLES)
-    assert reason_to_stand(known, view_of(talk, **waiting, **far)) == hinders
+    assert reason_to_stand(known, seen(**waiting, **far)) == hinders
     walker = {**waiting, "hazard": np.int64(ObjectClass.PEDESTRIAN.value)}
-    assert reason_to_stand(known, view_of(talk, **walker, **here)).get("object") is ObjectClass.PEDESTRIAN
+    assert reason_to_stand(known, seen(**walker, **here)).get("object") is ObjectClass.PEDESTRIAN
 
 
 def test_lanes_ahead_lead_over_to_the_lane_beside(tapers: Town) -> None:

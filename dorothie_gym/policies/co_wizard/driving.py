@@ -163,8 +163,10 @@ def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
     waited = view.time - state.commands.manoeuvre_sent_at
     if lane.in_junction or view.manoeuvring or waited < state.config.command_interval:
         return None
-    if state.town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
-        return _switch(state, view, LinkType.LANE_CHANGE_LEFT)
+    left = LinkType.LANE_CHANGE_LEFT
+    if state.town.neighbour(view.lane, left) is not None:
+        if state.town.successors(view.lane) or can_switch_lane(state.town, view.lane, view.station, left):
+            return _switch(state, view, left)
     if not can_turn_round(state.town, view.lane, u_turn_start(view.station, view.speed)):
         return None
     _note_manoeuvre(state, view)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.lane_neighbours import opposite_gap
 from dorothie_gym.maps.model import HEADING, HEIGHT, X, Y
+from dorothie_gym.sim.ego.lane_ends import may_merge, opposite_end
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
 from dorothie_gym.sim.ego.path_builder import (
     PATH_SPACING,
@@ -340,42 +341,8 @@ def grow(town: TownArrays, world: WorldArrays, station: float) -> int:
             return -1
         ahead += town.lanes[following].length
         if beside:
-            ahead -= _opposite_end(town, last, following)
+            ahead -= opposite_end(town, last, following)
     return 0
-
-
-@compiled
-def may_merge(town: TownArrays, number: int, station: float) -> bool:
-    """Returns whether a lane ends and can be left for the one beside it, from a station [m] on.
-
-    Close to its end, the lane beside must lead on without a choice: else there is no way to lay before a turn is
-    chosen.
-    """
-    beside = int(town.ways[number].merge)
-    if beside < 0:
-        return False
-    if town.lanes[number].length - station >= MIN_SWITCH + LEAD:
-        return True
-    left = town.lanes[beside].length - _opposite_end(town, number, beside)
-    return bool(left >= MIN_SWITCH + LEAD or town.ways[beside].onward >= 0 or town.ways[beside].merge >= 0)
-
-
-@compiled
-def may_enter(town: TownArrays, number: int, target: int, station: float, speed: float) -> bool:
-    """Returns whether a switch from a station of a lane at a speed leads to a lane with room to leave it again."""
-    if town.ways[target].merge < 0:
-        return True
-    x, y = position_on(town.points, town.lanes[number], station)
-    there, _ = project_on(town, target, x, y)
-    return bool(there + 2.0 * LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + MIN_SWITCH <= town.ways[target].end)
-
-
-@compiled
-def _opposite_end(town: TownArrays, number: int, beside: int) -> float:
-    """Returns the station of a lane beside the end of another one [m]."""
-    x, y = position_on(town.points, town.lanes[number], town.lanes[number].length)
-    station, _ = project_on(town, beside, x, y)
-    return station
 
 
 @compiled
@@ -408,6 +375,10 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
         room = max((end - at) / changes - LEAD, MIN_SWITCH if ends else 2.0)
         distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
         if ends and at + changes * distance > lane.length:
+            if k == 0 and lane.length - at > ALMOST:  # the ego is still on its lane
+                straight = min(LEAD, lane.length - at)
+                follow(town, world, number, at, at + straight, write)
+                at += straight
             k, at = merge(town, world, k, k + changes, at, changes * distance, write)
             continue
         spare = (lane.length - at) - changes * (distance + LEAD)

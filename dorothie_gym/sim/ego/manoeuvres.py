@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import HEIGHT, LEVEL_HEIGHT, WIDTH
+from dorothie_gym.sim.ego.lane_ends import may_enter, may_merge
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
     HALF_LENGTH,
@@ -31,8 +32,6 @@ from dorothie_gym.sim.ego.manoeuvre_lanes import (
     grow,
     lay_head,
     lay_pieces,
-    may_enter,
-    may_merge,
     take_course,
 )
 from dorothie_gym.sim.ego.path_builder import (
@@ -163,8 +162,7 @@ def find_feasible(town: TownArrays, world: WorldArrays, speed: float) -> int:
         found |= Feasible.SWITCH_LEFT
     if plan_switch(town, world, False, speed)[0] == Refusal.NONE:
         found |= Feasible.SWITCH_RIGHT
-    leftmost = town.lanes[plan.lane].left < 0 or _leads_nowhere(town, plan.lane, plan.station)
-    if leftmost and plan_u_turn(town, world, speed)[0] == Refusal.NONE:
+    if plan_u_turn(town, world, speed)[0] == Refusal.NONE:
         found |= Feasible.U_TURN
     return found
 
@@ -213,6 +211,8 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     lane, station = town.lanes[plan.lane], plan.station
     if _is_busy(town, world):
         return Refusal.IN_MANOEUVRE, -1, 0.0, 0.0
+    if lane.left >= 0 and not _leads_nowhere(town, plan.lane, station):
+        return Refusal.NOT_LEFTMOST, -1, 0.0, 0.0
     begin = station + LEAD * (speed > EGO_MOVING) + _u_turn_braking(speed, U_TURN_SPEED * U_TURN_SPEED)
     other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other >= 0:
@@ -222,7 +222,7 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
             begin += short
             other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other < 0:
-        return Refusal.NOT_LEFTMOST if lane.left >= 0 else Refusal.NO_ONCOMING, -1, 0.0, 0.0
+        return Refusal.NO_ONCOMING, -1, 0.0, 0.0
     if speed > EGO_MOVING and begin - station + U_TURN_REACH > world.car[0].roadblock:
         return Refusal.PROP_AHEAD, -1, 0.0, 0.0
     if begin > lane.length + 0.5:
