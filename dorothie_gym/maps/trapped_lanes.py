@@ -26,7 +26,8 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
         lanes: lanes of the town; `lanes[i].id` is `i`.
         links: links between them, lane changes included.
     """
-    followers, beside = defaultdict(list), defaultdict(list)
+    followers: dict[int, list[int]] = defaultdict(list)
+    beside: dict[int, list[int]] = defaultdict(list)
     for link in links:
         (beside if link.type.is_lane_change else followers)[link.source].append(link.target)
     turning: frozenset[int] | None = None
