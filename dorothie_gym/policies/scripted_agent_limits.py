@@ -27,6 +27,10 @@ USUAL_SPEED = 40
 """Default cruise speed on open road [km/h], which route costs assume."""
 
 
+CALM_SPEED = 30
+"""Speed at which a guided car finds a place beside a fast road [km/h]: that of the traffic in the shipped towns."""
+
+
 def usual_cruise(town: Town, lane: int, pace: int = USUAL_SPEED) -> int:
     """Returns the cruise speed on a lane where nobody has asked for another [km/h].
 

@@ -22,6 +22,7 @@ from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.knowledge import TOLD_TO_STOP
 from dorothie_gym.policies.route_progress import default_lane_place
+from dorothie_gym.policies.scripted_agent_limits import CALM_SPEED
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
@@ -114,6 +115,8 @@ def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words:
     asked = asked_speed(state, view, words.speed, words.faster)
     until = view.time + state.config.slow_time
     state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
+    if state.town.cruise is None and asked < state.config.open_road_speed:
+        state.intentions = state.intentions.calmed(CALM_SPEED)
 
 
 def asked_speed(state: CoWizardState, view: CoWizardView, speed: int | None, faster: bool | None) -> int:

@@ -197,6 +197,10 @@ class Intentions:
             return replace(self, speed=speed, slow_until=until)
         return replace(self, speed=speed, usual=speed, slow_until=until, asked=True)
 
+    def calmed(self, most: int) -> Intentions:
+        """Limits the speed after a temporary one to `most` [km/h], until the end of the trip."""
+        return replace(self, usual=min(self.usual, most), asked=True)
+
     def unhurried(self) -> Intentions:
         """Forgets that a speed was asked for, at the end of a trip."""
         return replace(self, asked=False) if self.asked else self

@@ -43,7 +43,7 @@ from dorothie_gym.policies.participant.telling_way import (
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
-from dorothie_gym.policies.scripted_agent_limits import USUAL_SPEED, reach_at
+from dorothie_gym.policies.scripted_agent_limits import CALM_SPEED, reach_at
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
 from dorothie_gym.support import portable_math as pm
@@ -317,7 +317,7 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.ran
     if not state.route.misses and not fast and not _is_easily_missed(state, view):
         return False
     state.guidance = state.guidance.after_slowing_early()
-    speed = float(rng.choice(config.careful_speeds)) if state.route.misses or not fast else float(USUAL_SPEED)
+    speed = float(rng.choice(config.careful_speeds)) if state.route.misses or not fast else float(CALM_SPEED)
     if 3.6 * view.speed <= speed:
         return False
     wording = Wording(faster=False, speed=speed)
