@@ -65,6 +65,9 @@ CHANGE_LEAD = 1.0
 CHANGE_COST = 10.0
 """Cost of a lane change [m]."""
 
+END_COST = 100.0
+"""Extra cost of a lane change close to the end of a lane, which is only made where the car is there already [m]."""
+
 LATE_CHANGE = 0.01
 """Extra cost of a lane change for each metre along its lane: of equal ones the first is preferred."""
 
@@ -387,7 +390,10 @@ def add_changes(
         if SHORT_CHANGE <= road <= room:
             count = _add_change(graph, lane, beside, entry, begin, road, edges, count)
     if row.merge == entry and row.length - begin < SHORT_CHANGE:
-        count = _add_change(graph, lane, beside, entry, begin, SHORT_CHANGE, edges, count)
+        added = _add_change(graph, lane, beside, entry, begin, SHORT_CHANGE, edges, count)
+        for k in range(count, added):
+            edges[k].cost += END_COST
+        count = added
     return count
 
 

@@ -86,8 +86,12 @@ class _Surroundings:
 
 def _ending(links: Sequence[LaneLink]) -> frozenset[int]:
     """Returns the lanes that cars must leave for a lane beside them before they end."""
-    changes = {link.source for link in links if link.type.is_lane_change}
-    return frozenset(changes - {link.source for link in links if not link.type.is_lane_change})
+    leading = {link.source for link in links if not link.type.is_lane_change}
+    changes = [(link.source, link.target) for link in links if link.type.is_lane_change]
+    found: set[int] = set()
+    while more := {a for a, b in changes if a not in leading and a not in found and (b in leading or b in found)}:
+        found |= more
+    return frozenset(found)
 
 
 def _places(

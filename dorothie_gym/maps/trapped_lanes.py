@@ -30,7 +30,7 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
     beside: dict[int, list[int]] = defaultdict(list)
     for link in links:
         (beside if link.type.is_lane_change else followers)[link.source].append(link.target)
-    turning: frozenset[int] | None = None
+    turning: dict[int, int] | None = None
     left = {lane.id for lane in lanes}
     while left:
         leading = {lane for lane in left if any(target in left for target in followers[lane])}
@@ -38,7 +38,7 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
             if len(leading) == len(left):
                 return frozenset()
             turning = _turning(lanes, links)
-        leading |= turning & left
+        leading |= {lane for lane, onto in turning.items() if lane in left and onto in left}
         leading = _with_changes(leading, left, beside)
         if len(leading) == len(left):
             break
@@ -46,11 +46,12 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
     return frozenset(lane.id for lane in lanes if lane.id not in left) if left else frozenset()
 
 
-def _turning(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset[int]:
-    """Returns the lanes at whose end a car can turn round."""
+def _turning(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> dict[int, int]:
+    """Returns the lanes onto which a car can turn round at the ends of lanes, by the ids of these."""
     oncoming = OncomingLanes(Town(name="", lanes=lanes, links=links, junctions=()))
     ends = ((lane.id, max(lane.length - NOSE, 0.0)) for lane in lanes if not lane.in_junction)
-    return frozenset(lane for lane, station in ends if oncoming.at(lane, station) is not None)
+    found = ((lane, oncoming.at(lane, station)) for lane, station in ends)
+    return {lane: opposite.lane for lane, opposite in found if opposite is not None}
 
 
 def _with_changes(leading: set[int], left: Collection[int], beside: dict[int, list[int]]) -> set[int]:
