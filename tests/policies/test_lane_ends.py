@@ -6,15 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Predicate, Proposition
+from dorothie_gym.dialogue import Predicate, Proposition, Wording, word_act
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import ActionValue, ObjectClass
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, Role, Slot
 from dorothie_gym.policies.co_wizard.intentions import Intentions
 from dorothie_gym.policies.co_wizard.proposition_truth import LANE_ENDS, reason_to_be_slow, reason_to_stand
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.route_progress import default_lane_distance, lanes_ahead, next_choice
 from dorothie_gym.policies.scripted_agent_limits import reach_at, usual_cruise
+from dorothie_gym.policies.speech import intend
 from dorothie_gym.sim.state.codes import Motion
 from tests.maps.ending_lanes import ring
 from tests.policies.test_reasons import on_the_way
@@ -83,5 +86,17 @@ def test_limit_has_no_effect_on_a_speed_that_was_asked_for() -> None:
     assert (slow.speed, slow.usual) == (20, 90)
 
 
-def test_end_of_a_lane_is_worded_as_a_cause() -> None:
-    assert LANE_ENDS.negated and LANE_ENDS.get("action") is ActionValue.LANE_FOLLOW
+def test_end_of_a_lane_is_worded_as_a_cause_and_as_a_reason_for_a_switch() -> None:
+    because = Proposition.of(Predicate.BECAUSE, effect=Proposition.of(Predicate.STANDS), cause=LANE_ENDS)
+    answer = intend(Function.ANSWER, because, elided=("effect",), wording=Wording(topic="because"))
+    reason = intend(Function.INFORM, LANE_ENDS, elided=("action",), wording=Wording(topic="lane_ends"))
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        assert "lane" in word_act(answer.act, Role.CO_WIZARD, rng, answer.wording).lower()
+        assert "end" in word_act(reason.act, Role.PARTICIPANT, rng, reason.wording).lower()
+
+
+def test_request_to_leave_a_lane_that_ends_is_understood() -> None:
+    spans = guess_spans("get over to the left, this lane ends", Role.PARTICIPANT)
+    assert [span.act.move for span in spans] == [DialogueMove.INSTRUCT, DialogueMove.EXPLAIN]
+    assert spans[0].act.values(Slot.ACTION) == (ActionValue.LANE_SWITCH,)
