@@ -41,7 +41,7 @@ from dorothie_gym.support.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, r
 from dorothie_gym.support.schemas import convert
 from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, remove, write_signed
 
-ARCHIVE_FORMAT = 1
+ARCHIVE_FORMAT = 2
 """Version of the archive format; raise it when the same town would be written differently."""
 
 MAX_ARCHIVE = 512 * MIB
@@ -78,7 +78,7 @@ def pack(town: Town, key: str) -> bytes:
         key: key of the archive, checked by `unpack`.
     """
     arrays: list[Array] = []
-    document: dict[str, object] = {"format": ARCHIVE_FORMAT, "key": key, "name": town.name}
+    document: dict[str, object] = {"format": ARCHIVE_FORMAT, "key": key, "name": town.name, "cruise": town.cruise}
     for part, kind in PARTS.items():
         elements = getattr(town, part)
         document[part] = {
@@ -111,7 +111,7 @@ def unpack(data: bytes, key: str) -> Town:
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
             raise TownArchiveError("it is of another format or another town")
-        return _town(document["name"], document, floats)
+        return _town(document["name"], document["cruise"], document, floats)
     except TownArchiveError:
         raise
     except (
@@ -143,9 +143,11 @@ def _plain(value: object) -> object:
     raise TypeError(f"a town cannot be archived with a {type(value).__name__} in it: {value!r}")
 
 
-def _town(name: str, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
+def _town(name: str, cruise: float | None, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
     if not isinstance(name, str) or floats.dtype != np.float64 or floats.ndim != 1:
         raise TownArchiveError("its name is no text, or its numbers are no floats")
+    if cruise is not None and not isinstance(cruise, float):
+        raise TownArchiveError("its cruise speed is no number")
     numbers = _ArrayReader(floats)
     parts: dict[str, list[Any]] = {}
     for part, kind in PARTS.items():
@@ -155,7 +157,7 @@ def _town(name: str, document: Mapping[str, Mapping[str, _Column]], floats: Arra
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
         raise TownArchiveError("it holds more numbers than its town has")
-    town = Town(name=name, **parts)
+    town = Town(name=name, cruise=cruise, **parts)
     if fault := next(_faults(town), None):
         raise TownArchiveError(f"it holds no sound town: {fault}")
     return town

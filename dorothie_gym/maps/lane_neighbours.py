@@ -81,7 +81,8 @@ class OncomingLanes:
     def at(self, lane_id: int, station: float) -> Oncoming | None:
         """Returns the opposite point on the oncoming lane.
 
-        None in a junction, on a lane that is not the leftmost, and without an oncoming lane nearby.
+        None in a junction, on a lane that is not the leftmost, and without an oncoming lane nearby. At a dead end,
+        where all lanes end, cars turn round from the other lanes too.
         """
         candidates = self.candidates(lane_id)
         if not len(candidates):
@@ -100,7 +101,9 @@ class OncomingLanes:
     def _lanes_near(self, lane_id: int) -> IntArray:
         """Returns the lanes outside junctions that are close enough to be oncoming somewhere along a lane."""
         lane = self._town.lanes[lane_id]
-        if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
+        leftmost = self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is None
+        ends = not self._town.successors(lane_id) and self._town.merge(lane_id) is None
+        if lane.in_junction or not (leftmost or ends):
             return np.empty(0, dtype=np.int64)
         reach = pm.hypot(WIDEST_MEDIAN, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
         own = self._points[self._owners == lane_id]

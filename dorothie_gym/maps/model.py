@@ -36,6 +36,11 @@ LEVEL_HEIGHT = 2.5
 """Difference in height at which lanes and bodies are on different levels and do not meet [m]; bridges leave more."""
 
 
+NARROW = 2.3
+"""Width below which a lane that tapers away is too narrow for a car, which is 2 m wide [m]; nine tenths of the greatest
+width of a lane that is narrow everywhere."""
+
+
 class LinkType(enum.StrEnum):
     """Type of a link between two lanes: a turn, or a change to the parallel lane."""
 
@@ -49,7 +54,11 @@ class LinkType(enum.StrEnum):
     @property
     def is_lane_change(self) -> bool:
         """Whether the target lies beside the source instead of following it."""
-        return self in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+        return self in LANE_CHANGES
+
+
+LANE_CHANGES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+"""Types of the links between lanes side by side."""
 
 
 @shared
@@ -108,6 +117,16 @@ class Lane:
     def length(self) -> float:
         """Length of the centre line in the plane [m]."""
         return float(self.stations[-1])
+
+    @cached_property
+    def wide_until(self) -> float:
+        """Station from which on a lane that tapers away is too narrow for a car [m]; else the length of the lane."""
+        least = min(NARROW, 0.9 * float(self.widths.max()))
+        last = int(np.flatnonzero(self.widths >= least)[-1])
+        if last == len(self.widths) - 1:
+            return self.length
+        station, width = self.stations[last : last + 2], self.widths[last : last + 2]
+        return float(station[0] + (width[0] - least) / (width[0] - width[1]) * (station[1] - station[0]))
 
     @property
     def in_junction(self) -> bool:

@@ -65,6 +65,9 @@ CHANGE_LEAD = 1.0
 CHANGE_COST = 10.0
 """Cost of a lane change [m]."""
 
+END_COST = 100.0
+"""Extra cost of a lane change close to the end of a lane, which is only made where the car is there already [m]."""
+
 LATE_CHANGE = 0.01
 """Extra cost of a lane change for each metre along its lane: of equal ones the first is preferred."""
 
@@ -112,6 +115,8 @@ class RoutingLane:
     left: Int32  # lanes that one may change to
     right: Int32
     junction: Flag  # whether it is a connector through a junction
+    end: Float  # station up to which it is wide enough for a car [m]
+    merge: Int32  # entry of the change by which the lane must be left as it ends, or -1
 
 
 class RoutingEdge:
@@ -201,6 +206,9 @@ def routing_graph(town: Town) -> RoutingGraph:
     for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
         beside = [town.neighbour(lane.id, side) for lane in town.lanes]
         lanes[name] = [NONE if lane is None else lane for lane in beside]
+    entries = {None: NONE, LinkType.LANE_CHANGE_LEFT: CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT: CHANGE_RIGHT}
+    lanes["end"] = [lane.wide_until for lane in town.lanes]
+    lanes["merge"] = [entries[town.merge(lane.id)] for lane in town.lanes]
     near = [oncoming.candidates(lane.id) for lane in town.lanes]
     none, no_rows, no_edges = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64), empty_records(RoutingEdge, 0)
     bare = RoutingGraph(
@@ -365,7 +373,10 @@ def find_manoeuvres(graph: RoutingGraph, edges: RecordArray[RoutingEdge]) -> int
 def add_changes(
     graph: RoutingGraph, lane: int, entry: int, begin: float, edges: RecordArray[RoutingEdge], count: int
 ) -> int:
-    """Adds lane changes of three lengths to one side from a station [m]; returns the number of edges."""
+    """Adds lane changes of three lengths to one side from a station [m]; returns the number of edges.
+
+    A lane that ends can also be left close to its end: that change leads beyond it.
+    """
     row = graph.lanes[lane]
     beside = int(row.left) if entry == CHANGE_LEFT else int(row.right)
     if beside == NONE:
@@ -378,6 +389,11 @@ def add_changes(
             road = min(CHANGE_LENGTH, room)  # the longest is limited by the rest of the lane
         if SHORT_CHANGE <= road <= room:
             count = _add_change(graph, lane, beside, entry, begin, road, edges, count)
+    if row.merge == entry and row.length - begin < SHORT_CHANGE:
+        added = _add_change(graph, lane, beside, entry, begin, SHORT_CHANGE, edges, count)
+        for k in range(count, added):
+            edges[k].cost += END_COST
+        count = added
     return count
 
 
@@ -393,13 +409,18 @@ def _add_change(
     count: int,
 ) -> int:
     """Adds a lane change of length `road` [m] if the lanes are adjacent there."""
-    leave, end = begin + CHANGE_LEAD, begin + road
+    length = graph.lanes[lane].length
+    leave, end = min(begin + CHANGE_LEAD, length), begin + road
     x, y = _position(graph, lane, leave)
     landing, first_gap = _project(graph, beside, x, y)
-    x, y = _position(graph, lane, end)
+    x, y = _position(graph, lane, min(end, length))
     land, last_gap = _project(graph, beside, x, y)
+    land = min(land + max(end - length, 0.0), graph.lanes[beside].length)
     if not (first_gap < MAX_ASIDE and last_gap < MAX_ASIDE):
         return count
+    if graph.lanes[beside].merge != NONE and graph.lanes[lane].merge != entry:
+        if land + SHORT_CHANGE > graph.lanes[beside].end:
+            return count  # no room to leave the other lane again before it ends
     weight, edge = graph.lanes[lane].weight, edges[count]
     edge.source, edge.target = cell_at(graph, lane, begin), cell_at(graph, beside, land)
     edge.cost = road * weight + CHANGE_COST + 2.0 * (CHANGE_LENGTH - road) + LATE_CHANGE * begin
@@ -426,6 +447,9 @@ def add_u_turn(
     Returns:
         The number of edges.
     """
+    row = graph.lanes[lane]
+    if row.left != NONE and row.length - leave >= SHORT_CHANGE:
+        return count  # from such a lane only at its end
     other, station, _ = oncoming_at(graph, lane, leave)
     if other < 0 or not graph.lanes[other].length - station > CELL:
         return count

@@ -14,7 +14,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import Array, Lane, LaneLink, Site
+from dorothie_gym.maps.model import NARROW, Array, Lane, LaneLink, Site
 from dorothie_gym.maps.routing import Router, router
 from dorothie_gym.maps.town import Town
 from dorothie_gym.support import portable_arrays as pn
@@ -29,6 +29,8 @@ SITE_RULES = ((40.0, 15.0), (25.0, 10.0), (12.0, 5.0), (2.0, 1.0))
 FASTEST_STOP = 20.0
 # Smallest difference between the distances of a landmark to the nearest other lane and to its own [m].
 SITE_CLEARANCE = 0.5
+# Stretch before the end of a lane in which cars leave it, without sites [m].
+MERGING_STRETCH = 130.0
 
 
 def lay_sites(
@@ -51,17 +53,17 @@ def lay_sites(
         At most `count` sites; fewer if the map has no room.
     """
     outermost = [lane for lane in _outermost(lanes) if lane.id not in avoid]
-    part = _parts(lanes, links)
+    part, ending = _parts(lanes, links), _ending(links)
     closed = _is_closed(outermost, links, part)
-    places = _places(lanes, outermost, count) if closed else np.empty((0, 6))
+    places = _places(lanes, outermost, count, ending) if closed else np.empty((0, 6))
     if len(places) < count:  # an open network, or a small one
         around = _Surroundings(lanes, links)
         for group in (outermost, [lane for lane in lanes if not lane.in_junction and lane.id not in avoid]):
-            places = max(places, _places(lanes, group, count, around), key=len)
+            places = max(places, _places(lanes, group, count, ending, around), key=len)
             if len(places) >= count:
                 break
     if not len(places):  # no car can return to any place
-        places = _places(lanes, [lane for lane in outermost if part[lane.id] == _largest(part)], count)
+        places = _places(lanes, [lane for lane in outermost if part[lane.id] == _largest(part)], count, ending)
     chosen = _spread(places[:, 2:4], count) if len(places) else []
     return tuple(_site(k, lanes[int(places[row, 0])], places[row]) for k, row in enumerate(sorted(chosen)))
 
@@ -82,11 +84,27 @@ class _Surroundings:
         return found
 
 
-def _places(lanes: Sequence[Lane], kerbs: list[Lane], count: int, around: _Surroundings | None = None) -> Array:
+def _ending(links: Sequence[LaneLink]) -> frozenset[int]:
+    """Returns the lanes that cars must leave for a lane beside them before they end."""
+    leading = {link.source for link in links if not link.type.is_lane_change}
+    changes = [(link.source, link.target) for link in links if link.type.is_lane_change]
+    found: set[int] = set()
+    while more := {a for a, b in changes if a not in leading and a not in found and (b in leading or b in found)}:
+        found |= more
+    return frozenset(found)
+
+
+def _places(
+    lanes: Sequence[Lane],
+    kerbs: list[Lane],
+    count: int,
+    ending: frozenset[int],
+    around: _Surroundings | None = None,
+) -> Array:
     """Returns candidate sites (n, 6) by the first rule that gives enough of them; see `_candidates`."""
     usable, best = _calm(kerbs), np.empty((0, 6))
     for shortest, margin in SITE_RULES:
-        places = _candidates([lane for lane in usable if lane.length >= shortest], margin)
+        places = _candidates([lane for lane in usable if lane.length >= shortest], margin, ending)
         if len(places):
             places = places[_is_clear(lanes, places)]
         best = places if around is None else around.largest(places)
@@ -135,15 +153,20 @@ def _calm(lanes: list[Lane]) -> list[Lane]:
     return calm if 2 * len(calm) >= len(lanes) else lanes
 
 
-def _candidates(lanes: Iterable[Lane], margin: float) -> Array:
-    """Returns candidate sites along lanes: rows of lane, station, landmark x, y, waypoint x, y [m]."""
+def _candidates(lanes: Iterable[Lane], margin: float, ending: Collection[int]) -> Array:
+    """Returns candidate sites along lanes: rows of lane, station, landmark x, y, waypoint x, y [m].
+
+    There are none where a lane opens or tapers away, and none where cars leave one of those that end.
+    """
     tables = [np.empty((0, 6))]
     for lane in lanes:
-        room = lane.length - 2.0 * margin
+        end = lane.length - (MERGING_STRETCH if lane.id in ending else 0.0)
+        room = end - 2.0 * margin
         if room <= 0.0:
             continue
-        s = np.linspace(margin, lane.length - margin, int(room / SITE_STEP) + 1) if room > SITE_STEP else [margin]
+        s = np.linspace(margin, end - margin, int(room / SITE_STEP) + 1) if room > SITE_STEP else [margin]
         station = np.asarray(s, dtype=float)
+        station = station[np.interp(station, lane.stations, lane.widths) >= NARROW]
         x, y, heading, width = (
             np.interp(station, lane.stations, column)
             for column in (lane.points[:, 0], lane.points[:, 1], lane.headings, lane.widths)

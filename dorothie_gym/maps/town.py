@@ -14,6 +14,7 @@ import numpy as np
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
+    LANE_CHANGES,
     Crosswalk,
     Exit,
     Junction,
@@ -112,6 +113,9 @@ class LightProgramme:
 
 # --- Town -------------------------------------------------------------------------------------------------------------
 
+SLOW_CRUISE = 40.0
+"""Cruise speed in towns with slow traffic, such as the shipped ones [km/h]."""
+
 MAX_EXTENT = 20_000.0
 """Largest extent of a town along x and y [m]; the index of its lanes takes 250 MB there."""
 
@@ -159,10 +163,12 @@ class Town:
         crosswalks: marked pedestrian crossings.
         sidewalks: pavements.
         programmes: traffic light programmes, one for each junction with lights.
+        cruise: cruise speed of the ego without a request [km/h], in a town with slow traffic like the paper's; None for
+            a town where all drive as fast as lane, sight and weather allow.
 
     Attributes:
-        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes: the arguments;
-            sequences as tuples.
+        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, cruise: the
+            arguments; sequences as tuples.
     """
 
     def __init__(
@@ -178,6 +184,7 @@ class Town:
         crosswalks: Sequence[Crosswalk] = (),
         sidewalks: Sequence[Sidewalk] = (),
         programmes: Sequence[LightProgramme] = (),
+        cruise: float | None = SLOW_CRUISE,
     ) -> None:
         self.name = name
         self.lanes = tuple(lanes)
@@ -189,12 +196,13 @@ class Town:
         self.crosswalks = tuple(crosswalks)
         self.sidewalks = tuple(sidewalks)
         self.programmes = tuple(programmes)
+        self.cruise = cruise
 
     @cached_property
     def identity(self) -> TownIdentity:
         """Name and content: equal for towns with equal parts, which copies of a town in other processes are."""
         parts = [self.lanes, self.links, self.junctions, self.streets, self.sites]
-        beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes]
+        beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes, self.cruise]
         return TownIdentity(name=self.name, content=digest_of([*parts, *beside]))
 
     @property
@@ -253,6 +261,33 @@ class Town:
             IndexError: no lane has this id.
         """
         return next((link.target for link in self._links_from[lane] if link.type is side), None)
+
+    @cached_property
+    def _merges(self) -> dict[int, LinkType]:
+        """Side of the lane change out of each lane without successors, by lane id."""
+        found: dict[int, LinkType] = {}
+        ending = [lane.id for lane in self.lanes if not self.successors(lane.id)]
+        leading = {lane.id for lane in self.lanes} - set(ending)
+        while True:
+            new: dict[int, LinkType] = {}
+            for lane in ending:
+                side = next((side for side in LANE_CHANGES if self.neighbour(lane, side) in leading), None)
+                if side is not None and lane not in leading:
+                    new[lane] = side
+            if not new:
+                return found
+            found.update(new)
+            leading.update(new)
+
+    def merge(self, lane: int) -> LinkType | None:
+        """Returns the lane change by which a lane that ends is left; None where lanes follow, or none is beside.
+
+        Of two sides the one with fewer changes to a lane that leads on, of equal ones the left.
+
+        Raises:
+            IndexError: no lane has this id.
+        """
+        return self._merges.get(self.lanes[lane].id)
 
     @cached_property
     def _lights(self) -> dict[int, tuple[LightProgramme, int]]:

@@ -43,5 +43,17 @@ def can_turn_round(town: Town, lane: int, start: float) -> bool:
 
 
 def can_switch_lane(town: Town, lane: int, station: float, side: LinkType, room: float = SWITCH_ROOM) -> bool:
-    """Returns whether a lane has a neighbour on a side, and more than `room` metres are left to change to it."""
-    return town.neighbour(lane, side) is not None and town.lanes[lane].length - station > room
+    """Returns whether a lane has a neighbour on a side, and more than `room` metres are left to change to it.
+
+    A lane that ends may be left up to its end, and entered only where there is room to leave it again.
+    """
+    beside = town.neighbour(lane, side)
+    if beside is None:
+        return False
+    if town.merge(lane) is side:
+        return True
+    if town.merge(beside) is not None:
+        there, _ = town.lanes[beside].project(town.lanes[lane].position(station))
+        if there + 2.0 * room > town.lanes[beside].wide_until:
+            return False
+    return town.lanes[lane].length - station > room

@@ -13,6 +13,7 @@ from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.route_progress import Choice, direction_of, find_exit, lanes_beside
+from dorothie_gym.policies.route_tables import entry_station
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.portable_math import wrap_degrees
 
@@ -102,7 +103,9 @@ class RoadAhead:
         begin = -here[1]
         for place, lane in enumerate(lanes):
             changes = place > 0 and lane in lanes_beside(town, lanes[place - 1])
-            if changes:  # the stations of lanes side by side are much the same
+            if changes and town.merge(lanes[place - 1]) is not None:
+                begin -= entry_station(town, lanes[place - 1], lane)
+            elif changes:  # the stations of lanes side by side are much the same
                 begin -= town.lanes[lanes[place - 1]].length
             stretches.append(Stretch(lane, begin))
             begin += town.lanes[lane].length
@@ -164,7 +167,12 @@ def _straight_lanes(town: Town, lane: int, reach: float) -> Iterator[int]:
         reach -= town.lanes[lane].length
         way = _onward(town, lane)
         if way is None:
-            return
+            side = town.merge(lane)
+            beside = None if side is None else town.neighbour(lane, side)
+            if beside is None:
+                return
+            lane = beside
+            continue
         beside = next((other for other in lanes_beside(town, lane) if way in town.exits(other)), None)
         if way not in town.exits(lane) and beside is not None:
             yield beside

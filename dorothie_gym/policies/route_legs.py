@@ -54,7 +54,10 @@ def _is_overdue(tables: RouteTables, legs: RecordArray[LegRecord], count: int, l
     entry = legs[leg + 1].entry
     if entry == FOLLOW:
         return False
-    room = tables.lanes[legs[leg].lane].length - station
+    lane = tables.lanes[legs[leg].lane]
+    if lane.merge == entry:  # the car changes lanes by itself, at the latest at the end
+        return False
+    room = lane.length - station
     if entry == U_TURN:
         return station > legs[leg].end + (MANOEUVRE_OVERDUE_DISTANCE if room > END_ROOM else 0.0)
     return room < SWITCH_ROOM or station > legs[leg].end + MANOEUVRE_OVERDUE_DISTANCE

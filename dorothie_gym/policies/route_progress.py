@@ -25,7 +25,7 @@ from dorothie_gym.policies.route_legs import (
     find_manoeuvre,
     needs_switch,
 )
-from dorothie_gym.policies.route_tables import default_successor, is_choice, route_tables
+from dorothie_gym.policies.route_tables import default_successor, entry_station, is_choice, route_tables
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.portable_math import wrap_degrees
@@ -111,11 +111,9 @@ def default_lane_distance(town: Town, here: Place, place: Place, distance: float
         distance: largest distance searched [m].
     """
     lane, station = here
-    ahead = -station
-    for passed in lanes_ahead(town, lane, station, distance):
+    for passed, begin in _lanes_ahead(town, lane, station, distance):
         if passed == place[0]:
-            return ahead + place[1]
-        ahead += town.lanes[passed].length
+            return begin + place[1]
     return None
 
 
@@ -123,30 +121,37 @@ def default_lane_place(town: Town, here: Place, distance: float) -> Place:
     """Returns the place at a distance ahead [m] on the default lanes, or the end of the last lane before a junction."""
     lane, station = here
     lanes, left = lanes_ahead(town, lane, station, distance), station + distance
-    for passed in lanes[:-1]:
+    for passed, following in itertools.pairwise(lanes):
         if left <= town.lanes[passed].length:
             return passed, left
-        left -= town.lanes[passed].length
+        left -= town.lanes[passed].length - entry_station(town, passed, following)
     return lanes[-1], min(left, town.lanes[lanes[-1]].length)
 
 
 def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple[int, ...]:
     """Returns a lane and those that follow by default within `distance` [m]."""
-    found, ahead = [lane], town.lanes[lane].length - station
+    return tuple(passed for passed, _ in _lanes_ahead(town, lane, station, distance))
+
+
+def _lanes_ahead(town: Town, lane: int, station: float, distance: float) -> list[tuple[int, float]]:
+    """Returns the lanes of `lanes_ahead`, with the distance to the start of each [m], negative behind the car."""
+    found, seen, begin = [(lane, -station)], {lane}, -station
+    ahead = town.lanes[lane].length - station
     following = default_successor(town, lane)
-    while ahead < distance and following is not None and following not in found:
-        found.append(following)
-        ahead += town.lanes[following].length
-        following = default_successor(town, following)
-    return tuple(found)
+    while ahead < distance and following is not None and following not in seen:
+        entry = entry_station(town, lane, following)
+        begin += town.lanes[lane].length - entry
+        found.append((following, begin))
+        seen.add(following)
+        ahead += town.lanes[following].length - entry
+        lane, following = following, default_successor(town, following)
+    return found
 
 
 def light_ahead(town: Town, lane: int, station: float, time: float) -> LightColour | None:
     """Returns the colour of the next traffic light on the default lanes; None if none is near."""
-    ahead = -station
-    for passed in lanes_ahead(town, lane, station, LIGHT_SIGHT):
-        ahead += town.lanes[passed].length
-        if ahead > LIGHT_SIGHT:
+    for passed, begin in _lanes_ahead(town, lane, station, LIGHT_SIGHT):
+        if begin + town.lanes[passed].length > LIGHT_SIGHT:
             return None
         colour = town.light(passed, time)
         if colour is not None:
@@ -161,9 +166,9 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
         following = default_successor(town, lane)
         if following is None or following in seen:
             return None
+        ahead += town.lanes[following].length - entry_station(town, lane, following)
         lane = following
         seen.add(lane)
-        ahead += town.lanes[lane].length
     return Choice(lane=lane, distance=max(ahead, 0.0), exits=town.exits(lane))
 
 

@@ -70,11 +70,22 @@ def is_choice(town: Town, lane: int) -> bool:
 
 
 def default_successor(town: Town, lane: int) -> int | None:
-    """Returns the lane that follows by default; None at a junction with a choice and where the map ends."""
+    """Returns the lane that follows by default; None at a junction with a choice and where the map ends.
+
+    A lane that ends is followed by the lane beside it to which the car changes, see `entry_station`.
+    """
     exits = town.exits(lane)
-    if not exits or is_choice(town, lane):
+    if not exits:
+        side = town.merge(lane)
+        return None if side is None else town.neighbour(lane, side)
+    if is_choice(town, lane):
         return None
     return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
+
+
+def entry_station(town: Town, lane: int, following: int) -> float:
+    """Returns the station of the lane that follows by default which is at the end of a lane [m]; 0 for a successor."""
+    return 0.0 if town.merge(lane) is None else town.lanes[following].project(town.lanes[lane].points[-1])[0]
 
 
 def _lane_before_choice(town: Town, lane: int) -> int:

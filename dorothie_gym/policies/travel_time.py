@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.maps.routing import LaneEntry, Leg
 from dorothie_gym.maps.town import LightColour, Town
-from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED, USUAL_SPEED
+from dorothie_gym.policies.scripted_agent_limits import FASTEST, STANDING_SPEED, USUAL_SPEED
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.route_progress import RouteProgress
@@ -33,16 +33,22 @@ class CruiseSpeed(NamedTuple):
         now: present speed [km/h].
         later: speed from a time on [km/h].
         until: that time [s].
+        by_limit: whether the speed from that time on, and the present one if it is the same, follow the speed limits.
     """
 
     now: float = USUAL_SPEED
     later: float = USUAL_SPEED
     until: float = math.inf
+    by_limit: bool = False
 
-    def pace(self, time: float) -> float:
-        """Returns the speed between junctions at a time [m/s, s]."""
+    def pace(self, time: float, town: Town, lane: int) -> float:
+        """Returns the speed between junctions on a lane at a time [m/s, s]."""
         speed = self.now if time < self.until else self.later
-        return _PACE * min(max(speed, _SLOWEST) / USUAL_SPEED, 1.0)
+        if town.cruise is not None:
+            return _PACE * min(max(speed, _SLOWEST) / USUAL_SPEED, 1.0)
+        limit = 3.6 * min(town.lanes[lane].speed_limit, FASTEST)
+        free = self.by_limit and speed >= self.later
+        return _PACE * max(limit if free else min(speed, limit), _SLOWEST) / USUAL_SPEED
 
 
 def travel_time(
@@ -64,12 +70,12 @@ def travel_time(
         station: distance of the car along its lane [m].
         now: time [s].
         speed: current speed [m/s].
-        cruise: cruise speed of the car; None for the usual one. A faster one saves no time in a town.
+        cruise: cruise speed of the car; None for the usual one. A faster one saves no time in a town with slow traffic.
     """
     if not progress.legs:
         return math.inf
     begun = now + (_SETTING_OFF if speed < STANDING_SPEED else 0.0)
-    driven = CruiseSpeed() if cruise is None else cruise
+    driven = CruiseSpeed(by_limit=True) if cruise is None else cruise
     return statistics.fmean(_arrival(town, progress, station, begun, driven, delay) for delay in _DELAYS) - now
 
 
@@ -79,7 +85,7 @@ def _arrival(
     """Returns the time at which a car that sets off at a time stops at the goal, with a factor on driving."""
     time, start = begun, station
     for leg, following in zip(progress.legs, (*progress.legs[1:], None), strict=True):
-        time += delay * _seconds_on(town, leg, start, cruise.pace(time))
+        time += delay * _seconds_on(town, leg, start, cruise.pace(time, town, leg.lane))
         start = -math.inf
         if following is not None:
             if town.lanes[following.lane].in_junction:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, RouteProgress, lanes_beside
-from dorothie_gym.policies.route_tables import default_successor, is_choice
+from dorothie_gym.policies.route_tables import default_successor, entry_station, is_choice
 from dorothie_gym.sim.network.network import side_by_side, ways_part
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.routing import Leg
     from dorothie_gym.maps.town import Town
 
 
@@ -47,9 +48,9 @@ def next_turn_lane(town: Town, lane: int, station: float) -> Choice | None:
         following = default_successor(town, lane)
         if following is None or following in seen:
             return None
+        ahead += town.lanes[following].length - entry_station(town, lane, following)
         lane = following
         seen.add(lane)
-        ahead += town.lanes[lane].length
     return None
 
 
@@ -68,12 +69,29 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
         if crossing is not None and leg.lane == crossing.lane and following.lane == crossing.exit.connector:
             return replace(crossing, distance=max(distance + leg.end - begin, crossing.distance))
         if following.entry in (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT):
-            distance += max(following.start - begin, 0.0)  # the stations of adjacent lanes are almost equal
+            distance += way_before_change(town, leg, following, begin)
             continue
         distance += max(leg.end - begin, 0.0)
         if following.entry is LaneEntry.FOLLOW and leg.lane in turn_lanes(town):
             return RouteJunction(lane=leg.lane, exit=town.exits(leg.lane)[0], distance=distance)
     return crossing
+
+
+def way_before_change(town: Town, leg: Leg, following: Leg, begin: float) -> float:
+    """Returns the distance from a station of a leg to the end of the lane change after it [m].
+
+    The stations of lanes side by side are almost equal, but for lanes that end: these often begin later.
+
+    Args:
+        town: the map.
+        leg: leg before the change.
+        following: leg after the change.
+        begin: the station [m].
+    """
+    lane = town.lanes[leg.lane]
+    if town.merge(lane.id) is not None:
+        begin = town.lanes[following.lane].project(lane.position(begin))[0]
+    return max(following.start - begin, 0.0)
 
 
 def junction_meant(town: Town, here: Place, choice: Choice | None) -> Choice | None:

@@ -142,7 +142,8 @@ class EnvConfig:
 
     Attributes:
         decision_frequency: decisions per second [Hz]; a divisor of the 30 Hz of the physics.
-        max_seconds: simulated time after which the session is truncated [s].
+        max_seconds: simulated time after which the session is truncated [s]. The default is a minimum on maps where
+            cars follow the speed limits, see `time_allowed.time_allowed`.
         words_per_second: speaking rate of all roles [words/s].
         observe_acts: whether utterances are observed with their acts (move and slots), or as text only.
         word_error_rate: word error rate of the speech recognition between participant and Co-Wizard, in [0, 1); 0 for

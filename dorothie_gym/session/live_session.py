@@ -30,6 +30,7 @@ from dorothie_gym.session.spaces.actions import (
     Physical,
     RoleAction,
 )
+from dorothie_gym.session.time_allowed import time_allowed
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.world import World
 from dorothie_gym.tasks.storyboard import TaskState
@@ -70,6 +71,7 @@ class LiveSession:
         scenario: storyboard, street names and departure.
         config: settings.
         limits: sizes of the spaces.
+        seconds_allowed: time after which the session is truncated [s].
         world: simulated world.
         task: progress in the storyboard.
         beliefs: goals and places of hidden landmarks as the Co-Wizard has stated them.
@@ -103,6 +105,7 @@ class LiveSession:
             arrays: arrays of the world of a session that has begun, by `session_seeds` and `start_world`.
         """
         self.scenario, self.config, self.limits = scenario, config, limits
+        self.seconds_allowed = time_allowed(town, scenario, config)
         world_seed, word_seed, ear_seed, style_seed, voice_seed = session_seeds(scenario)
         self.world = World(
             town, config.world, seed=world_seed, departure=scenario.departure, network=network, arrays=arrays

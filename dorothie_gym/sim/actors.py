@@ -11,7 +11,6 @@ import numpy as np
 
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
 from dorothie_gym.sim.population import (
-    SPEEDS,
     add_prop,
     add_street_walker,
     add_vehicle,
@@ -20,7 +19,7 @@ from dorothie_gym.sim.population import (
 )
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Walk
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
-from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
+from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS, VEHICLE_SPEEDS
 from dorothie_gym.sim.traffic.respawn import is_free
 from dorothie_gym.support.copying import CachedViews
 
@@ -94,7 +93,7 @@ class Actors(CachedViews):
         if not is_free(town, self.arrays, lane, float(station), int(NOBODY), float(distance)):
             return False
         cycles = bool(town.lanes[lane].right < 0 and town.lanes[lane].cycling) and self._rng.random() < CYCLIST_SHARE
-        kind, speeds = (Kind.CYCLIST, CYCLIST_SPEEDS) if cycles else (Kind.CAR, SPEEDS)
+        kind, speeds = (Kind.CYCLIST, CYCLIST_SPEEDS) if cycles else (Kind.CAR, VEHICLE_SPEEDS)
         self._make_room(vehicles=1)
         add_vehicle(town, self.arrays, lane, station, kind=kind, desired=float(self._rng.uniform(*speeds)))
         return True

@@ -21,7 +21,9 @@ class WorldConfig:
     Attributes:
         vehicles: background vehicles, about one in eight a cyclist, as many as fit.
         pedestrians: pedestrians, as many as fit.
-        cruise_speed: cruise speed of the ego at the start [km/h], a multiple of 5 in 5..90.
+        cruise_speed: cruise speed of the ego at the start [km/h], a multiple of 5 in 5..90. In a town without a cruise
+            speed of its own (`Town.cruise`), the ego follows the speed limits instead of the default until another
+            speed is set.
         collisions_stop: duration of the ego's standstill after a collision [s].
     """
 

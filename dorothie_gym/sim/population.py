@@ -28,6 +28,7 @@ from dorothie_gym.sim.traffic.parameters import (
     CYCLIST_SHARE,
     CYCLIST_SPEEDS,
     CYCLIST_WIDTH,
+    VEHICLE_SPEEDS,
 )
 from dorothie_gym.sim.traffic.respawn import SHORTEST, is_clear_of_people, is_free, new_key, put_on_lane
 from dorothie_gym.support import portable_math as pm
@@ -314,9 +315,6 @@ def _cumulated(weights: Array) -> Array:
 
 # --- Initial population -----------------------------------------------------------------------------------------------
 
-SPEEDS = 6.5, 10.0
-"""Range of the desired speeds of vehicles [m/s]."""
-
 PACES = 1.1, 1.6
 """Range of the desired speeds of pedestrians [m/s] (Knoblauch et al. 1996 measured 1.2 to 1.5 at crosswalks)."""
 
@@ -393,7 +391,7 @@ def _fill_lanes(
         if is_free(town, world, lanes[k], stations[k], NOBODY, CLEAR_OF_CAR):
             while world.vehicles[row].kind != Kind.EMPTY:
                 row += 1
-            low, high = CYCLIST_SPEEDS if cycles[count] else SPEEDS
+            low, high = CYCLIST_SPEEDS if cycles[count] else VEHICLE_SPEEDS
             kind, desired = Kind.CYCLIST if cycles[count] else Kind.CAR, low + (high - low) * shares[count]
             _put_vehicle(town, world, row, kind, lanes[k], stations[k], desired, pool)
             count += 1

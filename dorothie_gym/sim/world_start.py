@@ -8,6 +8,7 @@ import numpy as np
 
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.ego_controller import request_path
+from dorothie_gym.sim.ego.limits import cruise_by_limit
 from dorothie_gym.sim.ego.manoeuvres import BEGIN
 from dorothie_gym.sim.population import add_car, populate
 from dorothie_gym.sim.sensing.localizer import switch_on
@@ -69,7 +70,10 @@ def start_world(
     add_car(town, holder.arrays, lane, station)
     plain(holder.arrays.car)["collision_stop"] = round(config.collisions_stop * FRAME_RATE)
     request_path(town, holder, BEGIN, lane=lane, station=station)
-    plain(holder.arrays.plan)["cruise"] = config.cruise_speed
+    plan = plain(holder.arrays.plan)
+    follows = network.town.cruise is None and config.cruise_speed == WorldConfig.cruise_speed
+    plan["cruise"] = cruise_by_limit(network.town.lanes[lane].speed_limit) if follows else config.cruise_speed
+    plan["follows"] = follows
     populate(
         network, town, holder.arrays, seed=seeds.places()[1], vehicles=config.vehicles, pedestrians=config.pedestrians
     )

@@ -43,7 +43,7 @@ def _document(**changes: object) -> bytes:
 
 
 def test_an_archive_holds_all_parts_of_a_town() -> None:
-    assert set(inspect.signature(Town).parameters) == {"name", *PARTS}
+    assert set(inspect.signature(Town).parameters) == {"name", "cruise", *PARTS}
 
 
 def test_a_town_with_all_parts_is_restored_bit_for_bit() -> None:
@@ -53,6 +53,12 @@ def test_a_town_with_all_parts_is_restored_bit_for_bit() -> None:
 def test_an_empty_town_is_restored() -> None:
     empty = Town(name="", lanes=[], links=[], junctions=[])
     assert town_bits(unpack(pack(empty, "key"), "key")) == town_bits(empty)
+
+
+@pytest.mark.parametrize("cruise", ["40", True, "null"])
+def test_a_cruise_speed_that_is_no_number_is_refused(cruise: object) -> None:
+    with pytest.raises(TownArchiveError, match="cruise"):
+        unpack(_document(cruise=cruise), "key")
 
 
 @pytest.mark.parametrize("name", [*town_names(), "Town02", "Town05"])

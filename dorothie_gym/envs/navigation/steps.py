@@ -148,6 +148,7 @@ def carry_out(
         if not _may_change_cruise(plan.cruise, faster):
             return CRUISE_LIMIT
         plan.cruise += SPEED_STEP if faster else -SPEED_STEP
+        plan.follows = False
         return Refusal.NONE
     return command(town, world, order, angle, world.vehicles[0].speed)
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.long_lanes import cut_long_lanes
-from dorothie_gym.maps.model import Array, Junction, Lane
+from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink
 from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_road
 from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
 from dorothie_gym.maps.opendrive.lane_changes import lane_change_links
@@ -19,6 +21,7 @@ from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
+from dorothie_gym.maps.trapped_lanes import trapped_lanes
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.import_notes import ImportNotes
@@ -57,6 +60,8 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
     topology, lines = sample_centrelines(records, build_topology(records), samples)
     lanes = _lanes(records, topology, lines)
     links = successor_links(lanes, topology) + lane_change_links(records, topology, lanes)
+    if trapped := trapped_lanes(lanes, links):
+        topology, lanes, links = _without(trapped, topology, lanes, links, records)
     lanes, streets = name_streets(lanes, links)
     junctions, signals = _junctions(lanes), place_signals(records, topology, lanes)
     town = Town(
@@ -70,8 +75,27 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
         crosswalks=place_crosswalks(records),
         sidewalks=lay_sidewalks(records, samples, lanes),
         programmes=derive_programmes(lanes, links, junctions, signals),
+        cruise=None,
     )
     return cut_long_lanes(town, records.notes), records.notes
+
+
+def _without(
+    trapped: frozenset[int],
+    topology: Topology,
+    lanes: tuple[Lane, ...],
+    links: tuple[LaneLink, ...],
+    records: OpenDriveRecords,
+) -> tuple[Topology, tuple[Lane, ...], tuple[LaneLink, ...]]:
+    """Drops lanes that lead nowhere, with notes; the others are numbered anew."""
+    for lane in (lanes[k] for k in sorted(trapped)):
+        if not lane.in_junction:
+            where = f"road {records.roads[lane.road_id].name} / lane {lane.lane_id}"
+            records.notes.dropped(NoteKind.LANE, where, "leads nowhere: a car can neither go on nor turn round there")
+    kept = {lane.id: new for new, lane in enumerate(lane for lane in lanes if lane.id not in trapped)}
+    rest = tuple(replace(lanes[old], id=new) for old, new in kept.items())
+    among = (link for link in links if link.source in kept and link.target in kept)
+    return topology.without(trapped), rest, tuple(LaneLink(kept[a.source], kept[a.target], a.type) for a in among)
 
 
 def _lanes(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> tuple[Lane, ...]:

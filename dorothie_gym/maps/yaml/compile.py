@@ -73,6 +73,7 @@ def compile_town(layout: Layout) -> Town:
         crosswalks=crosswalks(layout, build.approaches),
         sidewalks=sidewalks(layout),
         programmes=programmes,
+        cruise=layout.plan.cruise,
     )
 
 

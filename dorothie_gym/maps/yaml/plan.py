@@ -122,6 +122,7 @@ class TownPlan:
         yields: the same for yield signs.
         crosswalks: pairs of a junction name and the street that is crossed there.
         sites: positions of landmarks [m]; empty to place them automatically.
+        cruise: cruise speed of the ego without a request, in a town with slow traffic [km/h]; None: the speed limits.
     """
 
     name: str
@@ -132,3 +133,4 @@ class TownPlan:
     yields: tuple[tuple[str, StreetPlan], ...] = ()
     crosswalks: tuple[tuple[str, StreetPlan], ...] = ()
     sites: tuple[tuple[Point, YamlEntry], ...] = ()
+    cruise: float | None = None

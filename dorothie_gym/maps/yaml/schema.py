@@ -195,7 +195,8 @@ def _green(
 # --- Whole town ------------------------------------------------------------------------------------------------------
 
 TOWN_KEYS = (
-    "name", "speed", "width", "sidewalk", "junctions", "streets", "lights", "stops", "yields", "crosswalks", "sites",
+    "name", "speed", "cruise", "width", "sidewalk", "junctions", "streets", "lights", "stops", "yields", "crosswalks",
+    "sites",
 )  # fmt: skip
 JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
 ROUNDABOUT_SPEED = 30.0
@@ -203,6 +204,10 @@ ROUNDABOUT_SPEED = 30.0
 ROUNDABOUT_RADIUS = (8.0, 150.0)
 """Range of radii of the centre line of a ring [m]."""
 ROUNDABOUT_LANES = (1, 3)
+
+
+CRUISE_RANGE = (10.0, 60.0)
+"""Range of the cruise speed of a town with slow traffic [km/h]."""
 
 
 def read_plan(path: Path) -> TownPlan:
@@ -235,7 +240,15 @@ def read_plan(path: Path) -> TownPlan:
         yields=yields,
         crosswalks=read_crosswalks(fields["crosswalks"], junctions, streets) if "crosswalks" in fields else (),
         sites=_sites(fields["sites"]) if "sites" in fields else (),
+        cruise=_cruise(fields["cruise"]) if "cruise" in fields else None,
     )
+
+
+def _cruise(entry: YamlEntry) -> float:
+    speed = entry.number(*CRUISE_RANGE, "km/h")
+    if speed % 5.0:
+        entry.fail(f"the cruise speed must be a multiple of 5 km/h, not {speed:g}")
+    return speed
 
 
 def _junctions(entry: YamlEntry, defaults: StreetDefaults) -> dict[str, JunctionPlan]:

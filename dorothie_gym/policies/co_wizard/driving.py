@@ -28,6 +28,7 @@ from dorothie_gym.policies.route_progress import (
     stopping_distance,
     streets_named,
 )
+from dorothie_gym.policies.scripted_agent_limits import reach_at, usual_cruise
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
@@ -162,8 +163,10 @@ def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
     waited = view.time - state.commands.manoeuvre_sent_at
     if lane.in_junction or view.manoeuvring or waited < state.config.command_interval:
         return None
-    if state.town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
-        return _switch(state, view, LinkType.LANE_CHANGE_LEFT)
+    left = LinkType.LANE_CHANGE_LEFT
+    if state.town.neighbour(view.lane, left) is not None:
+        if state.town.successors(view.lane) or can_switch_lane(state.town, view.lane, view.station, left):
+            return _switch(state, view, left)
     if not can_turn_round(state.town, view.lane, u_turn_start(view.station, view.speed)):
         return None
     _note_manoeuvre(state, view)
@@ -262,13 +265,18 @@ def _straight_on(state: CoWizardState, choice: Choice) -> Exit | None:
     return next((way for way in choice.exits if way.type is LinkType.STRAIGHT), None)
 
 
+def _turn_lead(state: CoWizardState, view: CoWizardView) -> float:
+    """Returns the distance to a junction at which a turn is commanded [m]."""
+    return reach_at(state.config.turn_lead, view.speed, state.town)
+
+
 def _turn(state: CoWizardState, view: CoWizardView) -> Physical | None:
     """Commands the turn at the next junction."""
     choice = junction_ahead(state, view)
     if state.intentions.halted or choice is None or state.intentions.nudge is not None:
         return None
     way = wanted_exit(state, view)
-    if way is None or (choice.distance > state.config.turn_lead and view.motion is not Motion.WAITING):
+    if way is None or (choice.distance > _turn_lead(state, view) and view.motion is not Motion.WAITING):
         return None
     commands, turns = state.commands, view.manoeuvre is PhysicalAction.J_TURN
     set_already = turns and abs(view.angle - way.angle) < 1.0
@@ -366,6 +374,10 @@ def _goal_is_close(state: CoWizardState, view: CoWizardView) -> bool:
 def _set_speed_and_lights(state: CoWizardState, view: CoWizardView) -> Physical | None:
     """Adjusts cruise speed and headlights."""
     intentions = state.intentions
+    if not state.town.lanes[view.lane].in_junction:
+        if state.town.cruise is None and intentions.arrived:
+            intentions = intentions.unhurried()
+        intentions = state.intentions = intentions.on_lane(usual_cruise(state.town, view.lane, state.style.pace))
     if intentions.speed < intentions.usual and view.time > intentions.slow_until and not intentions.creeping:
         intentions = state.intentions = intentions.with_speed(intentions.usual)
     slowly = state.plan.stops_soon or _goal_is_close(state, view) or _turns_soon(state, view)

@@ -24,6 +24,7 @@ from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
+from dorothie_gym.policies.scripted_agent_limits import reach_at
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.sim.state.codes import Motion
@@ -157,7 +158,7 @@ def _may_ask_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> bo
     if busy or view.time < state.config.first_word or intentions.wish is Wish.U_TURN or view.manoeuvring:
         return False
     waiting = _waits_for_way(state, view)
-    near = waiting or choice.distance < state.config.ask_distance
+    near = waiting or choice.distance < reach_at(state.config.ask_distance, view.speed, state.town)
     if not near or wanted_exit(state, view) is not None:
         return False
     if progress is not None:

@@ -22,8 +22,10 @@ from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.knowledge import TOLD_TO_STOP
 from dorothie_gym.policies.route_progress import default_lane_place
+from dorothie_gym.policies.scripted_agent_limits import CALM_SPEED
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import junction_meant
+from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.sim.state.codes import Motion
 
 STRAIGHT_ON_DISTANCE = 60.0
@@ -39,7 +41,7 @@ LIMIT_TOLERANCE = 3
 """Excess over the speed limit that is not remarked on [km/h]."""
 
 SPEED_RANGE = (10, 60)
-"""Range of cruise speeds that the Co-Wizard accepts [km/h]."""
+"""Range of cruise speeds that the Co-Wizard accepts in a town with slow traffic [km/h]; elsewhere up to the car's."""
 
 Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]
 """Reaction to an instruction: changes the state (working copy) by the observation, the act and its words."""
@@ -79,6 +81,7 @@ def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
     # a car that was stopped for a place off the map and now must turn round has passed it
     guided = state.beliefs.goal is not None and not state.beliefs.exact
     creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
+    creeping = creeping and state.town.cruise is not None  # elsewhere the car drove fast, and the place is far behind
     state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
     state.dialogue = state.dialogue.with_detour_question(None).after_u_turn_instruction(view.time)
 
@@ -112,6 +115,8 @@ def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words:
     asked = asked_speed(state, view, words.speed, words.faster)
     until = view.time + state.config.slow_time
     state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
+    if state.town.cruise is None and asked < state.config.open_road_speed:
+        state.intentions = state.intentions.calmed(CALM_SPEED)
 
 
 def asked_speed(state: CoWizardState, view: CoWizardView, speed: int | None, faster: bool | None) -> int:
@@ -127,6 +132,8 @@ def asked_speed(state: CoWizardState, view: CoWizardView, speed: int | None, fas
     if asked is None:
         asked = round(view.cruise) + (ASKED_SPEED_CHANGE if faster else -ASKED_SPEED_CHANGE)
     low, high = SPEED_RANGE
+    if state.town.cruise is None:
+        high = int(MAX_CRUISE)
     return min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
 
 

@@ -56,6 +56,7 @@ class Intentions:
         speed: target cruise speed [km/h].
         slow_until: time at which a temporary speed ends [s].
         usual: cruise speed on open road [km/h].
+        asked: whether that was asked for, so that the speed limit has no effect on it.
         lights: target state of the headlights; None if nothing was said about them.
     """
 
@@ -72,6 +73,7 @@ class Intentions:
     speed: int
     slow_until: float = math.inf
     usual: int
+    asked: bool = False
     lights: bool | None = None
 
     def resumed(self) -> Intentions:
@@ -173,7 +175,7 @@ class Intentions:
     def cruise(self) -> CruiseSpeed:
         """Cruise speed that is meant now, and after a temporary one."""
         until = self.slow_until if self.speed < self.usual else math.inf
-        return CruiseSpeed(self.speed, self.usual, until)
+        return CruiseSpeed(self.speed, self.usual, until, by_limit=not self.asked)
 
     def with_speed(self, speed: int) -> Intentions:
         """Sets the target cruise speed [km/h] until further notice; the usual speed stays unchanged."""
@@ -191,8 +193,23 @@ class Intentions:
             open_road: lower speeds are temporary [km/h].
             until: end of a temporary speed [s].
         """
-        usual = speed if speed >= open_road else self.usual
-        return replace(self, speed=speed, usual=usual, slow_until=until)
+        if speed < open_road:
+            return replace(self, speed=speed, slow_until=until)
+        return replace(self, speed=speed, usual=speed, slow_until=until, asked=True)
+
+    def calmed(self, most: int) -> Intentions:
+        """Limits the speed after a temporary one to `most` [km/h], until the end of the trip."""
+        return replace(self, usual=min(self.usual, most), asked=True)
+
+    def unhurried(self) -> Intentions:
+        """Forgets that a speed was asked for, at the end of a trip."""
+        return replace(self, asked=False) if self.asked else self
+
+    def on_lane(self, usual: int) -> Intentions:
+        """Sets the cruise speed of a lane [km/h], unless another one was asked for; a temporary one stays."""
+        if self.asked or usual == self.usual:
+            return self
+        return replace(self, speed=usual if self.speed == self.usual else self.speed, usual=usual)
 
     def with_lights(self, on: bool) -> Intentions:
         """Sets the target state of the headlights."""

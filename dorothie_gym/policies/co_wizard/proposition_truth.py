@@ -42,6 +42,14 @@ SPEED_TOLERANCE: Final = 5.0
 JUNCTION_NEAR: Final = 45.0
 """Distance to a junction from which on the car slows down for it [m]."""
 
+ENDS_WITHIN: Final = 100.0
+"""Distance to the end of a lane within which it explains that the car drives slowly or waits [m]."""
+
+LANE_ENDS: Final = Proposition.of(Predicate.POSSIBLE, action=ActionValue.LANE_FOLLOW, negated=True)
+"""The lane of the car ends, so that it cannot follow the lane."""
+
+_BESIDE: Final = (ObjectClass.UNLABELED, ObjectClass.VEHICLES)  # hazards before which a car waits that changes lanes
+
 CROWD: Final = 3
 """Minimum number of people or vehicles in a crowd."""
 
@@ -72,6 +80,12 @@ def seconds_to_goal(known: CoWizardKnowledge, view: CoWizardView) -> int | None:
 def speed_limit(town: Town, lane: int) -> int:
     """Returns the speed limit of a lane [km/h]."""
     return round(3.6 * town.lanes[lane].speed_limit)
+
+
+def lane_ends(town: Town, view: CoWizardView) -> bool:
+    """Returns whether the lane of the car ends ahead, within sight of its end: it has to leave it, or to turn round."""
+    lane = town.lanes[view.lane]
+    return not town.successors(lane.id) and lane.length - view.station < ENDS_WITHIN
 
 
 def is_localised(view: CoWizardView, most: float) -> bool:
@@ -220,6 +234,8 @@ def reason_to_be_slow(known: CoWizardKnowledge, view: CoWizardView) -> Propositi
     limit = speed_limit(known.town, view.lane)
     if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
         return Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT)
+    if lane_ends(known.town, view) and (view.motion is not Motion.HAZARD or view.hazard in _BESIDE):
+        return LANE_ENDS
     if view.motion is Motion.HAZARD and view.hazard is not ObjectClass.UNLABELED:
         return Proposition.of(Predicate.HINDERS, object=view.hazard)
     if not sees_far(view) and view.cruise < limit - SPEED_TOLERANCE:
@@ -249,6 +265,8 @@ def reason_to_stand(known: CoWizardKnowledge, view: CoWizardView) -> Proposition
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
     if hazard is ObjectClass.TRAFFIC_LIGHT:
         return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(known.town, view) else None
+    if view.motion in (Motion.HAZARD, Motion.WAITING) and lane_ends(known.town, view) and hazard in _BESIDE:
+        return LANE_ENDS
     if hazard is not ObjectClass.UNLABELED:
         return Proposition.of(Predicate.HINDERS, object=hazard)
     if known.halted and since - known.told_to_stop_at < OBEYED_WITHIN:

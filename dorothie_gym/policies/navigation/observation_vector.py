@@ -40,7 +40,7 @@ from dorothie_gym.policies.navigation.observation_fields import (
 )
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
-from dorothie_gym.sim.ego.manoeuvres import find_oncoming
+from dorothie_gym.sim.ego.manoeuvre_lanes import find_oncoming
 from dorothie_gym.sim.ego.path_builder import position_on, project_on
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Motion

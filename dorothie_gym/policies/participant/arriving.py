@@ -22,6 +22,7 @@ from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
+from dorothie_gym.policies.scripted_agent_limits import FASTEST, reach_at, usual_cruise
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     left = progress.left(view.station)
     if view.standing:
         return _guide_standing(state, view, left)
-    close = left < config.stop_distance
+    close = left < reach_at(config.stop_distance, view.speed, state.town)
     if not state.guidance.guiding or _is_sent_a_little(state, view):
         return close  # a car that was sent on a little stops by itself
     prepare_stop(state, view, left, rng)
@@ -251,13 +252,20 @@ def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) ->
     elif _is_about_to_slow_down(state, view):
         gain = GAIN_RANGE[0]
     slow = state.guidance.slowed_early or state.guidance.approach_announced
-    now, top = view.speed, max(config.soon_speed if slow else config.top_speed, view.speed)
+    now, top = view.speed, max(config.soon_speed if slow else _top_speed(state, view), view.speed)
     soon = min(max(now + gain * interval, 0.0), top)
     rooms = []
     for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * interval)):
         then = min(max(speed + gain * delay, 0.0), top)
         rooms.append(ahead - (speed + then) / 2 * delay - stopping_distance(then))
     return rooms[0], rooms[1]
+
+
+def _top_speed(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the largest speed expected of the car on its lane [m/s]."""
+    if state.town.cruise is not None:
+        return state.config.top_speed
+    return min(usual_cruise(state.town, view.lane) / 3.6, FASTEST)
 
 
 def _guide_standing(state: ParticipantState, view: ParticipantView, left: float) -> bool:

@@ -12,6 +12,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.nlg import word_act
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -36,11 +37,13 @@ from dorothie_gym.policies.participant.telling_way import (
     is_described,
     needs_no_reminder,
     tell_way,
+    turn_distance,
     way_back,
 )
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
+from dorothie_gym.policies.scripted_agent_limits import CALM_SPEED, reach_at
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
 from dorothie_gym.support import portable_math as pm
@@ -54,6 +57,9 @@ ANNOUNCING_TIME = 1.5
 
 U_TURN_WAIT = 4.0
 """Standstill on the lane of a U-turn after which the U-turn is announced although it is not near [s]."""
+
+FAST = 50.0
+"""Speed above which the car is asked to slow down long before the place [km/h]."""
 
 WRONG_WAY_EXPIRES = 4.0
 """Time within which a wrong turn is pointed out [s]."""
@@ -166,7 +172,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         turns_round and (_turns_later(state, view) or _takes_run_up(state, view))
     ):
         return
-    near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
+    near = distance < (_u_turn_distance(state, view) if key[0] == "round" else turn_distance(state, view))
     if _has_told_way(state, view, key, distance, rng):
         return
     if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
@@ -247,6 +253,10 @@ def _with_addition(
     state: ParticipantState, view: ParticipantView, words: Remark, again: bool, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
     """Returns a step with a possible addition in the same breath: a hint, or a question whether it was understood."""
+    if _leaves_ending_lane(state, view, words):
+        ends = Proposition.of(Predicate.POSSIBLE, action=ActionValue.LANE_FOLLOW, negated=True)
+        wording = Wording(topic="lane_ends")
+        return words, intend(CommunicativeFunction.INFORM, ends, elided=("action",), wording=wording, joined=True)
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
         # the moment must not be missed: the shorter of two wordings
@@ -258,6 +268,14 @@ def _with_addition(
     if draw < state.style.aligns + 0.7 * state.style.reasons:
         return words, *hint(state, view, rng)
     return (words,)
+
+
+def _leaves_ending_lane(state: ParticipantState, view: ParticipantView, words: Remark) -> bool:
+    """Returns whether a remark asks for the lane switch out of a lane that ends."""
+    side = state.town.merge(view.lane)
+    left = side is LinkType.LANE_CHANGE_LEFT
+    switches = words.act.values(Slot.ACTION) == (ActionValue.LANE_SWITCH,)
+    return side is not None and switches and words.wording.direction is (Direction.LEFT if left else Direction.RIGHT)
 
 
 def _is_left_to_ask(
@@ -286,13 +304,14 @@ def _is_left_to_ask(
 def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Asks the car to slow down for a place that was missed before, or is easily missed after a manoeuvre."""
     progress, config = state.route.to_goal, state.config
-    far = progress.left(view.station) > config.stop_distance
+    fast = state.town.cruise is None and 3.6 * view.speed > FAST
+    far = progress.left(view.station) > (1 + fast) * reach_at(config.stop_distance, view.speed, state.town)
     if state.guidance.slowed_early or far or view.speed < config.slow_speed:
         return False
-    if not state.route.misses and not _is_easily_missed(state, view):
+    if not state.route.misses and not fast and not _is_easily_missed(state, view):
         return False
     state.guidance = state.guidance.after_slowing_early()
-    speed = float(rng.choice(config.careful_speeds))
+    speed = float(rng.choice(config.careful_speeds)) if state.route.misses or not fast else float(CALM_SPEED)
     if 3.6 * view.speed <= speed:
         return False
     wording = Wording(faster=False, speed=speed)

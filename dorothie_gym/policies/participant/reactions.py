@@ -28,7 +28,7 @@ from dorothie_gym.policies.participant.given_orders import turned_round_lately
 from dorothie_gym.policies.participant.stories import purpose_of_target
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
+from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT, usual_cruise
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
 
@@ -200,12 +200,19 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
         progress = state.route.progress
         arrives = progress is not None and progress.left(view.station) < _SPEEDING_UP
         if not arrives and rng.random() < 0.5:
-            speed = round(config.usual_speed)
+            speed = _usual_speed(state, view)
             content, wording = (
                 act_builders.action(ActionValue.SPEED_CHANGE, speed=speed),
                 Wording(faster=True, speed=speed),
             )
             state.say(intend(Function.REQUEST, content, wording=wording))
+
+
+def _usual_speed(state: ParticipantState, view: ParticipantView) -> int:
+    """Returns the speed that the car is expected to drive at where nothing slows it down [km/h]."""
+    if state.town.cruise is not None:
+        return round(state.config.usual_speed)
+    return usual_cruise(state.town, view.lane)
 
 
 def _look_around(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -328,7 +335,7 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
-            speed = round(state.config.usual_speed + 5.0) if rng.random() < 0.5 else None
+            speed = _usual_speed(state, view) + 5 if rng.random() < 0.5 else None
             state.conversation = state.conversation.after_hurrying()
             content = act_builders.action(ActionValue.SPEED_CHANGE, speed=speed)
             return [(intend(Function.REQUEST, content, wording=Wording(faster=True, speed=speed)),)]

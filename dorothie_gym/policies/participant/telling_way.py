@@ -18,6 +18,7 @@ from dorothie_gym.policies.participant.approach_end import ending_behind
 from dorothie_gym.policies.participant.way_ahead import WayStep, way_ahead, way_behind_u_turn, way_remarks
 from dorothie_gym.policies.persona import Directions
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.scripted_agent_limits import reach_at
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
 if TYPE_CHECKING:
@@ -50,7 +51,12 @@ _OWN_WORDS: Final = frozenset({Directions.LANDMARKS, Directions.STREETS, Directi
 
 def is_described(state: ParticipantState, view: ParticipantView, key: StepKey, distance: float) -> bool:
     """Returns whether a step has been described and is not near yet."""
-    return key in state.guidance.way and distance > state.config.turn_distance
+    return key in state.guidance.way and distance > turn_distance(state, view)
+
+
+def turn_distance(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the distance to a junction at which a turn is announced [m]."""
+    return reach_at(state.config.turn_distance, view.speed, state.town)
 
 
 def needs_no_reminder(state: ParticipantState, view: ParticipantView, key: StepKey, rng: np.random.Generator) -> bool:
@@ -80,7 +86,7 @@ def tell_way(
         distance: distance to it [m].
         rng: random generator of the decision.
     """
-    guidance, near = state.guidance, distance < state.config.turn_distance
+    guidance, near = state.guidance, distance < turn_distance(state, view)
     early = distance < EARLY and state.style.manner is not Directions.VAGUE
     if key in guidance.way or guidance.step == key or guidance.looked_ahead == (key, near) or not (near or early):
         return ()

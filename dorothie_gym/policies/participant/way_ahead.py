@@ -27,7 +27,7 @@ from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.road_ahead import Crossing, RoadAhead
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, streets_named
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.policies.turn_lanes import turn_lanes
+from dorothie_gym.policies.turn_lanes import turn_lanes, way_before_change
 from dorothie_gym.support.portable_math import wrap_degrees
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def _turns_of(legs: Sequence[Leg], town: Town, station: float) -> Iterator[Route
             return
         begin = leg.start if place else station
         if following.entry is not LaneEntry.FOLLOW:
-            distance += max(following.start - begin, 0.0)
+            distance += way_before_change(town, leg, following, begin)
             continue
         distance += max(leg.end - begin, 0.0)
         way = next((one for one in town.exits(leg.lane) if one.connector == following.lane), None)

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.sim.ego.limits import KMH
+from dorothie_gym.sim.ego.limits import KMH, cruise_by_limit
 from dorothie_gym.sim.ego.manoeuvres import extend
 from dorothie_gym.sim.ego.path import find_sweeps
 from dorothie_gym.sim.ego.path_builder import find_end, point_before, position_on, project_on
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, Refusal
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
-from dorothie_gym.support.compilation import compiled
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 PATH_BEHIND, PATH_AHEAD = 12.0, 150.0
 """Minimum stretch of path behind and ahead of the ego that is written for the motion control [m]."""
+
+_cruise_by_limit = inlined(cruise_by_limit)
 
 PASSED = 1.0
 """Distance at which a place on the path or beyond the end of a lane is left out [m]."""
@@ -43,6 +45,9 @@ def prepare(town: TownArrays, world: WorldArrays) -> int:
         write_window(world)
     elif plan.written_until < min(car.s + PATH_AHEAD, plan.length):
         write_window(world)
+    lane = town.lanes[plan.lane]
+    if plan.follows and lane.junction < 0:
+        plan.cruise = _cruise_by_limit(lane.limit)
     car.action, car.action_end, car.cruise, car.held = plan.action, plan.end, plan.cruise * KMH, plan.held
     car.manual = plan.manual
     if plan.manual:

@@ -412,7 +412,7 @@ class EgoController:
 
     @cruise.setter
     def cruise(self, speed: float) -> None:
-        self.planner.plan["cruise"] = speed
+        self.planner.plan["cruise"], self.planner.plan["follows"] = speed, False
 
     @property
     def lights(self) -> bool:

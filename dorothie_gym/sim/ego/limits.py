@@ -174,6 +174,14 @@ def may_change_cruise(cruise: float, up: bool) -> bool:
     return MIN_CRUISE <= cruise + (SPEED_STEP if up else -SPEED_STEP) <= MAX_CRUISE
 
 
+def cruise_by_limit(limit: float) -> float:
+    """Returns the cruise speed on a lane with a speed limit [m/s]: a whole number of steps, not below the limit [km/h].
+
+    The path keeps the ego at the limit itself.
+    """
+    return float(min(max(SPEED_STEP * math.ceil(limit / KMH / SPEED_STEP - 1e-6), MIN_CRUISE), MAX_CRUISE))
+
+
 def is_past_stopping(speed: float, room: float) -> bool:
     """Returns whether a moving ego can no longer stop within a distance [m], at a speed [m/s]."""
     return speed > EGO_MOVING and speed * speed / (2 * HARD_STOP) > room

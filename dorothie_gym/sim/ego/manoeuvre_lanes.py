@@ -1,7 +1,7 @@
 """Lanes of a manoeuvre, and the pieces of path along them (compiled).
 
-The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`. A search for a turn appends its search
-tree after them. Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
+The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`; a search for a turn follows them.
+Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
 """
 
 from __future__ import annotations
@@ -9,8 +9,23 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.maps.lane_neighbours import opposite_gap
+from dorothie_gym.maps.model import HEADING, HEIGHT, X, Y
+from dorothie_gym.sim.ego.lane_ends import may_merge, opposite_end
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
-from dorothie_gym.sim.ego.path_builder import follow, keep, switch, u_turn
+from dorothie_gym.sim.ego.path_builder import (
+    PATH_SPACING,
+    append,
+    count_points,
+    follow,
+    keep,
+    position_on,
+    project_on,
+    segment_at,
+    switch,
+    u_turn,
+)
+from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.network.network import ANOTHER_WAY
 from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.support.compilation import compiled
@@ -40,11 +55,14 @@ WAITING_ROOM = 4.5
 MOST_CHANGES = 3
 """Maximum number of lane changes before a turn."""
 
+MERGING, MERGING_TIMES = 60.0, 2.0
+"""Distance before the end of a lane at which the ego leaves it by itself [m], and in lengths of the lane switch."""
+
+WIDEST_GAP = 14.0
+"""Distance beyond which no point of a lane is opposite [m]: more than the diagonal of `lane_neighbours`' limits."""
+
 ALMOST = 1e-3
 """Shortest piece of path [m]."""
-
-
-# --- Lists of lanes ---------------------------------------------------------------------------------------------------
 
 
 @compiled
@@ -106,6 +124,38 @@ def enter_exit(town: TownArrays, world: WorldArrays, number: int) -> bool:
 def misfit_of(town: TownArrays, number: int, angle: int) -> int:
     """Returns the difference between the angle of an exit and another one [degrees]."""
     return abs((town.exits[number].angle - angle + 180) % 360 - 180)
+
+
+@compiled
+def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, float]:
+    """Returns the closest oncoming lane at a station of a lane, -1 for none, and the station on it [m]."""
+    points, lane, ways = town.points, town.lanes[number], town.ways[number]
+    found, at, least = -1, 0.0, math.inf
+    if ways.oncomings == 0:
+        return found, at
+    here = segment_at(points, lane, station)
+    x, y = value_near(points, lane, here, X, station), value_near(points, lane, here, Y, station)
+    heading, height = value_near(points, lane, here, HEADING, station), value_near(points, lane, here, HEIGHT, station)
+    for k in range(ways.oncoming, ways.oncoming + ways.oncomings):
+        other = town.lane_lists[k]
+        beside = town.lanes[other]
+        if max(beside.left_edge - x, x - beside.right_edge, beside.low_edge - y, y - beside.high_edge) > WIDEST_GAP:
+            continue
+        there, _, segment = project(town, other, x, y)
+        there = min(max(there, 0.0), beside.length)
+        gap = opposite_gap(
+            x,
+            y,
+            heading,
+            height,
+            value_near(points, beside, segment, X, there),
+            value_near(points, beside, segment, Y, there),
+            value_near(points, beside, segment, HEADING, there),
+            value_near(points, beside, segment, HEIGHT, there),
+        )
+        if gap < least:
+            found, at, least = other, there, gap
+    return found, at
 
 
 # --- Search for a turn ------------------------------------------------------------------------------------------------
@@ -191,10 +241,17 @@ def _closest_exit(town: TownArrays, lane: int, angle: int) -> int:
 def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, station: float) -> bool:
     """Adds the lanes next to a row of the search that have room for a switch; returns whether the list had room."""
     step = world.steps[row]
-    lane, changes = town.lanes[step.lane], step.changes
+    lane, changes, way_out = town.lanes[step.lane], step.changes, town.ways[step.lane].merge
     left, right = lane.left, lane.right
+    if way_out >= 0 and not _is_seen(world, root, way_out) and not _reach(world, way_out, row, changes, True):
+        return False
     if changes == MOST_CHANGES or not _has_room(town, world, row, station):
         return True
+    # lanes that end lead nowhere
+    if left >= 0 and town.ways[left].merge >= 0:
+        left = -1
+    if right >= 0 and town.ways[right].merge >= 0:
+        right = -1
     if left >= 0 and not _is_seen(world, root, left) and not _reach(world, left, row, changes + 1, True):
         return False
     if right >= 0 and not _is_seen(world, root, right):
@@ -268,18 +325,23 @@ def grow(town: TownArrays, world: WorldArrays, station: float) -> int:
     Returns:
         0, 1 if the path ends where a turn must be chosen or at the end of the map, and -1 if there is no room.
     """
-    plan, steps, ahead = world.plan[0], world.steps, 0.0
+    plan, steps, ways, ahead = world.plan[0], world.steps, town.ways, 0.0
     for k in range(plan.steps):
         if not steps[k].change:
             ahead += town.lanes[steps[k].lane].length
     ahead -= station
     while ahead < LAID:
-        on = town.ways[steps[plan.steps - 1].lane].onward
-        if on < 0:
+        last = int(steps[plan.steps - 1].lane)
+        on = int(ways[last].onward)
+        beside = on < 0 and may_merge(town, last, station if plan.steps == 1 else 0.0)
+        if on < 0 and not beside:
             return 1
-        if not add_step(world, on, False):
+        following = int(ways[last].merge) if beside else on
+        if not add_step(world, following, beside):
             return -1
-        ahead += town.lanes[on].length
+        ahead += town.lanes[following].length
+        if beside:
+            ahead -= opposite_end(town, last, following)
     return 0
 
 
@@ -294,8 +356,9 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
         speed: speed of the ego [m/s], which the length of lane switches depends on.
         write: whether the points are written or only counted.
     """
-    count, steps, at = int(world.plan[0].steps), world.steps, station
-    for k in range(count):
+    count, steps, at, k = int(world.plan[0].steps), world.steps, station, -1
+    while k + 1 < count:
+        k += 1
         number = steps[k].lane
         lane = town.lanes[number]
         changes = 0
@@ -307,19 +370,80 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
             at = 0.0
             continue
         beside = steps[k + 1].lane
-        end = lane.length - (WAITING_ROOM if town.ways[beside].chooses else 0.0)
-        room = max((end - at) / changes - LEAD, 2.0)
+        ends = town.ways[number].merge >= 0
+        end = min(town.ways[number].end, lane.length - (WAITING_ROOM if town.ways[beside].chooses else 0.0))
+        room = max((end - at) / changes - LEAD, MIN_SWITCH if ends else 2.0)
         distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
+        if ends and at + changes * distance > lane.length:
+            if k == 0 and lane.length - at > ALMOST:  # the ego is still on its lane
+                straight = min(LEAD, lane.length - at)
+                follow(town, world, number, at, at + straight, write)
+                at += straight
+            k, at = merge(town, world, k, k + changes, at, changes * distance, write)
+            continue
         spare = (lane.length - at) - changes * (distance + LEAD)
         if k == 0:  # begins late enough to stop before it if others are beside the ego
             most = max(end - at - changes * (distance + LEAD), 0.0)
             lead = LEAD + min(speed * speed / (2.0 * PLANNED_BRAKING), most)
         else:
             lead = min(max(spare, LEAD), SETTLE)
-        begin = min(at + lead, lane.length - distance)
+        begin = at + lead
+        if ends and not world.plan[0].early:  # not long before the end, so that places on the lane can be reached
+            begin = max(begin, end - changes * max(MERGING_TIMES * distance, MERGING))
+        begin = min(begin, (max(end, at + distance) if ends else lane.length) - distance)
         if begin > at + ALMOST:
             follow(town, world, number, at, begin, write)
         at = switch(town, world, number, beside, max(begin, at), distance, write)
+
+
+@compiled
+def merge(
+    town: TownArrays, world: WorldArrays, first: int, step: int, start: float, distance: float, write: bool
+) -> tuple[int, float]:
+    """Lays the way out of a lane close to its end: along a lane beside it and those that follow, drawing near to them.
+
+    The distance from these lanes falls as in `switch`.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        first: step of the plan on the lane that ends.
+        step: step on the lane beside it.
+        start: distance along the first lane at which it begins [m].
+        distance: its length [m].
+        write: whether the points are written or only counted.
+
+    Returns:
+        The step before the one on which it ends, if that is another one than `step`, and the station there [m].
+    """
+    points, steps, last = town.points, world.steps, int(world.plan[0].steps) - 1
+    x, y = position_on(points, town.lanes[steps[first].lane], start)
+    begin, _ = project_on(town, steps[step].lane, x, y)
+    along_x, along_y = position_on(points, town.lanes[steps[step].lane], begin)
+    aside_x, aside_y = x - along_x, y - along_y
+    count = max(3, math.ceil(distance / PATH_SPACING) + 1)
+    limit, station = town.lanes[steps[first].lane].limit, begin
+    writes = count_points(world, count, write)
+    for k in range(count):
+        t = k / (count - 1)
+        station = begin + t * distance
+        while station > town.lanes[steps[step].lane].length and step < last and not steps[step + 1].change:
+            length = town.lanes[steps[step].lane].length
+            begin, station, step = begin - length, station - length, step + 1
+        number = int(steps[step].lane)
+        if writes and station <= town.lanes[number].length:
+            weight = 1.0 - t * t * t * (10.0 - 15.0 * t + 6.0 * (t * t))
+            x, y = position_on(points, town.lanes[number], station)
+            append(
+                world,
+                x + weight * aside_x,
+                y + weight * aside_y,
+                station,
+                min(limit, town.lanes[number].limit),
+                number,
+                True,
+            )
+    return step - 1, min(station, town.lanes[steps[step].lane].length)
 
 
 @compiled

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.lane_neighbours import opposite_gap
-from dorothie_gym.maps.model import HEADING, HEIGHT, LEVEL_HEIGHT, WIDTH, X, Y
+from dorothie_gym.maps.model import HEIGHT, LEVEL_HEIGHT, WIDTH
+from dorothie_gym.sim.ego.lane_ends import may_enter, may_merge
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
     HALF_LENGTH,
@@ -27,6 +27,7 @@ from dorothie_gym.sim.ego.manoeuvre_lanes import (
     add_step,
     begin_steps,
     cross_junction,
+    find_oncoming,
     find_turn,
     grow,
     lay_head,
@@ -42,10 +43,8 @@ from dorothie_gym.sim.ego.path_builder import (
     point_before,
     position_on,
     project_on,
-    segment_at,
     value_on,
 )
-from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.state.codes import (
     J_TURN,
     LANE_FOLLOW,
@@ -71,9 +70,6 @@ BEGIN = 0
 
 LAST_PIECE = 0.5
 """End of a lane that is laid where nothing else is left [m]."""
-
-WIDEST_GAP = 14.0
-"""Distance beyond which no point of a lane is opposite [m]: more than the diagonal of `lane_neighbours`' limits."""
 
 _has_room_to_switch, _is_past_stopping = inlined(has_room_to_switch), inlined(is_past_stopping)
 _u_turn_braking = inlined(u_turn_braking)
@@ -113,6 +109,10 @@ def find_place(town: TownArrays, world: WorldArrays) -> None:
             last -= 1
         plan.choice = course[k].lane
         plan.choice_at = course[last].s + (town.lanes[plan.choice].length - course[last].station)
+    elif plan.open_end:  # close to the end of a lane that ends beside a junction
+        merge = town.ways[course[plan.points - 1].lane].merge
+        if merge >= 0 and town.ways[merge].chooses:
+            plan.choice, plan.choice_at = merge, plan.length
 
 
 @compiled
@@ -122,6 +122,21 @@ def note_place(town: TownArrays, world: WorldArrays) -> None:
     if plan.action > 0 and world.car[0].s >= plan.end:
         plan.action = plan.angle = 0
     find_place(town, world)
+    if plan.off_line and plan.action == 0:
+        _note_merge(town, world)
+
+
+@compiled
+def _note_merge(town: TownArrays, world: WorldArrays) -> None:
+    """Makes the lane switch out of a lane that ends, which the ego has begun by itself, its present manoeuvre."""
+    plan, course, k = world.plan[0], world.course, int(world.plan[0].at)
+    while k + 1 < plan.points and course[k + 1].manoeuvre:
+        k += 1
+    left, right = town.lanes[plan.lane].left, town.lanes[plan.lane].right
+    from_left = left >= 0 and town.ways[left].merge == plan.lane
+    from_right = right >= 0 and town.ways[right].merge == plan.lane
+    if course[k].s > world.car[0].s and (from_left or from_right):
+        plan.action, plan.angle, plan.end = LANE_SWITCH, LEFT if from_right else -LEFT, course[k].s
 
 
 @compiled
@@ -147,7 +162,7 @@ def find_feasible(town: TownArrays, world: WorldArrays, speed: float) -> int:
         found |= Feasible.SWITCH_LEFT
     if plan_switch(town, world, False, speed)[0] == Refusal.NONE:
         found |= Feasible.SWITCH_RIGHT
-    if town.lanes[plan.lane].left < 0 and plan_u_turn(town, world, speed)[0] == Refusal.NONE:
+    if plan_u_turn(town, world, speed)[0] == Refusal.NONE:
         found |= Feasible.U_TURN
     return found
 
@@ -157,6 +172,13 @@ def _is_busy(town: TownArrays, world: WorldArrays) -> bool:
     """Returns whether the ego is off the centre lines or in a junction."""
     plan = world.plan[0]
     return plan.off_line or town.lanes[plan.lane].junction >= 0
+
+
+@inlined
+def _leads_nowhere(town: TownArrays, number: int, station: float) -> bool:
+    """Returns whether a lane ends, and from a station [m] there is no room for a lane switch any more."""
+    ways = town.ways[number]
+    return bool(ways.exits == 0 and ways.merge < 0 and not _has_room_to_switch(town.lanes[number].length - station))
 
 
 @compiled
@@ -169,7 +191,9 @@ def plan_switch(town: TownArrays, world: WorldArrays, left: bool, speed: float) 
     target = lane.left if left else lane.right
     if target < 0:
         return Refusal.NO_LANE_LEFT if left else Refusal.NO_LANE_RIGHT, -1
-    if not _has_room_to_switch(lane.length - plan.station):
+    merges = target == town.ways[plan.lane].merge and may_merge(town, plan.lane, plan.station)
+    enters = merges or may_enter(town, plan.lane, target, plan.station, speed)
+    if not enters or not (merges or _has_room_to_switch(lane.length - plan.station)):
         return Refusal.NO_ROOM_LEFT if left else Refusal.NO_ROOM_RIGHT, -1
     if plan.props > 0:
         x, y = position_on(town.points, lane, plan.station)
@@ -187,6 +211,8 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     lane, station = town.lanes[plan.lane], plan.station
     if _is_busy(town, world):
         return Refusal.IN_MANOEUVRE, -1, 0.0, 0.0
+    if lane.left >= 0 and not _leads_nowhere(town, plan.lane, station):
+        return Refusal.NOT_LEFTMOST, -1, 0.0, 0.0
     begin = station + LEAD * (speed > EGO_MOVING) + _u_turn_braking(speed, U_TURN_SPEED * U_TURN_SPEED)
     other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other >= 0:
@@ -196,7 +222,7 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
             begin += short
             other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other < 0:
-        return Refusal.NOT_LEFTMOST if lane.left >= 0 else Refusal.NO_ONCOMING, -1, 0.0, 0.0
+        return Refusal.NO_ONCOMING, -1, 0.0, 0.0
     if speed > EGO_MOVING and begin - station + U_TURN_REACH > world.car[0].roadblock:
         return Refusal.PROP_AHEAD, -1, 0.0, 0.0
     if begin > lane.length + 0.5:
@@ -204,38 +230,6 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     if _is_blocked(town, world, other, there - U_TURN_REACH, there + LANDING + MANOEUVRE_PROP_GAP):
         return Refusal.PROP_ONCOMING, -1, 0.0, 0.0
     return Refusal.NONE, other, there, min(begin, lane.length)
-
-
-@compiled
-def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, float]:
-    """Returns the closest oncoming lane at a station of a lane, -1 for none, and the station on it [m]."""
-    points, lane, ways = town.points, town.lanes[number], town.ways[number]
-    found, at, least = -1, 0.0, math.inf
-    if ways.oncomings == 0:
-        return found, at
-    here = segment_at(points, lane, station)
-    x, y = value_near(points, lane, here, X, station), value_near(points, lane, here, Y, station)
-    heading, height = value_near(points, lane, here, HEADING, station), value_near(points, lane, here, HEIGHT, station)
-    for k in range(ways.oncoming, ways.oncoming + ways.oncomings):
-        other = town.lane_lists[k]
-        beside = town.lanes[other]
-        if max(beside.left_edge - x, x - beside.right_edge, beside.low_edge - y, y - beside.high_edge) > WIDEST_GAP:
-            continue
-        there, _, segment = project(town, other, x, y)
-        there = min(max(there, 0.0), beside.length)
-        gap = opposite_gap(
-            x,
-            y,
-            heading,
-            height,
-            value_near(points, beside, segment, X, there),
-            value_near(points, beside, segment, Y, there),
-            value_near(points, beside, segment, HEADING, there),
-            value_near(points, beside, segment, HEIGHT, there),
-        )
-        if gap < least:
-            found, at, least = other, there, gap
-    return found, at
 
 
 @compiled
@@ -446,6 +440,7 @@ def _replace(
         `Refusal.NONE`, or `Refusal.NO_SPACE`; then nothing has changed.
     """
     plan, car, course = world.plan[0], world.car[0], world.course
+    plan.early = action == LANE_SWITCH
     open_end = grow(town, world, station)
     x, y = (0.0, 0.0) if fresh else place_of_ego(world)
     laid = -1 if open_end < 0 else _lay(town, world, station, speed, first, end, oncoming, start, open_end > 0)

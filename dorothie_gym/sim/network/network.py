@@ -14,7 +14,7 @@ from highway_env.road.road import RoadNetwork
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.maps.model import HEIGHT, Array, Exit, Lane, LaneTable, LinkType
+from dorothie_gym.maps.model import HEIGHT, LANE_CHANGES, Array, Exit, Lane, LaneTable, LinkType
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.lane_lookup import GridIndex
@@ -315,8 +315,7 @@ class TownNetwork(RoadNetwork):
         return RoadNetwork.from_config(config)
 
     def _find_side_lanes(self, lane_id: int) -> list[LaneIndex]:
-        sides = LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT
-        neighbours = (self.town.neighbour(lane_id, side) for side in sides)
+        neighbours = (self.town.neighbour(lane_id, side) for side in LANE_CHANGES)
         return [self.index_of(lane) for lane in neighbours if lane is not None]
 
 
@@ -343,8 +342,6 @@ def network_of(town: Town) -> TownNetwork:
 
 ANOTHER_WAY = 15.0
 """Difference in angle at which exits count as different turns [degrees]."""
-
-SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 
 
 class LaneExits(NamedTuple):
@@ -373,6 +370,11 @@ def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
         exits += [(way.connector, way.lane, way.angle, lanes[way.connector].junction) for way in found]
         record.chooses = _is_choice(found)
         record.onward = NOBODY
+        record.end, record.merge = lane.length, NOBODY
+        side = town.merge(lane.id)
+        beside_end = None if side is None else town.neighbour(lane.id, side)
+        if beside_end is not None:
+            record.end, record.merge = lane.wide_until, beside_end
         if found and not record.chooses:
             record.onward = min(found, key=lambda way: (abs(way.angle), way.connector)).connector
         beside, candidates = side_by_side(town, lane.id), oncoming.candidates(lane.id).tolist()
@@ -390,7 +392,7 @@ def side_by_side(town: Town, lane: int) -> list[int]:
     """Returns a lane and all that are reached from it by lane changes."""
     found = [lane]
     for known in found:
-        for side in SIDES:
+        for side in LANE_CHANGES:
             beside = town.neighbour(known, side)
             if beside is not None and beside not in found:
                 found.append(beside)

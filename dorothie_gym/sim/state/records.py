@@ -90,11 +90,13 @@ class PlanRecord:
     action: Int32  # manoeuvre planned or in progress: a `PhysicalAction` or 0
     angle: Int32  # its angle [degrees], positive left
     end: Float  # distance along the path at which it ends [m]
+    early: Flag  # whether a lane that ends is left as soon as possible
     connector: Int32  # connector and lane of the planned turn
     exit: Int32
     held: Flag  # whether the ego stands by the action Stop
     lights: Flag  # whether the headlights are on
     cruise: Float  # desired speed [km/h]
+    follows: Flag  # whether that is the speed limit of the lane, until another speed is set
     manual: Flag  # whether an outside driver gives throttle, steer and brake
     throttle: Float
     steer: Float

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.model import WIDTH, Array, Lane, LaneTable, LinkType, SignalKind
+from dorothie_gym.maps.model import NARROW, WIDTH, Array, Lane, LaneTable, LinkType, SignalKind
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
 from dorothie_gym.sim.network.lane_lookup import CELL_REACH, SLACK, build_cells
 from dorothie_gym.sim.network.network import TownNetwork, build_exits
@@ -29,7 +29,7 @@ from dorothie_gym.sim.state.town_records import (
     StopLineRecord,
     WalkwayRecord,
 )
-from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
+from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS, VEHICLE_SPEEDS
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import RecordArray, by_reference, empty_records, filled_records
 from dorothie_gym.support.copying import shared
@@ -168,6 +168,7 @@ def _build(network: TownNetwork) -> TownArrays:
     lanes = empty_records(LaneRecord, len(town.lanes))
     for lane in town.lanes:
         _describe(lanes[lane.id], lane, network.row(network.index_of(lane.id)), network.table)
+        lanes[lane.id].pace = 1.0 if town.cruise is not None else lane.speed_limit / VEHICLE_SPEEDS[1]
     neighbours = _link(town, lanes)
     _find_cycling(lanes, neighbours)
     relations = _relate(town, lanes, right_of_way(town))
@@ -191,7 +192,8 @@ def _describe(record: LaneRecord, lane: Lane, row: int, table: LaneTable) -> Non
     record.length = float(table.points[table.offsets[row + 1] - 1, 2])
     record.limit = lane.speed_limit
     record.curve_speed = curve_speed(lane)
-    record.half_width = float(lane.widths.min()) / 2
+    least = float(lane.widths.min())
+    record.half_width = (least if least >= NARROW else float(np.median(lane.widths))) / 2
     record.cos_first, record.sin_first, record.cos_last, record.sin_last = table.ends[row]
     record.left_edge, record.low_edge, record.right_edge, record.high_edge = table.boxes[row]
     record.first, record.last = table.offsets[row], table.offsets[row + 1] - 1

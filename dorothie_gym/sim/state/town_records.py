@@ -15,6 +15,7 @@ class LaneRecord:
 
     length: Float  # [m]
     limit: Float  # speed limit [m/s]
+    pace: Float  # factor on the desired speeds of cars: the fastest drive at the limit; 1 where traffic is slow
     curve_speed: Float  # speed in its tightest bend [m/s]
     half_width: Float  # [m]
     cos_first: Float  # directions of its two ends
@@ -53,6 +54,8 @@ class LaneExitsRecord:
 
     exit: Int32  # rows of `exits`, from right to left
     exits: Int32
+    end: Float  # station up to which it is wide enough for a car [m]
+    merge: Int32  # of a lane that ends: the lane beside it to change to, or -1
     onward: Int32  # lane that follows by default, or -1: the only one, or outside junctions the straightest
     chooses: Flag  # whether a turn must be chosen at its end
     offers: Flag  # whether the junction at its end offers a turn, from this lane or from one beside it

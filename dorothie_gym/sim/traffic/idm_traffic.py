@@ -30,6 +30,7 @@ from dorothie_gym.sim.traffic.parameters import (
 from dorothie_gym.sim.traffic.vehicle_models import (
     brake_to,
     change_lanes,
+    desired_on,
     extend,
     follow_road,
     following_acceleration,
@@ -78,7 +79,7 @@ def drive(town: TownArrays, world: WorldArrays, i: int) -> None:
 def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
     """Returns the acceleration by all that is ahead on the planned lanes [m/s^2], not limited yet."""
     vehicle = world.vehicles[i]
-    target, stop = vehicle.desired, math.inf
+    target, stop = desired_on(town.lanes[vehicle.lane], vehicle), math.inf
     front, gap = NOBODY, math.inf
     begin = -vehicle.station  # of a lane, from the vehicle's centre
     junction, line = NOBODY, 0.0
@@ -107,8 +108,9 @@ def _acceleration(town: TownArrays, world: WorldArrays, i: int) -> float:
         vehicle.blocked = world.nodes[front].body >= len(world.vehicles)
     if vehicle.lane != vehicle.plan[0]:
         found = min(found, free - _held_up_beside(town, world, i))
-    if town.lanes[vehicle.plan[vehicle.planned - 1]].successors == 0:
-        left = begin - 0.5 * vehicle.length - LINE_GAP
+    last = int(vehicle.plan[vehicle.planned - 1])
+    if town.lanes[last].successors == 0:
+        left = begin - (town.lanes[last].length - town.ways[last].end) - 0.5 * vehicle.length - LINE_GAP
         if left < vehicle.speed * vehicle.speed / (2.0 * STOP_BRAKING) + ASKING:
             stop = min(stop, brake_to(vehicle.speed, left))
     stop = min(stop, _give_way_to_turning(town, world, vehicle))

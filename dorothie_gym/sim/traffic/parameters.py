@@ -91,6 +91,10 @@ STOPPED = 0.05
 CHANGE_TIME = 3.0
 """Duration of a lane change [s]; none begins where the lane ends sooner."""
 
+VEHICLE_SPEEDS = 6.5, 10.0
+"""Range of the desired speeds of cars [m/s], in towns with slow traffic; elsewhere they are shares of the limit."""
+
+
 # --- Cyclists ---------------------------------------------------------------------------------------------------------
 
 CYCLIST_LENGTH, CYCLIST_WIDTH = 1.8, 0.7

@@ -148,6 +148,12 @@ def not_zero(x: float) -> float:
 
 
 @inlined
+def desired_on(lane: LaneRecord, vehicle: VehicleRecord) -> float:
+    """Returns the desired speed of a vehicle on a lane [m/s]."""
+    return float(vehicle.desired * lane.pace) if vehicle.kind == Kind.CAR else float(vehicle.desired)
+
+
+@inlined
 def free_acceleration(speed: float, target: float, limit: float) -> float:
     """Returns the acceleration towards a target speed on a free road, on a lane with a speed limit [m/s^2]."""
     share = max(speed, 0.0) / abs(not_zero(min(max(target, 0.0), limit)))
@@ -267,7 +273,10 @@ GIVING_UP = 1.0
 
 @inlined
 def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
-    """Considers a lane change, once in `LANE_CHANGE_DELAY`, or gives up a change that is in progress."""
+    """Considers a lane change, once in `LANE_CHANGE_DELAY`, or gives up a change that is in progress.
+
+    A lane that ends is left as soon as there is room beside it, also from a standstill at its end.
+    """
     vehicle = world.vehicles[i]
     if vehicle.lane != vehicle.plan[0]:
         lane = town.lanes[vehicle.lane]
@@ -281,21 +290,24 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
     vehicle.timer = 0.0
     lane = town.lanes[vehicle.lane]
     left = lane.length - vehicle.station
-    if lane.junction >= 0 or vehicle.claim >= 0 or vehicle.inside >= 0 or abs(vehicle.speed) < 1.0:
+    if lane.junction >= 0 or vehicle.claim >= 0 or vehicle.inside >= 0:
         return
-    if lane.successors > 0 and left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
+    if lane.successors == 0:
+        _consider(town, world, i, lane, int(town.ways[vehicle.lane].merge))
         return
-    if vehicle.kind == Kind.CYCLIST and lane.successors > 0:
+    if abs(vehicle.speed) < 1.0 or left < CAR_LENGTH + CHANGE_TIME * vehicle.speed:
+        return
+    if vehicle.kind == Kind.CYCLIST:
         _move_over(town, world, i, lane)
         return
-    if lane.left >= 0:
-        _consider(town, world, i, lane, int(lane.left))
-    if lane.right >= 0:
-        _consider(town, world, i, lane, int(lane.right))
+    _consider(town, world, i, lane, int(lane.left))
+    _consider(town, world, i, lane, int(lane.right))
 
 
 @compiled
 def _consider(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord, side: int) -> None:
+    if side < 0:
+        return
     vehicle = world.vehicles[i]
     beside = town.lanes[side]
     if beside.successors == 0 and lane.successors > 0:
@@ -336,7 +348,8 @@ def mobil(town: TownArrays, world: WorldArrays, i: int, side: int, station: floa
     if rear >= 0 and world.nodes[rear].body < len(world.vehicles):
         follower = world.vehicles[world.nodes[rear].body]
         along = vehicle.speed * (vehicle.cos * follower.cos + vehicle.sin * follower.sin)
-        imposed = free_acceleration(follower.speed, follower.desired, town.lanes[follower.lane].limit)
+        behind_on = town.lanes[follower.lane]
+        imposed = free_acceleration(follower.speed, desired_on(behind_on, follower), behind_on.limit)
         imposed -= following_acceleration(follower.speed, along, behind, 0.5 * (vehicle.length + follower.length))
         if imposed < -LANE_CHANGE_BRAKING:
             return False

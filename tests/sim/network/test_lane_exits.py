@@ -8,7 +8,7 @@ import pytest
 from dorothie_gym.maps import LinkType
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.maps.model import HEADING, HEIGHT, WIDTH
-from dorothie_gym.sim.ego.manoeuvres import find_oncoming
+from dorothie_gym.sim.ego.manoeuvre_lanes import find_oncoming
 from dorothie_gym.sim.ego.path_builder import position_on, project_on, value_on
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from tests.sim.driving import network

@@ -50,6 +50,7 @@ _NOW: Final = 4.0  # tolerance of "now" [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
 _CROWD: Final = 3  # minimum number in a crowd
+_END_IN_SIGHT: Final = 120.0  # distance to the end of a lane that keeps the car from following it [m]
 _IN_FRONT: Final = 15.0  # largest distance from the centre of the car to the body that it waits behind [m]
 _AHEAD: Final = 25.0  # and its largest angle to the heading [degrees]
 _TOLD: Final = 60.0  # longest time between an order and the action that it explains [s]
@@ -336,12 +337,24 @@ def _blocked(world: SessionWorld, cause: Proposition, time: float) -> bool | Non
     return math.isfinite(nearest) and nearest < SIGHT
 
 
+def _impossible(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    """Whether the lane of the car ends ahead, where that keeps it from following the lane."""
+    if cause.get("action") is not ActionValue.LANE_FOLLOW or not cause.negated:
+        return None
+    places = [world.place(time + shift) for shift in (-_NOW, -2.0, 0.0)]
+    return any(
+        not world.town.successors(lane) and world.town.lanes[lane].length - station < _END_IN_SIGHT
+        for lane, station in places
+    )
+
+
 _CAUSES: Final[dict[Predicate, Callable[[SessionWorld, Proposition, float], bool | None]]] = {
     Predicate.RED: _red,
     Predicate.HINDERS: _hinders,
     Predicate.TOLD: _told,
     Predicate.BEHIND: _behind,
     Predicate.BLOCKED: _blocked,
+    Predicate.POSSIBLE: _impossible,
     Predicate.ARRIVED: lambda world, cause, time: _arrived(world, cause, time, Role.CO_WIZARD),
     Predicate.GOAL: lambda world, cause, time: world.goal_named(time) and world.believed_goal(time) is not None,
 }
