@@ -20,6 +20,7 @@ from typing import Any, TypeAlias, TypedDict, get_type_hints
 import numpy as np
 
 from dorothie_gym.errors import InputFileError, TownArchiveError, one_line
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.model import (
     NO_STREET,
     Array,
@@ -41,7 +42,7 @@ from dorothie_gym.support.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, r
 from dorothie_gym.support.schemas import convert
 from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, remove, write_signed
 
-ARCHIVE_FORMAT = 1
+ARCHIVE_FORMAT = 2
 """Version of the archive format; raise it when the same town would be written differently."""
 
 MAX_ARCHIVE = 512 * MIB
@@ -78,7 +79,7 @@ def pack(town: Town, key: str) -> bytes:
         key: key of the archive, checked by `unpack`.
     """
     arrays: list[Array] = []
-    document: dict[str, object] = {"format": ARCHIVE_FORMAT, "key": key, "name": town.name}
+    document: dict[str, object] = {"format": ARCHIVE_FORMAT, "key": key, "name": town.name, "traffic": town.traffic}
     for part, kind in PARTS.items():
         elements = getattr(town, part)
         document[part] = {
@@ -111,7 +112,7 @@ def unpack(data: bytes, key: str) -> Town:
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
             raise TownArchiveError("it is of another format or another town")
-        return _town(document["name"], document, floats)
+        return _town(document["name"], DrivingSide(document["traffic"]), document, floats)
     except TownArchiveError:
         raise
     except (
@@ -143,7 +144,7 @@ def _plain(value: object) -> object:
     raise TypeError(f"a town cannot be archived with a {type(value).__name__} in it: {value!r}")
 
 
-def _town(name: str, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
+def _town(name: str, traffic: DrivingSide, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
     if not isinstance(name, str) or floats.dtype != np.float64 or floats.ndim != 1:
         raise TownArchiveError("its name is no text, or its numbers are no floats")
     numbers = _ArrayReader(floats)
@@ -155,7 +156,7 @@ def _town(name: str, document: Mapping[str, Mapping[str, _Column]], floats: Arra
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
         raise TownArchiveError("it holds more numbers than its town has")
-    town = Town(name=name, **parts)
+    town = Town(name=name, traffic=traffic, **parts)
     if fault := next(_faults(town), None):
         raise TownArchiveError(f"it holds no sound town: {fault}")
     return town

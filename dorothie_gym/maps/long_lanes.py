@@ -85,6 +85,7 @@ def cut_long_lanes(town: Town, notes: ImportNotes | None = None) -> Town:
         crosswalks=town.crosswalks,
         sidewalks=town.sidewalks,
         programmes=town.programmes,
+        traffic=town.traffic,
     )
 
 

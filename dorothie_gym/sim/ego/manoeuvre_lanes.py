@@ -192,13 +192,13 @@ def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, sta
     """Adds the lanes next to a row of the search that have room for a switch; returns whether the list had room."""
     step = world.steps[row]
     lane, changes = town.lanes[step.lane], step.changes
-    left, right = lane.left, lane.right
+    inner, outer = lane.inner, lane.outer
     if changes == MOST_CHANGES or not _has_room(town, world, row, station):
         return True
-    if left >= 0 and not _is_seen(world, root, left) and not _reach(world, left, row, changes + 1, True):
+    if inner >= 0 and not _is_seen(world, root, inner) and not _reach(world, inner, row, changes + 1, True):
         return False
-    if right >= 0 and not _is_seen(world, root, right):
-        return _reach(world, right, row, changes + 1, True)
+    if outer >= 0 and not _is_seen(world, root, outer):
+        return _reach(world, outer, row, changes + 1, True)
     return True
 
 

@@ -147,7 +147,7 @@ def find_feasible(town: TownArrays, world: WorldArrays, speed: float) -> int:
         found |= Feasible.SWITCH_LEFT
     if plan_switch(town, world, False, speed)[0] == Refusal.NONE:
         found |= Feasible.SWITCH_RIGHT
-    if town.lanes[plan.lane].left < 0 and plan_u_turn(town, world, speed)[0] == Refusal.NONE:
+    if town.lanes[plan.lane].inner < 0 and plan_u_turn(town, world, speed)[0] == Refusal.NONE:
         found |= Feasible.U_TURN
     return found
 
@@ -196,7 +196,9 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
             begin += short
             other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other < 0:
-        return Refusal.NOT_LEFTMOST if lane.left >= 0 else Refusal.NO_ONCOMING, -1, 0.0, 0.0
+        if lane.inner < 0:
+            return Refusal.NO_ONCOMING, -1, 0.0, 0.0
+        return Refusal.NOT_LEFTMOST if town.sign > 0.0 else Refusal.NOT_RIGHTMOST, -1, 0.0, 0.0
     if speed > EGO_MOVING and begin - station + U_TURN_REACH > world.car[0].roadblock:
         return Refusal.PROP_AHEAD, -1, 0.0, 0.0
     if begin > lane.length + 0.5:
@@ -232,6 +234,7 @@ def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, f
             value_near(points, beside, segment, Y, there),
             value_near(points, beside, segment, HEADING, there),
             value_near(points, beside, segment, HEIGHT, there),
+            town.sign,
         )
         if gap < least:
             found, at, least = other, there, gap
