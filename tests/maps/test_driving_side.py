@@ -140,6 +140,12 @@ def test_a_left_hand_ring_is_driven_clockwise(tmp_path: Path) -> None:
         assert sense * sum(turned) > 3.0  # headings grow clockwise
 
 
+SQUARE = (
+    "traffic: left\njunctions: {a: [0, -50], b: [200, -50], c: [0, -250], d: [200, -250]}\n"
+    "streets: {One: [a, b], Two: [c, d], Three: [a, c], Four: [b, d]}\n"
+)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -148,10 +154,10 @@ def test_a_left_hand_ring_is_driven_clockwise(tmp_path: Path) -> None:
         (MIDTOWN.replace("speed: 50\n", "speed: 50\ntraffic: british\n"), "unknown side 'british'"),
         (LEFT_HAND.replace("turn_lanes: [market]", "turn_lanes: [circus]"), "roundabout, which has no right turns"),
         (
-            "traffic: left\njunctions: {a: [0, -50], b: [200, -50], c: [100, 0], d: [100, -120]}\n"
-            "streets: {One: [a, b, [300, -50], [300, 90], [-90, 90], [-90, -50], a], Two: [c, d]}\n",
-            r"touches street '\w+' near \[\d+, -\d+\]",
+            SQUARE.replace("Four: [b, d]", "Four: {through: [b, [200, -100], [190, -100], d], radius: 40}"),
+            r"the bend at \[200\.0, -100\.0\]",
         ),
+        (SQUARE.replace("Four: [b, d]", "Four: [b, d], Five: [a, d], Six: [b, c]"), r"near \[9\d, -1\d\d\]"),
     ],
 )
 def test_messages_are_about_the_file_and_not_its_mirror_image(tmp_path: Path, text: str, message: str) -> None:

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.yaml.geometry import Point
 
 LIGHTS_KEYS = ("at", "offset", "phases")
+PHASE_KEYS = ("green", "left", "right", "seconds")
 TRAFFIC = tuple(str(side) for side in DrivingSide)
 SECONDS = (3.0, 300.0)
 """Range of phase durations [s]."""
@@ -160,8 +161,9 @@ def _phases(entry: YamlEntry, junction: str, streets: Sequence[StreetPlan]) -> t
 
 
 def _phase(entry: YamlEntry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]) -> GreenPlan:
-    turns = str(streets[0].traffic.far_turn)  # "left", or "right" where traffic keeps to the left
-    fields = entry.fields(("green", turns, "seconds"), required=("seconds",))
+    traffic = streets[0].traffic
+    turns = str(traffic.far_turn)  # those of the lanes in the median
+    fields = entry.fields([key for key in PHASE_KEYS if key != traffic.near_turn], required=("seconds",))
     green = _green(fields["green"], junction, here, streets) if "green" in fields else ()
     turning = _green(fields[turns], junction, here, streets) if turns in fields else ()
     if not green and not turning:
@@ -196,7 +198,7 @@ def _green(
 # --- Whole town ------------------------------------------------------------------------------------------------------
 
 TOWN_KEYS = (
-    "name", "traffic", "speed", "width", "sidewalk", "junctions", "streets", "lights", "stops", "yields", "crosswalks",
+    "name", "speed", "width", "sidewalk", "traffic", "junctions", "streets", "lights", "stops", "yields", "crosswalks",
     "sites",
 )  # fmt: skip
 JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
