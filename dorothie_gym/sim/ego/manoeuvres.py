@@ -225,17 +225,10 @@ def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, f
             continue
         there, _, segment = project(town, other, x, y)
         there = min(max(there, 0.0), beside.length)
-        gap = opposite_gap(
-            x,
-            y,
-            heading,
-            height,
-            value_near(points, beside, segment, X, there),
-            value_near(points, beside, segment, Y, there),
-            value_near(points, beside, segment, HEADING, there),
-            value_near(points, beside, segment, HEIGHT, there),
-            town.sign,
-        )
+        to_x, to_y = value_near(points, beside, segment, X, there), value_near(points, beside, segment, Y, there)
+        course = value_near(points, beside, segment, HEADING, there)
+        level = value_near(points, beside, segment, HEIGHT, there)
+        gap = opposite_gap(x, y, heading, height, to_x, to_y, course, level, town.sign)
         if gap < least:
             found, at, least = other, there, gap
     return found, at
