@@ -9,6 +9,7 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.maps import (
     DrivingSide,
     ImportNote,
+    Lane,
     LinkType,
     NoteKind,
     Town,
@@ -26,7 +27,8 @@ from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 from dorothie_gym.maps.yaml import read_yaml_town
 
-from .opendrive_text import geometry, lane, opendrive, road, section
+from .mirrored_opendrive import mirror
+from .opendrive_text import geometry, lane, opendrive, road, section, shared_map
 from .yaml_text import MIDTOWN, written
 
 LEFT, RIGHT = DrivingSide.LEFT, DrivingSide.RIGHT
@@ -226,3 +228,25 @@ def test_turns_across_oncoming_traffic_wait_in_left_hand_traffic() -> None:
     assert RIGHT.crosses_oncoming(LinkType.LEFT) and not RIGHT.crosses_oncoming(LinkType.RIGHT)
     assert all(side.crosses_oncoming(LinkType.U_TURN) for side in DrivingSide)
     assert LEFT.as_right_hand(LinkType.LANE_CHANGE_LEFT) is LinkType.LANE_CHANGE_RIGHT
+
+
+def test_the_mirror_image_of_a_file_is_the_mirror_image_of_its_town(tmp_path: Path) -> None:
+    source = shared_map("Town02")
+    mirror(source, tmp_path / "Town02.xodr")
+    (town, _), (left, _) = import_opendrive(source), import_opendrive(tmp_path / "Town02.xodr")
+    assert left.traffic is LEFT
+    image = mirrored(left)
+
+    def ends(lane: Lane) -> tuple[int, ...]:
+        return lane.road_id, *np.round(lane.points[[0, -1]].ravel(), 2).tolist()
+
+    ids = {ends(row): row.id for row in town.lanes}
+    same = {row.id: ids[ends(row)] for row in image.lanes}  # lanes may be in another order
+    assert sorted(same.values()) == list(range(len(town.lanes)))
+    links = {(same[link.source], same[link.target], link.type) for link in image.links}
+    assert links == {(link.source, link.target, link.type) for link in town.links}
+    assert {(same[site.lane], round(site.station, 1)) for site in image.sites} == {
+        (site.lane, round(site.station, 1)) for site in town.sites
+    }
+    ruled = {(signal.kind, frozenset(same[lane] for lane in signal.lanes)) for signal in image.signals}
+    assert ruled == {(signal.kind, frozenset(signal.lanes)) for signal in town.signals}
