@@ -64,9 +64,11 @@ def towns(
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 drawing.town_picture(loaded, picture, fold=town_maps.fold_of(loaded.name))
     if as_json:
-        print_json(_check_report(loaded.name, faults, notes) if check else facts)
+        print_json(_check_report(loaded, faults, notes) if check else facts)
     else:
         if check:
+            if loaded.traffic is town_maps.DrivingSide.LEFT:
+                stdout().print("left-hand traffic")
             _show_notes(notes)
             _show_faults(facts, faults)
         else:
@@ -284,8 +286,11 @@ def _show_notes(notes: Sequence[town_maps.ImportNote]) -> None:
             console.print(f"  and {len(found) - NOTES_SHOWN} more; --json lists all", style="dim", markup=False)
 
 
-def _check_report(name: str, faults: Sequence[town_maps.Fault], notes: Sequence[town_maps.ImportNote]) -> Facts:
-    report: Facts = {"town": name, "faults": [_fault_row(fault) for fault in faults]}
+def _check_report(
+    town: town_maps.Town, faults: Sequence[town_maps.Fault], notes: Sequence[town_maps.ImportNote]
+) -> Facts:
+    report: Facts = {"town": town.name, "traffic": str(town.traffic)}
+    report["faults"] = [_fault_row(fault) for fault in faults]
     return report | {str(action): _note_rows(notes, action) for action in town_maps.NoteAction}
 
 

@@ -7,12 +7,14 @@ from .catalogue import fold_of as fold_of
 from .catalogue import import_report as import_report
 from .catalogue import load_town as load_town
 from .catalogue import town_names as town_names
+from .driving_side import DrivingSide as DrivingSide
 from .import_notes import ImportNote as ImportNote
 from .import_notes import NoteAction as NoteAction
 from .import_notes import NoteKind as NoteKind
 from .lint import check_town as check_town
 from .lint.fault import Fault as Fault
 from .lint.fault import FaultKind as FaultKind
+from .mirroring import mirrored as mirrored
 from .model import NO_JUNCTION as NO_JUNCTION
 from .model import NO_STREET as NO_STREET
 from .model import Crosswalk as Crosswalk

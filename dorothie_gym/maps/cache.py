@@ -20,6 +20,7 @@ from typing import Any, TypeAlias, TypedDict, get_type_hints
 import numpy as np
 
 from dorothie_gym.errors import InputFileError, TownArchiveError, one_line
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.model import (
     NO_STREET,
     Array,
@@ -78,7 +79,9 @@ def pack(town: Town, key: str) -> bytes:
         key: key of the archive, checked by `unpack`.
     """
     arrays: list[Array] = []
-    document: dict[str, object] = {"format": ARCHIVE_FORMAT, "key": key, "name": town.name, "cruise": town.cruise}
+    document: dict[str, object] = {
+        "format": ARCHIVE_FORMAT, "key": key, "name": town.name, "traffic": town.traffic, "cruise": town.cruise
+    }  # fmt: skip
     for part, kind in PARTS.items():
         elements = getattr(town, part)
         document[part] = {
@@ -111,7 +114,7 @@ def unpack(data: bytes, key: str) -> Town:
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
             raise TownArchiveError("it is of another format or another town")
-        return _town(document["name"], document["cruise"], document, floats)
+        return _town(document["name"], DrivingSide(document["traffic"]), document["cruise"], document, floats)
     except TownArchiveError:
         raise
     except (
@@ -143,7 +146,13 @@ def _plain(value: object) -> object:
     raise TypeError(f"a town cannot be archived with a {type(value).__name__} in it: {value!r}")
 
 
-def _town(name: str, cruise: float | None, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
+def _town(
+    name: str,
+    traffic: DrivingSide,
+    cruise: float | None,
+    document: Mapping[str, Mapping[str, _Column]],
+    floats: Array,
+) -> Town:
     if not isinstance(name, str) or floats.dtype != np.float64 or floats.ndim != 1:
         raise TownArchiveError("its name is no text, or its numbers are no floats")
     if cruise is not None and not isinstance(cruise, float):
@@ -157,7 +166,7 @@ def _town(name: str, cruise: float | None, document: Mapping[str, Mapping[str, _
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
         raise TownArchiveError("it holds more numbers than its town has")
-    town = Town(name=name, cruise=cruise, **parts)
+    town = Town(name=name, traffic=traffic, cruise=cruise, **parts)
     if fault := next(_faults(town), None):
         raise TownArchiveError(f"it holds no sound town: {fault}")
     return town

@@ -156,6 +156,7 @@ def describe(town: Town) -> dict[str, JsonValue]:
 
     Returns:
         name: name of the town;
+        traffic: side of the road on which vehicles drive, "right" or "left";
         lanes, links: counts; connectors are included, lane changes are not;
         components: sizes of the strongly connected components of the lanes without lane changes, largest first;
         components_with_lane_changes: the same with lane changes;
@@ -168,6 +169,7 @@ def describe(town: Town) -> dict[str, JsonValue]:
     onward = [link for link in town.links if not link.type.is_lane_change]
     return {
         "name": town.name,
+        "traffic": str(town.traffic),
         "lanes": len(town.lanes),
         "links": len(onward),
         "components": _component_sizes(len(town.lanes), onward),

@@ -35,6 +35,7 @@ class NoteKind(enum.StrEnum):
     CONNECTION = "connection"
     LANE_CHANGE = "lane change"
     DIRECTION = "direction"
+    TRAFFIC = "traffic rule"
     ACCESS = "access"
     SPEED = "speed limit"
     SIGNAL = "signal"

@@ -62,7 +62,7 @@ class Oncoming(NamedTuple):
 
 @shared
 class OncomingLanes:
-    """Lookup of the oncoming lane to the left of a point on a lane."""
+    """Lookup of the oncoming lane across the middle of the road from a point on a lane."""
 
     def __init__(self, town: Town) -> None:
         self._town = town
@@ -81,14 +81,15 @@ class OncomingLanes:
     def at(self, lane_id: int, station: float) -> Oncoming | None:
         """Returns the opposite point on the oncoming lane.
 
-        None in a junction, on a lane that is not the leftmost, and without an oncoming lane nearby. At a dead end,
+        None in a junction, on a lane that is not the innermost, and without an oncoming lane nearby. At a dead end,
         where all lanes end, cars turn round from the other lanes too.
         """
         candidates = self.candidates(lane_id)
         if not len(candidates):
             return None
         table = self._table
-        found = Oncoming(*across(table.points, table.offsets, table.ends, lane_id, station, candidates))
+        sign = self._town.traffic.sign
+        found = Oncoming(*across(table.points, table.offsets, table.ends, lane_id, station, candidates, sign))
         return found if found.lane >= 0 else None
 
     def candidates(self, lane_id: int) -> IntArray:
@@ -101,9 +102,9 @@ class OncomingLanes:
     def _lanes_near(self, lane_id: int) -> IntArray:
         """Returns the lanes outside junctions that are close enough to be oncoming somewhere along a lane."""
         lane = self._town.lanes[lane_id]
-        leftmost = self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is None
+        innermost = self._town.neighbour(lane_id, self._town.traffic.to_middle) is None
         ends = not self._town.successors(lane_id) and self._town.merge(lane_id) is None
-        if lane.in_junction or not (leftmost or ends):
+        if lane.in_junction or not (innermost or ends):
             return np.empty(0, dtype=np.int64)
         reach = pm.hypot(WIDEST_MEDIAN, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
         own = self._points[self._owners == lane_id]
@@ -115,9 +116,12 @@ class OncomingLanes:
 
 @allocating
 def across(
-    points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray
+    points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray, sign: float
 ) -> tuple[int, float, float]:
-    """Returns the closest oncoming lane among candidates (-1: none), the station on it [m], and the distance [m]."""
+    """Returns the closest oncoming lane among candidates (-1: none), the station on it [m], and the distance [m].
+
+    `sign` is that of the town's `DrivingSide`.
+    """
     x, y = position(points, offsets, ends, lane, station, 0.0)
     heading = value_at(points, offsets, lane, HEADING, station)
     height = value_at(points, offsets, lane, HEIGHT, station)
@@ -134,6 +138,7 @@ def across(
             value_at(points, offsets, other, Y, there),
             value_at(points, offsets, other, HEADING, there),
             value_at(points, offsets, other, HEIGHT, there),
+            sign,
         )
         if gap < least:
             found, at, least = other, there, gap
@@ -150,13 +155,17 @@ def opposite_gap(
     other_y: float,
     other_heading: float,
     other_height: float,
+    sign: float,
 ) -> float:
-    """Returns the distance to a point on another lane, infinite if that is not opposite and oncoming [m]."""
+    """Returns the distance to a point on another lane, infinite if that is not opposite and oncoming [m].
+
+    `sign` is that of the town's `DrivingSide`.
+    """
     if abs((other_heading - heading + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
         return math.inf
     c, n = pm.cos(heading), pm.sin(heading)
     dx, dy = other_x - x, other_y - y
-    across, along = dy * c - dx * n, dx * c + dy * n  # positive right
+    across, along = sign * (dy * c - dx * n), dx * c + dy * n  # positive towards the kerb
     if not -WIDEST_MEDIAN <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
         return math.inf
     return -across if abs(other_height - height) <= MAX_HEIGHT else math.inf
@@ -171,16 +180,18 @@ def oncoming_lanes(town: Town) -> OncomingLanes:
 # --- Lanes side by side ----------------------------------------------------------------------------------------------
 
 
-def rightmost(town: Town, lane_id: int) -> int:
-    """Returns the rightmost lane that can be reached by lane changes."""
-    while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_RIGHT)) is not None:
-        lane_id = beside
-    return lane_id
+def outermost(town: Town, lane_id: int) -> int:
+    """Returns the lane nearest to the kerb that can be reached by lane changes."""
+    return _last(town, lane_id, town.traffic.to_kerb)
 
 
-def leftmost(town: Town, lane_id: int) -> int:
-    """Returns the leftmost lane that can be reached by lane changes."""
-    while (beside := town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT)) is not None:
+def innermost(town: Town, lane_id: int) -> int:
+    """Returns the lane nearest to the middle of the road that can be reached by lane changes."""
+    return _last(town, lane_id, town.traffic.to_middle)
+
+
+def _last(town: Town, lane_id: int, side: LinkType) -> int:
+    while (beside := town.neighbour(lane_id, side)) is not None:
         lane_id = beside
     return lane_id
 

@@ -198,7 +198,7 @@ class Exit:
         lane: lane beyond the junction.
         type: turn type.
         angle: change of direction to the exit in whole degrees, at least -180 and below 180, positive left. All exits
-            of a lane have different angles: equal ones are moved apart by one degree, from right to left.
+            of a lane have different angles: equal ones are moved apart by one degree, from the kerb on.
         junction_id: id of the junction that is crossed, or -1.
     """
 

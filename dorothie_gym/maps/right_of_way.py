@@ -35,9 +35,6 @@ TURN = np.radians(20.0)
 FACING = np.radians(45.0)
 """Largest deviation from opposite directions of lanes that face each other [rad]."""
 
-LEFTWARD = (LinkType.LEFT, LinkType.U_TURN)
-"""Turn types that cross oncoming traffic."""
-
 _CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)  # a light overrides a sign
 
 
@@ -45,12 +42,13 @@ class RightOfWay:
     """Conflicts and priorities of all connectors of a town; see `right_of_way`.
 
     Signs count first: traffic from a stop or yield sign waits for traffic without one (roundabout entries have yield
-    signs, so they wait for the ring). Among equals, left turns and U-turns wait for oncoming traffic that goes straight
-    or right. All others are equal and go in order of arrival, as do movements that only pass each other too closely,
-    such as a turn that ends beside the lane of oncoming traffic.
+    signs, so they wait for the ring). Among equals, turns across oncoming traffic (left turns, or right turns where
+    traffic keeps to the left) and U-turns wait for oncoming traffic that goes straight or turns to its kerb. All others
+    are equal and go in order of arrival, as do movements that only pass each other too closely, such as a turn that
+    ends beside the lane of oncoming traffic.
 
-    A connector waits only if it has a sign and the other has none, or if it turns left, the other does not, and both
-    have equal signs. This order has no cycles, so no set of connectors waits for each other.
+    A connector waits only if it has a sign and the other has none, or if it crosses oncoming traffic, the other does
+    not, and both have equal signs. This order has no cycles, so no set of connectors waits for each other.
     """
 
     def __init__(self, town: Town) -> None:
@@ -67,13 +65,13 @@ class RightOfWay:
                 if not follows:  # vehicles from the same lane drive one behind the other anyway
                     foes[one][other] = foes[other][one] = touch
         self._foes = {connector: tuple(sorted(others)) for connector, others in foes.items()}
-        turns = _turns(town)
+        crosses = {number: town.traffic.crosses_oncoming(turn) for number, turn in _turns(town).items()}
         signed = {connector: self._is_signed(sources[connector]) for connector in self._foes}
         self._waits = {
             connector: tuple(
                 other
                 for other in others
-                if foes[connector][other] and _waits(town.lanes[connector], town.lanes[other], turns, signed)
+                if foes[connector][other] and _waits(town.lanes[connector], town.lanes[other], crosses, signed)
             )
             for connector, others in self._foes.items()
         }
@@ -140,11 +138,10 @@ def _turns(town: Town) -> dict[int, LinkType]:
     return {link.target: turn_into(link, town.lanes) for link in entering}
 
 
-def _waits(one: Lane, other: Lane, turns: Mapping[int, LinkType], signed: Mapping[int, bool]) -> bool:
+def _waits(one: Lane, other: Lane, crosses: Mapping[int, bool], signed: Mapping[int, bool]) -> bool:
     if signed[one.id] != signed[other.id]:
         return signed[one.id]
-    one_left, other_left = (turns.get(lane.id) in LEFTWARD for lane in (one, other))
-    return one_left and not other_left and opposition(one, other) < FACING
+    return crosses.get(one.id, False) and not crosses.get(other.id, False) and opposition(one, other) < FACING
 
 
 def _meetings(lanes: Sequence[Lane]) -> Iterator[tuple[int, int, bool]]:

@@ -79,7 +79,7 @@ MAX_ASIDE = 6.0
 """Largest distance between the centre lines of lanes that one can change between [m]."""
 
 TURN_COST = {LinkType.STRAIGHT: 0.0, LinkType.RIGHT: 5.0, LinkType.LEFT: 10.0, LinkType.U_TURN: 60.0}
-"""Cost of a turn at a junction [m]."""
+"""Cost of a turn at a junction in right-hand traffic [m]."""
 
 U_TURN_COST = 60.0
 """Cost of a U-turn between junctions [m]."""
@@ -148,6 +148,7 @@ class RoutingGraph(NamedTuple):
         ends: (lanes, 4) directions of their ends, see `polyline.LaneTable`.
         near: lanes that may be oncoming somewhere along a lane, lane by lane.
         near_rows: (lanes + 1,) their start for each lane.
+        sign: that of the town's `DrivingSide`.
         edges: cheapest edge between each pair of cells and tails, sorted by source and target.
         rows: (nodes + 1,) first edge of each source, and the number of edges.
         incoming: edges sorted by target.
@@ -163,6 +164,7 @@ class RoutingGraph(NamedTuple):
     ends: Array
     near: IntArray
     near_rows: IntArray
+    sign: float
     edges: RecordArray[RoutingEdge]
     rows: IntArray
     incoming: IntArray
@@ -213,7 +215,7 @@ def routing_graph(town: Town) -> RoutingGraph:
     none, no_rows, no_edges = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64), empty_records(RoutingEdge, 0)
     bare = RoutingGraph(
         lanes, table.points, table.offsets, table.ends, np.concatenate([none, *near]),
-        np.concatenate(([0], np.cumsum([len(each) for each in near]))),
+        np.concatenate(([0], np.cumsum([len(each) for each in near]))), float(town.traffic.sign),
         no_edges, no_rows, none, no_rows, no_edges, no_rows,
     )  # fmt: skip
     cells = int(first[-1])
@@ -251,7 +253,7 @@ def _following(town: Town, graph: RoutingGraph, cells: int) -> RecordArray[Routi
     links = [link for link in town.links if not link.type.is_lane_change]
     source = np.array([link.source for link in links], dtype=np.int64)
     target = np.array([link.target for link in links], dtype=np.int64)
-    turn = np.array([TURN_COST[link.type] for link in links])
+    turn = np.array([TURN_COST[town.traffic.as_right_hand(link.type)] for link in links])
     edges = empty_records(RoutingEdge, len(within) + 2 * len(links))
     edges["last"] = edges["until"] = NONE
     along, across_ends = edges[: len(within)], edges[len(within) :]
@@ -303,7 +305,7 @@ def cell_at(graph: RoutingGraph, lane: int, station: float) -> int:
 def oncoming_at(graph: RoutingGraph, lane: int, station: float) -> tuple[int, float, float]:
     """Returns the opposite point on the oncoming lane: lane (-1: none), station [m] and distance [m]."""
     near = graph.near[graph.near_rows[lane] : graph.near_rows[lane + 1]]
-    return across(graph.points, graph.offsets, graph.ends, lane, station, near)
+    return across(graph.points, graph.offsets, graph.ends, lane, station, near, graph.sign)
 
 
 @compiled

@@ -14,6 +14,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.model import NARROW, Array, Lane, LaneLink, Site
 from dorothie_gym.maps.routing import Router, router
 from dorothie_gym.maps.town import Town
@@ -34,20 +35,25 @@ MERGING_STRETCH = 130.0
 
 
 def lay_sites(
-    lanes: Sequence[Lane], links: Sequence[LaneLink], count: int = 24, avoid: Collection[int] = ()
+    lanes: Sequence[Lane],
+    links: Sequence[LaneLink],
+    count: int = 24,
+    avoid: Collection[int] = (),
+    traffic: DrivingSide = DrivingSide.RIGHT,
 ) -> tuple[Site, ...]:
     """Places landmark sites at the kerb, spread over the town by farthest-point sampling.
 
-    A site lies to the right of the outermost lane of a road, at half the lane width plus 6 m, where no other lane is as
-    close. All sites can be reached from each other: on the links of the town if its kerb lanes are strongly connected,
-    else by all manoeuvres of a car, U-turns at dead ends included. A map without such places, of one-way roads that
-    lead nowhere, has sites along its largest part.
+    A site lies on the kerb's side of the outermost lane of a road, at half the lane width plus 6 m, where no other lane
+    is as close. All sites can be reached from each other: on the links of the town if its kerb lanes are strongly
+    connected, else by all manoeuvres of a car, U-turns at dead ends included. A map without such places, of one-way
+    roads that lead nowhere, has sites along its largest part.
 
     Args:
         lanes: lanes of the town, with streets.
         links: links between them, lane changes included.
         count: number of sites.
         avoid: lanes without sites.
+        traffic: side of the road on which vehicles drive.
 
     Returns:
         At most `count` sites; fewer if the map has no room.
@@ -55,15 +61,16 @@ def lay_sites(
     outermost = [lane for lane in _outermost(lanes) if lane.id not in avoid]
     part, ending = _parts(lanes, links), _ending(links)
     closed = _is_closed(outermost, links, part)
-    places = _places(lanes, outermost, count, ending) if closed else np.empty((0, 6))
+    places = _places(lanes, outermost, count, ending, traffic) if closed else np.empty((0, 6))
     if len(places) < count:  # an open network, or a small one
-        around = _Surroundings(lanes, links)
+        around = _Surroundings(lanes, links, traffic)
         for group in (outermost, [lane for lane in lanes if not lane.in_junction and lane.id not in avoid]):
-            places = max(places, _places(lanes, group, count, ending, around), key=len)
+            places = max(places, _places(lanes, group, count, ending, traffic, around), key=len)
             if len(places) >= count:
                 break
     if not len(places):  # no car can return to any place
-        places = _places(lanes, [lane for lane in outermost if part[lane.id] == _largest(part)], count, ending)
+        largest = [lane for lane in outermost if part[lane.id] == _largest(part)]
+        places = _places(lanes, largest, count, ending, traffic)
     chosen = _spread(places[:, 2:4], count) if len(places) else []
     return tuple(_site(k, lanes[int(places[row, 0])], places[row]) for k, row in enumerate(sorted(chosen)))
 
@@ -71,8 +78,8 @@ def lay_sites(
 class _Surroundings:
     """Groups of places that a car can reach from each other."""
 
-    def __init__(self, lanes: Sequence[Lane], links: Sequence[LaneLink]) -> None:
-        self._router = Router(Town(name="", lanes=lanes, links=links, junctions=()))
+    def __init__(self, lanes: Sequence[Lane], links: Sequence[LaneLink], traffic: DrivingSide) -> None:
+        self._router = Router(Town(name="", lanes=lanes, links=links, junctions=(), traffic=traffic))
         self._labels = self._router.parts()
 
     def largest(self, places: Array) -> Array:
@@ -99,12 +106,13 @@ def _places(
     kerbs: list[Lane],
     count: int,
     ending: frozenset[int],
+    traffic: DrivingSide,
     around: _Surroundings | None = None,
 ) -> Array:
     """Returns candidate sites (n, 6) by the first rule that gives enough of them; see `_candidates`."""
     usable, best = _calm(kerbs), np.empty((0, 6))
     for shortest, margin in SITE_RULES:
-        places = _candidates([lane for lane in usable if lane.length >= shortest], margin, ending)
+        places = _candidates([lane for lane in usable if lane.length >= shortest], margin, ending, traffic)
         if len(places):
             places = places[_is_clear(lanes, places)]
         best = places if around is None else around.largest(places)
@@ -153,7 +161,7 @@ def _calm(lanes: list[Lane]) -> list[Lane]:
     return calm if 2 * len(calm) >= len(lanes) else lanes
 
 
-def _candidates(lanes: Iterable[Lane], margin: float, ending: Collection[int]) -> Array:
+def _candidates(lanes: Iterable[Lane], margin: float, ending: Collection[int], traffic: DrivingSide) -> Array:
     """Returns candidate sites along lanes: rows of lane, station, landmark x, y, waypoint x, y [m].
 
     There are none where a lane opens or tapers away, and none where cars leave one of those that end.
@@ -171,7 +179,7 @@ def _candidates(lanes: Iterable[Lane], margin: float, ending: Collection[int]) -
             np.interp(station, lane.stations, column)
             for column in (lane.points[:, 0], lane.points[:, 1], lane.headings, lane.widths)
         )
-        aside = 0.5 * width + SITE_OFFSET
+        aside = traffic.sign * (0.5 * width + SITE_OFFSET)
         number = np.full(len(station), float(lane.id))
         place = (x - aside * pn.sin(heading), y + aside * pn.cos(heading))
         tables.append(np.column_stack((number, station, *place, x, y)))

@@ -12,6 +12,7 @@ from itertools import accumulate
 import numpy as np
 
 from dorothie_gym.errors import TownError
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
     LANE_CHANGES,
@@ -163,11 +164,12 @@ class Town:
         crosswalks: marked pedestrian crossings.
         sidewalks: pavements.
         programmes: traffic light programmes, one for each junction with lights.
+        traffic: side of the road on which vehicles drive.
         cruise: cruise speed of the ego without a request [km/h], in a town with slow traffic like the paper's; None for
             a town where all drive as fast as lane, sight and weather allow.
 
     Attributes:
-        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, cruise: the
+        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, traffic, cruise: the
             arguments; sequences as tuples.
     """
 
@@ -184,6 +186,7 @@ class Town:
         crosswalks: Sequence[Crosswalk] = (),
         sidewalks: Sequence[Sidewalk] = (),
         programmes: Sequence[LightProgramme] = (),
+        traffic: DrivingSide = DrivingSide.RIGHT,
         cruise: float | None = SLOW_CRUISE,
     ) -> None:
         self.name = name
@@ -196,6 +199,7 @@ class Town:
         self.crosswalks = tuple(crosswalks)
         self.sidewalks = tuple(sidewalks)
         self.programmes = tuple(programmes)
+        self.traffic = traffic
         self.cruise = cruise
 
     @cached_property
@@ -203,7 +207,8 @@ class Town:
         """Name and content: equal for towns with equal parts, which copies of a town in other processes are."""
         parts = [self.lanes, self.links, self.junctions, self.streets, self.sites]
         beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes, self.cruise]
-        return TownIdentity(name=self.name, content=digest_of([*parts, *beside]))
+        side = [] if self.traffic is DrivingSide.RIGHT else [self.traffic]
+        return TownIdentity(name=self.name, content=digest_of([*parts, *beside, *side]))
 
     @property
     def kilometres(self) -> float:
@@ -333,7 +338,7 @@ class Town:
         return self._exits[lane]
 
     def _find_exits(self, lane: Lane) -> tuple[Exit, ...]:
-        found = []
+        found, sign = [], self.traffic.sign
         for link in self.successors(lane.id):
             target, junction = self.lanes[link.target], self.lanes[link.target].junction_id
             seen = {target.id}
@@ -342,15 +347,15 @@ class Town:
             ):
                 target = self.lanes[onward[0].target]
                 seen.add(target.id)
-            turn = wrap_degrees(float(np.degrees(lane.headings[-1] - target.headings[0])))
+            turn = wrap_degrees(sign * float(np.degrees(lane.headings[-1] - target.headings[0])))
             found.append((turn, link, target, junction))
         found.sort(key=lambda row: (row[0], row[2].id))
         used: set[int] = set()
         exits = []
         for turn, link, target, junction in found:
-            angle = int(wrap_degrees(round(turn)))
+            angle = int(wrap_degrees(sign * round(turn)))
             while angle in used:
-                angle = int(wrap_degrees(angle + 1))
+                angle = int(wrap_degrees(angle + sign))
             used.add(angle)
             exits.append(Exit(connector=link.target, lane=target.id, type=link.type, angle=angle, junction_id=junction))
-        return tuple(exits)
+        return tuple(exits[::sign])

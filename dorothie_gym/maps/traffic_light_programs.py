@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, Signal, SignalKind
-from dorothie_gym.maps.right_of_way import FACING, LEFTWARD, opposition, turn_into
+from dorothie_gym.maps.right_of_way import FACING, opposition, turn_into
 from dorothie_gym.maps.town import LightPhase, LightProgramme
 from dorothie_gym.support import portable_arrays as pn
 
@@ -23,7 +24,7 @@ SHORTEST_GREEN = 12.0
 """Shortest green of facing approaches with many phases [s]."""
 
 LEFT_GREEN = 8.0
-"""Green of left-turn lanes [s]: four cars."""
+"""Green of left-turn lanes [s], in left-hand traffic of right-turn lanes: four cars."""
 
 YELLOW, LONGEST_YELLOW = 3.0, 6.0
 """Shortest and longest yellow [s] (MUTCD 2009, section 4D.26)."""
@@ -51,14 +52,14 @@ class _Movement:
         speed: speed limit of the incoming lane [m/s].
         connector: lane across the junction.
         targets: ids of the lanes beyond it.
-        left: whether it turns left.
+        far: whether it crosses oncoming traffic: a left turn, or in left-hand traffic a right turn.
     """
 
     source: int
     speed: float
     connector: Lane
     targets: frozenset[int]
-    left: bool
+    far: bool
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,8 @@ class _Head:
     approaches: frozenset[tuple[int, bool]]
 
     @property
-    def only_left(self) -> bool:
-        return all(movement.left for movement in self.movements)
+    def only_far(self) -> bool:
+        return all(movement.far for movement in self.movements)
 
     def opposition(self, other: _Head) -> float:
         """Returns the deviation of two groups from facing each other [rad], rounded to 0.001 for stable ties."""
@@ -96,7 +97,11 @@ def yellow_time(speed: float) -> float:
 
 
 def derive_programmes(
-    lanes: Sequence[Lane], links: Sequence[LaneLink], junctions: Sequence[Junction], signals: Sequence[Signal]
+    lanes: Sequence[Lane],
+    links: Sequence[LaneLink],
+    junctions: Sequence[Junction],
+    signals: Sequence[Signal],
+    traffic: DrivingSide = DrivingSide.RIGHT,
 ) -> tuple[LightProgramme, ...]:
     """Generates a programme for each junction with traffic lights.
 
@@ -110,6 +115,7 @@ def derive_programmes(
         links: links between them.
         junctions: junctions in the order of the offsets of their programmes.
         signals: signals; other kinds, and lights whose lanes do not lead into a junction, are ignored.
+        traffic: side of the road on which vehicles drive; on the left, right turns take the place of left turns.
 
     Returns:
         Programmes in the order of the junctions.
@@ -124,7 +130,7 @@ def derive_programmes(
         if junction is not None:
             lit[junction].append(signal)
     at = [junction.id for junction in junctions if junction.id in lit]
-    return tuple(_programme(k, id_, _heads(id_, lit[id_], lanes, followers)) for k, id_ in enumerate(at))
+    return tuple(_programme(k, id_, _heads(id_, lit[id_], lanes, followers, traffic)) for k, id_ in enumerate(at))
 
 
 def _junction(signal: Signal, lanes: Sequence[Lane], followers: dict[int, list[LaneLink]]) -> int | None:
@@ -142,7 +148,11 @@ def _junction(signal: Signal, lanes: Sequence[Lane], followers: dict[int, list[L
 
 
 def _heads(
-    junction: int, signals: Sequence[Signal], lanes: Sequence[Lane], followers: dict[int, list[LaneLink]]
+    junction: int,
+    signals: Sequence[Signal],
+    lanes: Sequence[Lane],
+    followers: dict[int, list[LaneLink]],
+    traffic: DrivingSide,
 ) -> list[_Head]:
     """Returns the lights of a junction in order of their ids, grouped if they share a lane."""
     sharing: list[tuple[list[int], set[int]]] = []  # ids of lights and their lanes
@@ -164,7 +174,7 @@ def _heads(
                 speed=lanes[link.source].speed_limit,
                 connector=lanes[link.target],
                 targets=frozenset(on.target for on in followers[link.target]),
-                left=turn_into(link, lanes) in LEFTWARD,
+                far=traffic.crosses_oncoming(turn_into(link, lanes)),
             )
             for link in entering
         )
@@ -176,13 +186,13 @@ def _heads(
 def _programme(order: int, junction: int, heads: Sequence[_Head]) -> LightProgramme:
     turning = [head for head in heads if _is_turn_lane(head, heads)]
     through = _together([head for head in heads if head not in turning])
-    left = _together(turning)
+    protected = _together(turning)
     green = float(np.clip(SHARED_GREEN / len(through), SHORTEST_GREEN, THROUGH_GREEN))
     phases: list[LightPhase] = []
     for group in through:
         roads = {road for head in group for road in head.approaches}
-        leading = [turn for turn in left if any(head.approaches & roads for head in turn)]
-        left = [turn for turn in left if turn not in leading]
+        leading = [turn for turn in protected if any(head.approaches & roads for head in turn)]
+        protected = [turn for turn in protected if turn not in leading]
         for turn in leading:
             phases.extend(_turn_of(turn, LEFT_GREEN))
         phases.extend(_turn_of(group, green))
@@ -198,13 +208,13 @@ def _programme(order: int, junction: int, heads: Sequence[_Head]) -> LightProgra
 
 
 def _is_turn_lane(head: _Head, heads: Sequence[_Head]) -> bool:
-    """Returns whether left-turn lights need a protected phase: there are others beside them and facing them.
+    """Returns whether lights of turns across oncoming traffic need a protected phase: others are beside and face them.
 
     The stem of a T, or a road that ends at a one-way street, has no oncoming traffic.
     """
-    others = [other for other in heads if not other.only_left]
+    others = [other for other in heads if not other.only_far]
     beside = any(head.approaches & other.approaches for other in others)
-    return head.only_left and beside and any(head.opposition(other) < FACING for other in others)
+    return head.only_far and beside and any(head.opposition(other) < FACING for other in others)
 
 
 def _turn_of(heads: Iterable[_Head], green: float) -> tuple[LightPhase, LightPhase, LightPhase]:
@@ -239,12 +249,12 @@ def _together(heads: Sequence[_Head]) -> list[list[_Head]]:
 def _compatible(one: _Movement, other: _Movement) -> bool:
     """Returns whether two movements may be green together: parallel or opposite ones that do not meet.
 
-    Left turns may meet oncoming traffic because they yield. Crossing approaches are never green together.
+    Turns across oncoming traffic may meet it because they yield. Crossing approaches are never green together.
     """
     if one.source == other.source:
         return True
     off = opposition(one.connector, other.connector)
-    if off < FACING and (one.left or other.left):
+    if off < FACING and (one.far or other.far):
         return True
     if FACING <= off <= np.pi - FACING:
         return False

@@ -175,7 +175,7 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
 def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
     """Returns the adjacent lanes of the same direction, the nearest first."""
     found: list[int] = []
-    for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
+    for side in (town.traffic.to_middle, town.traffic.to_kerb):
         beside = town.neighbour(lane, side)
         while beside is not None and beside not in found and beside != lane:
             found.append(beside)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 
 from dorothie_gym.errors import StoryboardError
-from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.routing import crowds, cuts_off
 from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.slots import GoalStatus
@@ -20,6 +19,7 @@ from dorothie_gym.sim.population import kerb
 from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Array
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.session_log import Outcome
     from dorothie_gym.session.spaces.actions import AdWizardAction
@@ -113,7 +113,7 @@ class ExceptionExecutor:
         return {"asked": action.count, "count": done, **dict(zip(("x0", "x1", "y0", "y1"), corners, strict=True))}
 
     def _places_within(self, middle: Array, half: float, *, driving: bool) -> list[tuple[int, float]]:
-        """Returns candidate places in a square: on lanes away from waypoints for vehicles, else at the right kerb."""
+        """Returns candidate places in a square: on lanes away from waypoints for vehicles, else at the kerb."""
         places, points = _spawn_places(self._world.town, driving)
         inside = np.abs(points - middle).max(axis=1) <= half
         return [places[k] for k in np.flatnonzero(inside).tolist()]
@@ -264,11 +264,11 @@ def _spawn_places(town: Town, driving: bool) -> tuple[list[tuple[int, float]], A
     for lane in town.lanes:
         if lane.in_junction or lane.length < 12.0:
             continue
-        if not driving and town.neighbour(lane.id, LinkType.LANE_CHANGE_RIGHT) is not None:
+        if not driving and town.neighbour(lane.id, town.traffic.to_kerb) is not None:
             continue
         waypoints = [site.station for site in town.sites if site.lane == lane.id] if driving else []
         for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP).tolist():
             if all(abs(waypoint - station) >= FROM_WAYPOINT for waypoint in waypoints):
                 places.append((lane.id, station))
-                points.append(lane.position(station) if driving else kerb(lane, station))
+                points.append(lane.position(station) if driving else kerb(town, lane, station))
     return places, np.array(points).reshape(-1, 2)

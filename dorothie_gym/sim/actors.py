@@ -92,14 +92,14 @@ class Actors(CachedViews):
         town = self.town_arrays
         if not is_free(town, self.arrays, lane, float(station), int(NOBODY), float(distance)):
             return False
-        cycles = bool(town.lanes[lane].right < 0 and town.lanes[lane].cycling) and self._rng.random() < CYCLIST_SHARE
+        cycles = bool(town.lanes[lane].outer < 0 and town.lanes[lane].cycling) and self._rng.random() < CYCLIST_SHARE
         kind, speeds = (Kind.CYCLIST, CYCLIST_SPEEDS) if cycles else (Kind.CAR, VEHICLE_SPEEDS)
         self._make_room(vehicles=1)
         add_vehicle(town, self.arrays, lane, station, kind=kind, desired=float(self._rng.uniform(*speeds)))
         return True
 
     def add_pedestrian(self, lane: int, station: float) -> bool:
-        """Adds a pedestrian beside a lane, or to the right of those beside it, if the place is free.
+        """Adds a pedestrian beside a lane, or at the kerb of those beside it, if the place is free.
 
         Such pedestrians stay at their street, and cross it anywhere.
         """

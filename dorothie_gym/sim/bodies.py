@@ -229,7 +229,7 @@ _PLAN = field_offset(VEHICLE, "plan") // 4
 
 
 class Cyclist(TrafficVehicle):
-    """A cyclist: a narrow, slow vehicle that keeps to the right."""
+    """A cyclist: a narrow, slow vehicle that keeps to the kerb."""
 
 
 class _Thing(BodyView[Record_co]):

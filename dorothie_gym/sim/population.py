@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import TownError
-from dorothie_gym.maps.lane_neighbours import rightmost
+from dorothie_gym.maps.lane_neighbours import outermost
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.pedestrians.walkway_position import closest_walk, place_beside
@@ -163,7 +163,7 @@ def _put_pedestrian(
 def add_street_walker(
     network: TownNetwork, town: TownArrays, world: WorldArrays, lane: int, station: float
 ) -> int | None:
-    """Adds a pedestrian beside a lane, or to the right of those beside it.
+    """Adds a pedestrian beside a lane, or at the kerb of those beside it.
 
     Such pedestrians stay at their street, and cross it anywhere but near junctions.
 
@@ -177,9 +177,9 @@ def add_street_walker(
     Returns:
         Its row; None if there is no footway, if a pedestrian or the ego is there already, or if all rows are taken.
     """
-    beside = network.town.lanes[rightmost(network.town, lane)]
+    beside = network.town.lanes[outermost(network.town, lane)]
     station = min(station, beside.length)
-    x, y = (float(value) for value in kerb(beside, station))
+    x, y = (float(value) for value in kerb(network.town, beside, station))
     walk, at, _ = closest_walk(town, Footway.STREET, x, y, STREET_WAY_REACH)
     if walk < 0 or town.walks[walk].lane != beside.id or not is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
         return None
@@ -188,9 +188,9 @@ def add_street_walker(
     return add_pedestrian(town, world, walk, at, pace=WALKING_SPEED)
 
 
-def kerb(lane: Lane, station: float) -> Array:
-    """Returns the place of a pedestrian beside a lane (2,) [m]; the lane is the rightmost one of its direction."""
-    return lane.position(station, lane.width_at(station) / 2 + KERB)
+def kerb(town: Town, lane: Lane, station: float) -> Array:
+    """Returns the place of a pedestrian beside a lane (2,) [m]; the lane is the outermost one of its direction."""
+    return lane.position(station, town.traffic.sign * (lane.width_at(station) / 2 + KERB))
 
 
 def remove_pedestrian(world: WorldArrays, number: int) -> None:
@@ -335,7 +335,7 @@ def populate(
         seed: seed of the places and the desired speeds.
         vehicles: number of vehicles, cyclists included.
         pedestrians: number of pedestrians; on pavements, or in a town without them beside the streets.
-        cyclists: share of the vehicles; they ride to the right on slow roads.
+        cyclists: share of the vehicles; they ride at the kerb of slow roads.
     """
     rng = np.random.default_rng(seed)
     _add_traffic(network, town, world, rng, vehicles, cyclists)
@@ -360,7 +360,7 @@ def _add_traffic(
 def _rideable(network: TownNetwork) -> NDArray[np.bool_]:
     """Returns the lanes on which cyclists may begin (lanes,)."""
     lanes = plain(town_arrays(network).lanes)
-    rideable: NDArray[np.bool_] = lanes["cycling"] & (lanes["right"] < 0) & (lanes["junction"] < 0)
+    rideable: NDArray[np.bool_] = lanes["cycling"] & (lanes["outer"] < 0) & (lanes["junction"] < 0)
     return rideable
 
 

@@ -87,7 +87,12 @@ class TestCheck:
 
     def test_faultless_town_as_json(self) -> None:
         result = call("--check", "brookside", "--json")
-        assert result.exit_code == 0 and loaded(result) == {"town": "brookside", "faults": [], **NO_NOTES}
+        assert result.exit_code == 0 and loaded(result) == {
+            "town": "brookside",
+            "traffic": "right",
+            "faults": [],
+            **NO_NOTES,
+        }
 
     def test_imported_map_is_checked_like_a_shipped_one(self) -> None:
         result = call("--check", ring())
@@ -105,7 +110,10 @@ class TestCheck:
         result = call("--check", ring("path.xodr", width=1.5), "--json")
         assert result.exit_code == 1
         value = loaded(result)
-        assert value == {"town": "path", "faults": value["faults"], **NO_NOTES} and len(value["faults"]) == 2
+        assert (
+            value == {"town": "path", "traffic": "right", "faults": value["faults"], **NO_NOTES}
+            and len(value["faults"]) == 2
+        )
         fault = value["faults"][0]
         assert list(fault) == ["kind", "lanes", "position", "message"]
         assert fault["kind"] == "narrow" and fault["lanes"] == [0] and len(fault["position"]) == 2
@@ -159,7 +167,7 @@ def test_a_check_says_what_was_dropped_and_assumed() -> None:
 
 def test_the_json_of_a_check_holds_all_notes_by_kind() -> None:
     report = json.loads(call("--check", noted_ring(), "--json").stdout)
-    assert list(report) == ["town", "faults", "dropped", "repaired", "assumed"]
+    assert list(report) == ["town", "traffic", "faults", "dropped", "repaired", "assumed"]
     (link,) = report["dropped"]["road link"]
     assert link["element"].startswith("road 1 / link / predecessor") and "road 99" in link["message"]
     assert report["repaired"] == {}
@@ -185,3 +193,12 @@ def test_a_map_with_few_places_says_how_many_storyboards_need() -> None:
     assert "of which cars can drive between 0; 0 of 54 storyboards fit" in words
     assert re.search(r"need 2 to \d+ places", words)
     assert "storyboards" not in call("brookside").stdout
+
+
+def test_a_check_says_that_traffic_keeps_to_the_left() -> None:
+    path = ring()
+    text = path.read_text()
+    path.write_text(text.replace("<road ", '<road rule="LHT" '))
+    assert call("--check", path).stdout.splitlines()[0] == "left-hand traffic"
+    assert json.loads(call("--check", path, "--json").stdout)["traffic"] == "left"
+    assert json.loads(call(path, "--json").stdout)["traffic"] == "left"

@@ -43,7 +43,7 @@ def _document(**changes: object) -> bytes:
 
 
 def test_an_archive_holds_all_parts_of_a_town() -> None:
-    assert set(inspect.signature(Town).parameters) == {"name", "cruise", *PARTS}
+    assert set(inspect.signature(Town).parameters) == {"name", "traffic", "cruise", *PARTS}
 
 
 def test_a_town_with_all_parts_is_restored_bit_for_bit() -> None:

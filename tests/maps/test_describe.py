@@ -36,6 +36,7 @@ def test_components_count_lane_changes_apart() -> None:
     )
     assert describe(town) == {
         "name": "three",
+        "traffic": "right",
         "lanes": 3,
         "links": 3,
         "components": [2, 1],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import LinkType, NoteKind, Town, load_town, town_names
-from dorothie_gym.maps.lane_neighbours import leftmost, rightmost
+from dorothie_gym.maps.lane_neighbours import innermost, outermost
 from dorothie_gym.maps.opendrive import import_opendrive, read_opendrive
 
 from .opendrive_text import lane, linked, opendrive, road, section, shared_map
@@ -57,7 +57,7 @@ def test_a_lane_that_changes_its_number_is_on_the_side_where_it_lies(tmp_path: P
     assert town.neighbour(through, toward_centre) == turn
     assert town.neighbour(turn, toward_centre) is None
     check_neighbours(town)
-    assert rightmost(town, turn) == rightmost(town, through) != leftmost(town, turn) == leftmost(town, through)
+    assert outermost(town, turn) == outermost(town, through) != innermost(town, turn) == innermost(town, through)
     beside = town.lanes[turn]
     middle = beside.position(0.5 * beside.length)
     assert (town.lanes[through].project(middle)[1] > 0.0) == (town.neighbour(through, RIGHT) == turn)

@@ -108,7 +108,7 @@ def test_lights_with_and_without_phases(midtown: TownPlan) -> None:
     assert (written_out.junction, written_out.offset) == ("market", 10.0)
     assert written_out.phases == (
         GreenPlan(streets=("Grand Avenue",), seconds=25.0),
-        GreenPlan(streets=(), left_only=("Grand Avenue",), seconds=8.0),
+        GreenPlan(streets=(), turn_lanes_only=("Grand Avenue",), seconds=8.0),
         GreenPlan(streets=("Market Street",), seconds=15.0),
     )
 

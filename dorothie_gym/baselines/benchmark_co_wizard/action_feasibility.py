@@ -102,7 +102,7 @@ def _turn_round(view: CoWizardView, town: Town) -> FeasibleAction | None:
     lane = town.lanes[view.lane]
     if view.manoeuvre is PhysicalAction.U_TURN and view.motion is not Motion.STOPPED:
         return FeasibleAction(physical=None, direction=Direction.BACK)
-    if lane.in_junction or view.manoeuvring or town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
+    if lane.in_junction or view.manoeuvring or town.neighbour(view.lane, town.traffic.to_middle) is not None:
         return None
     if not can_turn_round(town, view.lane, u_turn_start(view.station, view.speed)):
         return None

@@ -127,6 +127,7 @@ def readings_of(batch: DrivingRows, number: int) -> Readings:
         hazard=bool(control["hazard"] > 0),
         lights=bool(plan["lights"]),
         steering=float(control["steer"]) if batch.pedals else None,
+        traffic=batch.town.traffic,
     )
 
 

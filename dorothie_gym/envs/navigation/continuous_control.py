@@ -132,8 +132,8 @@ def instructed_manoeuvre(
         return 0, 0
     if order == LANE_SWITCH:
         return (order, LEFT if SECTORS[heard.sector] > 0 else RIGHT) if heard.sector >= 0 else (0, 0)
-    leftmost = town.lanes[plan.lane].left < 0
-    may = leftmost and plan_u_turn(town, world, world.vehicles[0].speed)[0] == Refusal.NONE
+    innermost = town.lanes[plan.lane].inner < 0
+    may = innermost and plan_u_turn(town, world, world.vehicles[0].speed)[0] == Refusal.NONE
     return (order, 0) if may else (0, 0)
 
 

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from dorothie_gym.support import portable_math as pm
@@ -63,6 +64,7 @@ class Readings:
         hazard: whether the car brakes for a hazard.
         lights: whether the headlights are on.
         steering: share of the greatest steering angle, positive right; None where the car steers itself.
+        traffic: side of the road on which vehicles drive, from which U-turns lead away.
     """
 
     action: ActionValue | None = None
@@ -77,6 +79,7 @@ class Readings:
     hazard: bool = False
     lights: bool = False
     steering: float | None = None
+    traffic: DrivingSide = DrivingSide.RIGHT
 
 
 def rows_of_dashboard(height: int) -> int:
@@ -105,12 +108,12 @@ def draw_dashboard(readings: Readings) -> NDArray[np.uint8]:
         _draw_needle(panel, *readings.goal)
         _fill(panel, 2, _DISTANCE, pm.hypot(*readings.goal) / GOAL, GOAL_COLOUR)
     elif readings.action is not None:
-        _draw_icon(panel, _ICON, readings.action, readings.sector, None)
+        _draw_icon(panel, _ICON, readings.action, readings.sector, readings.traffic, None)
         colour = AHEAD if readings.distance >= 0.0 else PASSED
         _fill(panel, 0, _DISTANCE, abs(readings.distance) / FAR, colour)
         _fill(panel, 1, _DISTANCE, abs(readings.distance) / NEAR, colour)
     if readings.planned is not None:
-        _draw_icon(panel, _PLAN, readings.planned, readings.planned_sector, PLANNED)
+        _draw_icon(panel, _PLAN, readings.planned, readings.planned_sector, readings.traffic, PLANNED)
     _fill(panel, 0, _SPEED, readings.speed / FASTEST, SPEED)
     _fill(panel, 1, _SPEED, readings.wanted / FASTEST, WANTED)
     if readings.limit is not None:
@@ -280,7 +283,7 @@ _COLOURS = {
 }
 
 
-def icon_of(action: ActionValue, sector: int | None) -> NDArray[np.bool_]:
+def icon_of(action: ActionValue, sector: int | None, traffic: DrivingSide) -> NDArray[np.bool_]:
     """Returns the shape of an action in a direction (11, 11): arrows of turns point into their sector."""
     angle = 0 if sector is None else SECTORS[sector]
     if action is ActionValue.J_TURN:
@@ -288,14 +291,20 @@ def icon_of(action: ActionValue, sector: int | None) -> NDArray[np.bool_]:
         return np.rot90(_ARROWS[odd], (angle - odd) // 90)
     if action is ActionValue.LANE_SWITCH:
         return _LEFTWARD if angle > 0 else _LEFTWARD[:, ::-1]
-    return _SHAPES.get(action, _UNKNOWN)
+    shape = _SHAPES.get(action, _UNKNOWN)
+    return shape[:, ::-1] if action is ActionValue.U_TURN and traffic is DrivingSide.LEFT else shape
 
 
 def _draw_icon(
-    panel: NDArray[np.uint8], first: int, action: ActionValue, sector: int | None, colour: tuple[int, int, int] | None
+    panel: NDArray[np.uint8],
+    first: int,
+    action: ActionValue,
+    sector: int | None,
+    traffic: DrivingSide,
+    colour: tuple[int, int, int] | None,
 ) -> None:
     square = panel[HEIGHT - _SIZE :, first : first + _SIZE]
-    square[icon_of(action, sector)] = colour or _COLOURS.get(action, (200, 200, 200))
+    square[icon_of(action, sector, traffic)] = colour or _COLOURS.get(action, (200, 200, 200))
 
 
 def _draw_needle(panel: NDArray[np.uint8], ahead: float, right: float) -> None:

@@ -146,6 +146,7 @@ class SeatFrames:
             "k": "hello",
             "seat": seat.name,
             "town": town.name,
+            "traffic": str(town.traffic),
             "rate": self._config.decision_frequency,
             "pictures": self._windscreen is not None and seat.role is not Role.AD_WIZARD,
             "repeatable": self._config.repeatable,

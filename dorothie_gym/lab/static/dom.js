@@ -17,7 +17,7 @@ export function h(tag, props = {}, ...children) {
 
 const ICONS = {
   arrow: 'M12 20V5m0 0-5.500 5.500M12 5l5.500 5.500',
-  uturn: 'M8 20V10a5 5 0 0 1 10 0v4m0 0-3.500-3.500M18 14l3-3.500',
+  uturn: 'M16 20V10a5 5 0 0 0-10 0v4m0 0 3.500-3.500M6 14l-3-3.500',
   stop: 'M8 3h8l5 5v8l-5 5H8l-5-5V8zM8.500 12h7',
   go: 'M7 4.500v15l12-7.500z',
   faster: 'm5 12 7-7 7 7M5 19l7-7 7 7',
@@ -46,7 +46,7 @@ const ICONS = {
 export function icon(name, turn = 0) {
   const svg = document.createElementNS(SVG, 'svg');
   svg.setAttribute('viewBox', '0 0 24 24');
-  svg.setAttribute('class', 'icon');
+  svg.setAttribute('class', name === 'uturn' ? 'icon uturn' : 'icon');
   svg.setAttribute('aria-hidden', 'true');
   const path = document.createElementNS(SVG, 'path');
   path.setAttribute('d', ICONS[name]);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,31 +31,32 @@ DRAWN_OUT = 2.0
 crossings with five and more arms have no faults; with 1.5 some do."""
 
 THIRD_MOUTH = 0.5
-"""Distance to the right of both streets of a right turn of a mouth that belongs to a third street [m]."""
+"""Distance beyond the kerbs of both streets of a turn of a mouth that belongs to a third street [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LaneEndPose:
-    """End of a lane: position (2,) [m], direction (2,) and width [m]."""
+    """End of a lane: position (2,) [m], direction (2,), width [m] and the sign of the town's `DrivingSide`."""
 
     place: Array
     along: Array
     width: float
+    sign: int
 
     @property
-    def right(self) -> Array:
-        """Unit vector to the right (2,)."""
-        return np.array([-self.along[1], self.along[0]])
+    def outward(self) -> Array:
+        """Unit vector towards the kerb (2,): to the right, or in left-hand traffic to the left."""
+        return self.sign * np.array([-self.along[1], self.along[0]])
 
     @property
     def edges(self) -> Array:
-        """Left and right edge point (2, 2) [m]."""
-        aside = 0.5 * self.width * self.right
+        """Edge points in the middle of the road and at the kerb (2, 2) [m]."""
+        aside = 0.5 * self.width * self.outward
         return np.array([self.place - aside, self.place + aside])
 
 
 class Corner:
-    """Rounded kerb on the inner side of a right turn."""
+    """Rounded kerb on the inner side of a turn from kerb to kerb."""
 
     def __init__(self, connector: int, start: LaneEndPose, end: LaneEndPose, corner: Array, turn: float) -> None:
         """Rounds off a corner.
@@ -64,7 +65,7 @@ class Corner:
             connector: id of the lane of the turn.
             start: start of the turn.
             end: end of the turn.
-            corner: intersection of the right edges of both streets (2,) [m].
+            corner: intersection of the kerbs of both streets (2,) [m].
             turn: change of direction [rad], positive.
         """
         self.connector = connector
@@ -72,7 +73,7 @@ class Corner:
         self._kerbs = start.edges[1], end.edges[1]
         self._corner = corner
         self._radius = 1.0 / pn.tan(0.5 * turn)
-        self._middle = self._radius * start.right - start.along
+        self._middle = self._radius * start.outward - start.along
 
     def _drawing(self, drawn_out: float) -> Array:
         """Returns the matrix (2, 2) that scales the rounded part of both edges to length 1, so that the kerb is an arc.
@@ -87,9 +88,9 @@ class Corner:
         return drawing
 
     def beyond(self, places: Array) -> Array:
-        """Returns the distance of positions (n, 2) to the right of both streets, without limit along them (n,) [m]."""
+        """Returns the distance of positions (n, 2) beyond both kerbs, without limit along them (n,) [m]."""
         (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
-        beyond: Array = np.minimum((places - kerb) @ start.right, (places - kerb_behind) @ end.right)
+        beyond: Array = np.minimum((places - kerb) @ start.outward, (places - kerb_behind) @ end.outward)
         return beyond
 
     def depth(self, places: Array, connector: int) -> Array:
@@ -126,16 +127,16 @@ def end_of(town: Town, lane: int, point: int) -> LaneEndPose:
     row = town.lanes[lane]
     heading = row.headings[point]
     along = np.array([pn.cos(heading), pn.sin(heading)])
-    return LaneEndPose(place=row.points[point, :2], along=along, width=float(row.widths[point]))
+    return LaneEndPose(place=row.points[point, :2], along=along, width=float(row.widths[point]), sign=town.traffic.sign)
 
 
 def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], edges: Array) -> list[Corner]:
-    """Returns the corners of right turns from kerb to kerb; none where a third street lies in between.
+    """Returns the corners of turns from kerb to kerb; none where a third street lies in between.
 
     Args:
         town: the town.
         connectors: ids of the connectors of the junction.
-        kerb_lanes: ids of the lanes with a kerb on their right.
+        kerb_lanes: ids of the lanes with a kerb beside them.
         edges: mouths of the junction (n, 2) [m].
     """
     found = []
@@ -144,8 +145,8 @@ def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], e
         if not (before and after and kerb_lanes.issuperset(before) and kerb_lanes.issuperset(after)):
             continue
         start, end = end_of(town, before[0], -1), end_of(town, after[0], 0)
-        turn = float(pn.arctan2(start.along @ -end.right, start.along @ end.along))
-        shifted = [LaneEndPose(place=pose.edges[1], along=pose.along, width=0.0) for pose in (start, end)]
+        turn = float(pn.arctan2(start.along @ -end.outward, start.along @ end.along))
+        shifted = [replace(pose, place=pose.edges[1], width=0.0) for pose in (start, end)]
         meeting = _meeting(*shifted)
         if meeting is None or not CORNER_TURNS[0] <= turn <= CORNER_TURNS[1]:
             continue
@@ -172,7 +173,7 @@ def outside(edges: Array, start: LaneEndPose, end: LaneEndPose, room: float, pla
         reach = room + 0.5 * float(pn.hypot(*(end.place - start.place)))
         bends = start.place + reach * start.along, end.place - reach * end.along
     aside = [
-        bend + sign * room * pose.right for bend, pose in zip(bends, (start, end), strict=True) for sign in (-1, 1)
+        bend + sign * room * pose.outward for bend, pose in zip(bends, (start, end), strict=True) for sign in (-1, 1)
     ]
     edges = np.concatenate((edges, np.array(aside)))
     try:
@@ -221,7 +222,7 @@ def kerb_faults(town: Town, samples: LaneSamples) -> Iterator[Fault]:
 
 
 def _kerb_lanes(lanes: Sequence[Lane]) -> frozenset[int]:
-    """Returns the lanes outside junctions with a kerb on their right, according to their lane numbers."""
+    """Returns the lanes outside junctions with a kerb beside them, according to their lane numbers."""
     widest: dict[tuple[int, bool], int] = {}
     for lane in lanes:
         side = lane.road_id, lane.lane_id > 0

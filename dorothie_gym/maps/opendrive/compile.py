@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.long_lanes import cut_long_lanes
 from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink
@@ -17,6 +18,7 @@ from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalk
 from dorothie_gym.maps.opendrive.lane_changes import lane_change_links
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
+from dorothie_gym.maps.opendrive.traffic_rule import driving_side
 from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
@@ -59,6 +61,8 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
     samples = {road.id: sample_road(road) for road in records.roads.values()}
     topology, lines = sample_centrelines(records, build_topology(records), samples)
     lanes = _lanes(records, topology, lines)
+    traffic = driving_side(records, lanes)
+    lanes = tuple(_numbered_outwards(records, topology, lane, traffic) for lane in lanes)
     links = successor_links(lanes, topology) + lane_change_links(records, topology, lanes)
     if trapped := trapped_lanes(lanes, links):
         topology, lanes, links = _without(trapped, topology, lanes, links, records)
@@ -70,11 +74,12 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
         links=links,
         junctions=junctions,
         streets=streets,
-        sites=lay_sites(lanes, links),
+        sites=lay_sites(lanes, links, traffic=traffic),
         signals=signals,
         crosswalks=place_crosswalks(records),
         sidewalks=lay_sidewalks(records, samples, lanes),
-        programmes=derive_programmes(lanes, links, junctions, signals),
+        programmes=derive_programmes(lanes, links, junctions, signals, traffic),
+        traffic=traffic,
         cruise=None,
     )
     return cut_long_lanes(town, records.notes), records.notes
@@ -112,6 +117,21 @@ def _lanes(records: OpenDriveRecords, topology: Topology, lines: list[Array]) ->
         )
         for k, (chain, line, limit) in enumerate(zip(topology.chains, lines, limits, strict=True))
     )
+
+
+def _numbered_outwards(records: OpenDriveRecords, topology: Topology, lane: Lane, traffic: DrivingSide) -> Lane:
+    """Returns a lane with a number that grows from the middle of the road to the kerb.
+
+    The numbers of a file grow with the distance from the reference line, which SUMO draws at the kerb in left-hand
+    traffic.
+    """
+    piece = topology.chains[lane.id][0]
+    road = records.roads[piece.road]
+    if road.right_hand == (traffic is DrivingSide.RIGHT):
+        return lane
+    side = [abs(number) for number in road.sections[piece.section].lanes if number * piece.lane > 0]
+    number = max(side) + 1 - abs(piece.lane)
+    return replace(lane, lane_id=number if piece.lane > 0 else -number)
 
 
 def _speed_limits(records: OpenDriveRecords, topology: Topology) -> list[float]:

@@ -17,6 +17,7 @@ from dorothie_gym.maps.opendrive.geometry import Arc, Polynomial, Primitive, Ref
 from dorothie_gym.maps.opendrive.lane_sections import read_sections
 from dorothie_gym.maps.opendrive.objects import read_crosswalks, read_signals
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadLink, RoadRecord
+from dorothie_gym.maps.opendrive.traffic_rule import refuse_mixed_rules
 from dorothie_gym.support import portable_arrays as pn
 
 if TYPE_CHECKING:
@@ -31,6 +32,9 @@ LONGEST_LANES = 4_000_000.0
 
 # Shapes of the elements of a reference line.
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
+
+# Traffic rules of roads (OpenDRIVE 1.5 and later).
+_RULES = ("LHT", "RHT")
 
 
 def parse_opendrive(path: str | Path) -> OpenDriveRecords:
@@ -48,6 +52,7 @@ class _Parser(ElementReader):
     def parse(self) -> OpenDriveRecords:
         root = self.root()
         self.number_ids(root)
+        self._rule = _common_rule(root)
         roads: dict[int, RoadRecord] = {}
         elements: dict[int, Element] = {}
         for element in root.iterfind("road"):
@@ -60,6 +65,7 @@ class _Parser(ElementReader):
                 roads[road.id], elements[road.id] = road, element
         if not roads:
             refuse_empty(self.source, self.notes, "has no roads; export the map again")
+        refuse_mixed_rules(self.source, roads)
         sections = (section for road in roads.values() for section in road.sections)
         lanes = sum((section.end - section.start) * len(section.lanes) for section in sections)
         if lanes > LONGEST_LANES:
@@ -87,7 +93,7 @@ class _Parser(ElementReader):
         length = self.number(road, "length")
         if not 0.0 <= length <= LONGEST_ROAD:
             self.fail(road, f"attribute length must lie in 0 to {LONGEST_ROAD:g} m, but is {length:g}")
-        right_hand = road.get("rule", "RHT").upper() != "LHT"
+        right_hand = self._right_hand(road)
         return RoadRecord(
             id=self.reference(road, "id", "road", self.roads),
             name=self.text(road, "id"),
@@ -109,6 +115,13 @@ class _Parser(ElementReader):
             signals=read_signals(self, road),
             crosswalks=read_crosswalks(self, road),
         )
+
+    def _right_hand(self, road: Element) -> bool:
+        """Returns whether traffic keeps to the right on a road; one without a rule follows the others."""
+        rule = road.get("rule", "").upper()
+        if rule not in _RULES and self._rule == "LHT":
+            self.notes.assumed(NoteKind.TRAFFIC, describe(road), "has no rule LHT or RHT; that of other roads is LHT")
+        return (rule if rule in _RULES else self._rule) != "LHT"
 
     def _crossed(self, road: Element) -> int:
         """Returns the junction that a road crosses, or -1; it need not be in the file."""
@@ -231,6 +244,12 @@ class _Parser(ElementReader):
                 self.notes.assumed(NoteKind.CONNECTION, describe(element), reason)
                 return contact
         self.fail(element, "attribute contactPoint must be start or end, and no end of its road is linked")
+
+
+def _common_rule(root: Element) -> str:
+    """Returns the rule of the roads that have one, LHT or RHT; by default, and where they differ, RHT."""
+    rules = {road.get("rule", "").upper() for road in root.iterfind("road")}
+    return "LHT" if "LHT" in rules and "RHT" not in rules else "RHT"
 
 
 def _place(road: RoadRecord, end: int) -> Array:

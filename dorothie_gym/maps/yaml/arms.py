@@ -208,16 +208,17 @@ def _partner(crossing: Crossing, arms: Sequence[Arm], ramp: Arm, host: Arm) -> i
     if not ways or min(ways)[0] > _STRAIGHT_ON_ANGLE:
         ramp.street.entry.fail(
             f"the ramp {verb} {host.street.name!r} at {crossing.name!r}, but {way} on this side; ramps leave and"
-            " join on the right of a street that runs straight through the junction"
+            f" join on the {ramp.street.traffic} of a street that runs straight through the junction"
         )
     return min(ways)[1]
 
 
 def _check_side(ramp: Arm, other: Arm, wrong: object, slips: Mapping[int, int]) -> None:
-    """Rejects a ramp that is close to a street on its left side."""
+    """Rejects a ramp that is close to a street on the side of oncoming traffic."""
     if wrong and ramp.street.ramp and ramp.index not in slips and not other.street.ramp:
-        verb = "leaves" if ramp.outgoing else "joins"
+        verb, traffic = "leaves" if ramp.outgoing else "joins", ramp.street.traffic
         ramp.street.entry.fail(
-            f"the ramp {verb} {other.street.name!r} on its left; ramps are on the right, in driving direction: bend its"
+            f"the ramp {verb} {other.street.name!r} on its {traffic.far_turn}; ramps are on the {traffic}, in driving"
+            " direction: bend its"
             " first points to the other side"
         )

@@ -190,7 +190,8 @@ def _radii(segment: StreetSegment, points: Sequence[Point]) -> list[float]:
         fits = min(rooms[k - 1], rooms[k]) / pm.tan(min(turn, math.radians(179.0)) / 2.0)
         radius = fits if street.radius is None else street.radius
         tightest = segment.section.tightest(signed > 0.0, SMALLEST_BEND)
-        where = f"the bend at {[round(c, 2) for c in points[k]]} {segment.label()}"
+        place = [round(points[k][0], 2), round(street.traffic.sign * points[k][1], 2)]
+        where = f"the bend at {place} {segment.label()}"
         if radius < tightest:
             street.entry.fail(
                 f"{where} is tighter than its lanes are wide: radius {radius:.1f} m, at least {tightest:.1f} m are"

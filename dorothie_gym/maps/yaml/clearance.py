@@ -142,7 +142,8 @@ def _refuse(
 ) -> NoReturn:
     """Raises the error of two samples that touch."""
     first, second = sorted((int(k) for k in samples.owner[pair]), reverse=True)
-    place = [round(float(c)) for c in samples.points[pair[0], :2]]
+    x, y = (float(c) for c in samples.points[pair[0], :2])
+    place = [round(x), round(segments[0].street.traffic.sign * y)]
     if first < len(segments):
         segment, other = segments[first], segments[second]
         if first == second:

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.import_notes import ImportNotes
 from dorothie_gym.maps.long_lanes import cut_long_lanes
+from dorothie_gym.maps.mirroring import mirrored
 from dorothie_gym.maps.model import NO_JUNCTION, NO_STREET, Array, Junction, Lane, LaneLink, LinkType, Site, Street
 from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.town import Town
@@ -42,11 +44,14 @@ def read_yaml_town(path: str | FilePath) -> Town:
 def import_yaml_town(path: str | FilePath) -> tuple[Town, ImportNotes]:
     """Compiles a town file like `read_yaml_town`; also returns what was repaired: lanes that were too long."""
     notes = ImportNotes(str(path))
-    return cut_long_lanes(compile_town(lay_out(read_plan(FilePath(path)))), notes), notes
+    plan = read_plan(FilePath(path))
+    left = plan.traffic is DrivingSide.LEFT
+    town = compile_town(lay_out(plan.mirrored() if left else plan))
+    return cut_long_lanes(mirrored(town) if left else town, notes), notes
 
 
 def compile_town(layout: Layout) -> Town:
-    """Builds the town of a layout: first the lanes of all segments, then the connectors.
+    """Builds the town of a layout, with right-hand traffic: first the lanes of all segments, then the connectors.
 
     Raises:
         TownError: the phases of a light do not match its signals, or a site is far from all streets.

@@ -125,11 +125,11 @@ def place_signals(
 
 @dataclass(frozen=True)
 class _Head:
-    """Signal with the street of its approach, and whether it only controls the left-turn lane."""
+    """Signal with the street of its approach, and whether it only controls the turn lane in the median."""
 
     signal: Signal
     street: StreetPlan
-    left: bool
+    turns: bool
 
 
 def _kinds(layout: Layout, crossing: Crossing) -> dict[int, SignalKind]:
@@ -152,11 +152,11 @@ def _heads(approach: Approach, kind: SignalKind, number: int) -> list[_Head]:
     kerb = through[0]
     aside = kerb.widths[-1] / 2.0 + SIGNAL_ASIDE
     if kind is not SignalKind.TRAFFIC_LIGHT or pocket is None:
-        return [_Head(_signal(number, kind, approach.incoming, kerb, aside), street, left=False)]
+        return [_Head(_signal(number, kind, approach.incoming, kerb, aside), street, turns=False)]
     middle = -pocket.widths[-1] / 2.0 - MEDIAN_ASIDE
     return [
-        _Head(_signal(number, kind, through, kerb, aside), street, left=False),
-        _Head(_signal(number + 1, kind, (pocket,), pocket, middle), street, left=True),
+        _Head(_signal(number, kind, through, kerb, aside), street, turns=False),
+        _Head(_signal(number + 1, kind, (pocket,), pocket, middle), street, turns=True),
     ]
 
 
@@ -195,7 +195,7 @@ def _written(plan: LightsPlan, junction_id: int, heads: Sequence[_Head]) -> Ligh
     greens = [_greens(plan, phase, heads) for phase in plan.phases]
     for head in heads:
         if not any(head.signal.id in green for green in greens):
-            which = "left-turn lane" if head.left else "light"
+            which = f"{head.street.traffic.far_turn}-turn lane" if head.turns else "light"
             plan.entry.fail(f"the {which} of {head.street.name!r} never has green; add its street to a phase")
     phases: list[LightPhase] = []
     for phase, green, after in zip(plan.phases, greens, (*greens[1:], greens[0]), strict=True):
@@ -216,16 +216,16 @@ def _written(plan: LightsPlan, junction_id: int, heads: Sequence[_Head]) -> Ligh
 
 def _greens(plan: LightsPlan, phase: GreenPlan, heads: Sequence[_Head]) -> tuple[int, ...]:
     """Returns the ids of the signals that are green in a phase."""
-    for name in (*phase.streets, *phase.left_only):
-        left_only = name in phase.left_only
-        if not any(head.street.name == name and (head.left or not left_only) for head in heads):
-            what = "left-turn lane" if left_only else "approach"
+    for name in (*phase.streets, *phase.turn_lanes_only):
+        turns = name in phase.turn_lanes_only
+        if not any(head.street.name == name and (head.turns or not turns) for head in heads):
+            what = f"{heads[0].street.traffic.far_turn}-turn lane" if turns else "approach"
             plan.entry.fail(f"a phase gives green to {name!r}, which has no {what} here; name another street")
     return tuple(
         head.signal.id
         for head in heads
-        if (head.street.name in phase.streets and head.street.name not in phase.left_only)
-        or (head.left and head.street.name in phase.left_only)
+        if (head.street.name in phase.streets and head.street.name not in phase.turn_lanes_only)
+        or (head.turns and head.street.name in phase.turn_lanes_only)
     )
 
 

@@ -68,6 +68,7 @@ def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: in
         speed=plan.speed,
         width=max(runs[k].street.width for k, _ in ends),
         sidewalk=max(runs[k].street.sidewalk for k, _ in ends),
+        traffic=runs[ends[0][0]].street.traffic,
         entry=junction.entry,
     )
     inner = plan.radius - (plan.lanes - 1) * street.width / 2.0
@@ -139,7 +140,7 @@ class Layout:
         centrelines: line of each segment, from the edge of its first crossing to that of its second.
         arms: arms in order of heading, by crossing id.
         ways: paths of all movements, by crossing id.
-        pockets: length of left-turn lanes [m], by index of the segment and whether they lead to its start.
+        pockets: length of turn lanes in medians [m], by index of the segment and whether they lead to its start.
         hosts: id of the street that each ramp leaves or else joins, by id of the ramp.
     """
 

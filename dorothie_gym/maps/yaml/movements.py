@@ -75,7 +75,9 @@ def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], segments: Sequence[S
         result.append(arm)
     for street in {arm.street.id: arm.street for arm in wanted}.values():
         if not any(arm.pocket for arm in result if arm.street is street):
-            street.entry.fail(f"it has a turn lane before {crossing.name!r}, where nothing goes left; remove it")
+            street.entry.fail(
+                f"it has a turn lane before {crossing.name!r}, where nothing goes {street.traffic.far_turn}; remove it"
+            )
     return tuple(result)
 
 

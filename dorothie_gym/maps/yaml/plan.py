@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.yaml.entries import YamlEntry
 from dorothie_gym.maps.yaml.geometry import Point
 
@@ -63,12 +64,13 @@ class StreetPlan:
         forward: lanes along the course, at least 1.
         backward: lanes against it; 0 makes the street one-way.
         median: width of the median [m].
-        turn_lanes: names of the junctions before which a left-turn lane opens in the median.
-        ramp: whether it is a ramp: one-way, leaves and joins other streets on their right at a small angle.
+        turn_lanes: names of the junctions before which a lane for turns across oncoming traffic opens in the median.
+        ramp: whether it is a ramp: one-way, leaves and joins other streets on the side of their kerb at a small angle.
         speed: speed limit [km/h].
         width: width of a lane [m].
         radius: radius of its bends [m], or None for the largest that fits.
         sidewalk: width of the pavements on both sides [m]; 0 for none.
+        traffic: side of the road on which vehicles drive in its town.
         entry: position in the file.
     """
 
@@ -84,6 +86,7 @@ class StreetPlan:
     width: float
     radius: float | None = None
     sidewalk: float = 2.0
+    traffic: DrivingSide = DrivingSide.RIGHT
     entry: YamlEntry
 
 
@@ -91,12 +94,12 @@ class StreetPlan:
 class GreenPlan:
     """Phase of a light programme in a plan: streets with green on all approaches, and duration [s].
 
-    `left_only` holds the names of the streets with green for the left-turn lanes only.
+    `turn_lanes_only` holds the names of the streets with green for the turn lanes in the median only.
     """
 
     streets: tuple[str, ...]
     seconds: float
-    left_only: tuple[str, ...] = ()
+    turn_lanes_only: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +126,7 @@ class TownPlan:
         crosswalks: pairs of a junction name and the street that is crossed there.
         sites: positions of landmarks [m]; empty to place them automatically.
         cruise: cruise speed of the ego without a request, in a town with slow traffic [km/h]; None: the speed limits.
+        traffic: side of the road on which vehicles drive.
     """
 
     name: str
@@ -134,3 +138,31 @@ class TownPlan:
     crosswalks: tuple[tuple[str, StreetPlan], ...] = ()
     sites: tuple[tuple[Point, YamlEntry], ...] = ()
     cruise: float | None = None
+    traffic: DrivingSide = DrivingSide.RIGHT
+
+    def mirrored(self) -> TownPlan:
+        """Returns the plan with y negated: laid out for right-hand traffic, the mirror image of a left-hand town."""
+        streets = {street.id: _mirrored_street(street) for street in self.streets}
+        stops, yields, crosswalks = (
+            tuple((name, streets[street.id]) for name, street in pairs)
+            for pairs in (self.stops, self.yields, self.crosswalks)
+        )
+        return replace(
+            self,
+            junctions={name: replace(j, centre=_mirrored(j.centre)) for name, j in self.junctions.items()},
+            streets=tuple(streets.values()),
+            stops=stops,
+            yields=yields,
+            crosswalks=crosswalks,
+            sites=tuple((_mirrored(place), entry) for place, entry in self.sites),
+        )
+
+
+def _mirrored(point: Point) -> Point:
+    return point[0], -point[1]
+
+
+def _mirrored_street(street: StreetPlan) -> StreetPlan:
+    return replace(
+        street, course=tuple(s if isinstance(s, str) else replace(s, at=_mirrored(s.at)) for s in street.course)
+    )

@@ -7,6 +7,7 @@ A village::
 
     name: village                  # optional, else the file's name
     speed: 40                      # km/h, optional
+    traffic: left                  # side of the road, optional, else right
     junctions:                     # metres, x east, y south
       green: [0, 0]
       pond: [150, 0]
@@ -24,6 +25,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.yaml.entries import YamlEntry, listed, read_nodes
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, JunctionPlan, LightsPlan, RoundaboutPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.street_schema import (
@@ -41,7 +43,8 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.yaml.geometry import Point
 
 LIGHTS_KEYS = ("at", "offset", "phases")
-PHASE_KEYS = ("green", "left", "seconds")
+PHASE_KEYS = ("green", "left", "right", "seconds")
+TRAFFIC = tuple(str(side) for side in DrivingSide)
 SECONDS = (3.0, 300.0)
 """Range of phase durations [s]."""
 OFFSET = (0.0, 600.0)
@@ -158,22 +161,22 @@ def _phases(entry: YamlEntry, junction: str, streets: Sequence[StreetPlan]) -> t
 
 
 def _phase(entry: YamlEntry, junction: str, here: Mapping[str, StreetPlan], streets: Sequence[StreetPlan]) -> GreenPlan:
-    fields = entry.fields(PHASE_KEYS, required=("seconds",))
+    traffic = streets[0].traffic
+    turns = str(traffic.far_turn)  # those of the lanes in the median
+    fields = entry.fields([key for key in PHASE_KEYS if key != traffic.near_turn], required=("seconds",))
     green = _green(fields["green"], junction, here, streets) if "green" in fields else ()
-    left = _green(fields["left"], junction, here, streets) if "left" in fields else ()
-    if not green and not left:
-        entry.fail("the phase names no street; add 'green: [...]' or 'left: [...]'")
-    for name in left:
+    turning = _green(fields[turns], junction, here, streets) if turns in fields else ()
+    if not green and not turning:
+        entry.fail(f"the phase names no street; add 'green: [...]' or '{turns}: [...]'")
+    for name in turning:
         if junction not in here[name].turn_lanes:
-            fields["left"].fail(
+            fields[turns].fail(
                 f"{name!r} has no turn lane at {junction!r}; add it to the 'turn_lanes' of the street,"
                 " or name the street in 'green'"
             )
         if name in green:
-            fields["left"].fail(
-                f"{name!r} is in the 'green' of this phase already, turn lanes included; remove it here"
-            )
-    return GreenPlan(streets=green, left_only=left, seconds=fields["seconds"].number(*SECONDS, "seconds"))
+            fields[turns].fail(f"{name!r} is in the 'green' of this phase already, turn lanes included; remove it here")
+    return GreenPlan(streets=green, turn_lanes_only=turning, seconds=fields["seconds"].number(*SECONDS, "seconds"))
 
 
 def _green(
@@ -195,7 +198,8 @@ def _green(
 # --- Whole town ------------------------------------------------------------------------------------------------------
 
 TOWN_KEYS = (
-    "name", "speed", "cruise", "width", "sidewalk", "junctions", "streets", "lights", "stops", "yields", "crosswalks",
+    "name", "speed", "cruise", "width", "sidewalk", "traffic", "junctions", "streets", "lights", "stops", "yields",
+    "crosswalks",
     "sites",
 )  # fmt: skip
 JUNCTION_KEYS = ("at", "roundabout", "lanes", "speed")
@@ -218,7 +222,8 @@ def read_plan(path: Path) -> TownPlan:
     """
     top = read_nodes(path)
     fields = {key: value.named(key) for key, value in top.fields(TOWN_KEYS, required=("junctions", "streets")).items()}
-    defaults = StreetDefaults()
+    traffic = DrivingSide(fields["traffic"].choice(TRAFFIC, "side", "right or left")) if "traffic" in fields else None
+    defaults = StreetDefaults(traffic=traffic or DrivingSide.RIGHT)
     for key, read in (("speed", speed), ("width", lane_width), ("sidewalk", pavement)):
         if key in fields:
             defaults = defaults.replaced(key, read(fields[key]))
@@ -241,6 +246,7 @@ def read_plan(path: Path) -> TownPlan:
         crosswalks=read_crosswalks(fields["crosswalks"], junctions, streets) if "crosswalks" in fields else (),
         sites=_sites(fields["sites"]) if "sites" in fields else (),
         cruise=_cruise(fields["cruise"]) if "cruise" in fields else None,
+        traffic=defaults.traffic,
     )
 
 

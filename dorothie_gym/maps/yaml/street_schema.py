@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.yaml.plan import Bend, CourseStep, JunctionPlan, StreetPlan
 
 if TYPE_CHECKING:
@@ -33,15 +34,17 @@ HEIGHT_RANGE = (-500.0, 9000.0)
 
 @dataclass(frozen=True, kw_only=True)
 class StreetDefaults:
-    """Default properties of streets: speed limit [km/h], widths [m]."""
+    """Default properties of streets: speed limit [km/h], widths [m], and the side of the road of their traffic."""
 
     speed: float = 40.0
     width: float = 3.5
     sidewalk: float = 2.0
+    traffic: DrivingSide = DrivingSide.RIGHT
 
     def replaced(self, key: str, value: float) -> StreetDefaults:
-        """Returns a copy with one value replaced."""
-        return dataclasses.replace(self, **{key: value})
+        """Returns a copy with one number replaced."""
+        change: dict[str, Any] = {key: value}
+        return dataclasses.replace(self, **change)
 
 
 def speed(entry: YamlEntry) -> float:
@@ -92,7 +95,7 @@ def read_street(
         fields["median"].fail("a median keeps two directions apart and this street has one; remove it")
     turn_lanes: tuple[str, ...] = ()
     if "turn_lanes" in fields:
-        turn_lanes = _turn_lanes(fields["turn_lanes"], course, junctions)
+        turn_lanes = _turn_lanes(fields["turn_lanes"], course, junctions, defaults.traffic)
         _check_room(fields["turn_lanes"], backward=backward, median=median, width=width)
     return StreetPlan(
         id=k,
@@ -107,6 +110,7 @@ def read_street(
         width=width,
         radius=fields["radius"].number(*RADIUS_RANGE, "metres") if "radius" in fields else None,
         sidewalk=pavement(fields["sidewalk"]) if "sidewalk" in fields else 0.0 if ramp else defaults.sidewalk,
+        traffic=defaults.traffic,
         entry=here,
     )
 
@@ -166,7 +170,7 @@ def _lanes(fields: Mapping[str, YamlEntry], *, ramp: bool) -> tuple[int, int]:
 
 
 def _turn_lanes(
-    entry: YamlEntry, course: tuple[CourseStep, ...], junctions: Mapping[str, JunctionPlan]
+    entry: YamlEntry, course: tuple[CourseStep, ...], junctions: Mapping[str, JunctionPlan], traffic: DrivingSide
 ) -> tuple[str, ...]:
     found: list[str] = []
     on_course = list(dict.fromkeys(step for step in course if isinstance(step, str)))
@@ -175,7 +179,7 @@ def _turn_lanes(
         if name not in on_course:
             element.fail(f"the street does not run through {name!r}; it does through {', '.join(on_course)}")
         if junctions[name].roundabout:
-            element.fail(f"{name!r} is a roundabout, which has no left turns; remove it here")
+            element.fail(f"{name!r} is a roundabout, which has no {traffic.far_turn} turns; remove it here")
         if name in found:
             element.fail(f"{name!r} is there twice; remove one")
         found.append(name)

@@ -51,6 +51,7 @@ class Border:
     Attributes:
         kind: kind of the area beyond it.
         sign: side of the lanes: -1 left, +1 right.
+        outer: whether that is the side of the kerb, not that of oncoming traffic.
         lanes: ids of the lanes, in driving direction.
         street: street of the first lane, or -1.
         points: line on the edge of the lanes in driving direction (n, 3) [m].
@@ -61,6 +62,7 @@ class Border:
 
     kind: BorderKind
     sign: int
+    outer: bool
     lanes: tuple[int, ...]
     street: int
     points: Array
@@ -86,31 +88,31 @@ class Borders:
 
     Attributes:
         lines: all lines, each once.
-        right_neighbour: lane in the same direction on the right of each lane that has one.
-        divided: lanes with oncoming traffic on their left, beyond a line or a median.
+        outer_neighbour: lane in the same direction beside each lane that has one on the side of the kerb.
+        divided: lanes with oncoming traffic beside them, beyond a line or a median.
     """
 
     lines: tuple[Border, ...]
-    right_neighbour: dict[int, int]
+    outer_neighbour: dict[int, int]
     divided: frozenset[int]
 
     @cached_property
-    def left_neighbour(self) -> dict[int, int]:
-        """Lane in the same direction on the left of each lane that has one."""
-        return {right: lane for lane, right in self.right_neighbour.items()}
+    def inner_neighbour(self) -> dict[int, int]:
+        """Lane in the same direction beside each lane that has one on the side of oncoming traffic."""
+        return {outer: lane for lane, outer in self.outer_neighbour.items()}
 
     def abreast(self, lane: int) -> int:
-        """Returns the number of lanes from a lane to the left edge of its carriageway."""
+        """Returns the number of lanes from a lane to the inner edge of its carriageway."""
         seen = {lane}
-        while (beside := self.left_neighbour.get(lane, lane)) not in seen:
+        while (beside := self.inner_neighbour.get(lane, lane)) not in seen:
             seen.add(beside)
             lane = beside
         return len(seen)
 
-    def rightmost(self, lane: int) -> int:
-        """Returns the rightmost lane of the carriageway of a lane."""
+    def outermost(self, lane: int) -> int:
+        """Returns the lane at the kerb of the carriageway of a lane."""
         seen = {lane}
-        while (beside := self.right_neighbour.get(lane, lane)) not in seen:
+        while (beside := self.outer_neighbour.get(lane, lane)) not in seen:
             seen.add(beside)
             lane = beside
         return lane
@@ -121,17 +123,17 @@ def find_borders(town: Town, samples: TownSamples) -> Borders:
     outside = samples.of_lanes(np.array([not lane.in_junction for lane in town.lanes], dtype=bool))
     if not len(outside):
         return Borders((), {}, frozenset())
-    on_left = _beside(samples, outside, -1)
-    on_right = _beside(samples, outside, 1)
-    leftmost = outside[on_left[outside] < 0]
-    facing, gap = _facing(samples, leftmost)
-    hidden = _inside_others(samples, outside)
+    out = town.traffic.sign  # row 0 of the kinds is the side of oncoming traffic, row 1 that of the kerb
+    inner = _beside(samples, outside, -out)
+    outer = _beside(samples, outside, out)
+    facing, gap = _facing(samples, outside[inner[outside] < 0], out)
+    hidden = _inside_others(samples, outside, out)
     thin = samples.half_width < _THIN / 2.0
     kinds = np.zeros((2, len(samples.lane)), dtype=np.int64)
     kinds[:, outside] = BorderKind.EDGE
-    kinds[1][on_right >= 0] = BorderKind.NONE  # drawn from the other lane, whose left side it is
-    kinds[0][on_left >= 0] = BorderKind.LANE
-    kinds[0][on_left >= 0] *= ~(thin | thin[np.maximum(on_left, 0)])[on_left >= 0]
+    kinds[1][outer >= 0] = BorderKind.NONE  # drawn from the other lane, whose inner side it is
+    kinds[0][inner >= 0] = BorderKind.LANE
+    kinds[0][inner >= 0] *= ~(thin | thin[np.maximum(inner, 0)])[inner >= 0]
     met = facing >= 0
     kinds[0][met] = np.where(gap[met] < NARROWEST_MEDIAN, BorderKind.CENTRE, BorderKind.MEDIAN)
     yielding = met & (kinds[0] == BorderKind.CENTRE) & ~_owns(town, samples, facing)
@@ -140,11 +142,11 @@ def find_borders(town: Town, samples: TownSamples) -> Borders:
     kinds[:, thin] *= kinds[:, thin] != BorderKind.EDGE
     lines = [
         line
-        for sign, row in ((-1, kinds[0]), (1, kinds[1]))
-        for line in _lines(town, samples, row, gap if sign < 0 else np.zeros_like(gap), sign)
+        for sign, row in ((-out, kinds[0]), (out, kinds[1]))
+        for line in _lines(town, samples, row, gap if sign != out else np.zeros_like(gap), sign)
     ]
     divided = np.unique(samples.lane[met]).tolist()
-    return Borders(tuple(lines), _majority(samples, on_right), frozenset(divided))
+    return Borders(tuple(lines), _majority(samples, outer), frozenset(divided))
 
 
 def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDArray[np.int64]:
@@ -163,23 +165,24 @@ def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDAr
     return found
 
 
-def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
-    """Returns the sample of the oncoming lane on the left (n,), or -1, and the gap between both left edges (n,) [m]."""
+def _facing(samples: TownSamples, innermost: NDArray[np.int64], out: int) -> tuple[NDArray[np.int64], Array]:
+    """Returns the sample of the oncoming lane (n,), or -1, and the gap between the inner edges of both (n,) [m]."""
     found, gap = np.full(len(samples.lane), -1, dtype=np.int64), np.zeros(len(samples.lane))
-    if not len(leftmost):
+    if not len(innermost):
         return found, gap
-    edge = samples.edge(-1)[leftmost]
+    edge = samples.edge(-out)[innermost]
     near, where = cKDTree(edge).query(edge, k=40, distance_upper_bound=_WIDEST_MEDIAN + 1.0)
-    candidate = leftmost[np.minimum(where, len(leftmost) - 1)]
-    fits = np.isfinite(near) & (pn.cos(samples.heading[candidate] - samples.heading[leftmost][:, None]) < -0.9)
-    fits &= np.abs(samples.centre[candidate, 2] - samples.centre[leftmost, 2][:, None]) < SAME_SURFACE
-    ahead, aside = _frame(samples, leftmost, edge[np.minimum(where, len(leftmost) - 1)] - edge[:, None])
+    candidate = innermost[np.minimum(where, len(innermost) - 1)]
+    fits = np.isfinite(near) & (pn.cos(samples.heading[candidate] - samples.heading[innermost][:, None]) < -0.9)
+    fits &= np.abs(samples.centre[candidate, 2] - samples.centre[innermost, 2][:, None]) < SAME_SURFACE
+    ahead, aside = _frame(samples, innermost, edge[np.minimum(where, len(innermost) - 1)] - edge[:, None])
+    aside = out * aside  # positive towards the own kerb
     fits &= (np.abs(ahead) < 1.3) & (aside < _TOUCH) & (aside > -_WIDEST_MEDIAN)
     some = fits.any(axis=1)
     first = np.argmin(np.where(fits, near, np.inf), axis=1)
-    rows = np.arange(len(leftmost))
-    found[leftmost] = np.where(some, candidate[rows, first], -1)
-    gap[leftmost] = np.where(some, np.maximum(0.0, -aside[rows, first]), 0.0)
+    rows = np.arange(len(innermost))
+    found[innermost] = np.where(some, candidate[rows, first], -1)
+    gap[innermost] = np.where(some, np.maximum(0.0, -aside[rows, first]), 0.0)
     return found, gap
 
 
@@ -190,11 +193,11 @@ def _frame(samples: TownSamples, index: NDArray[np.int64], offset: Array) -> tup
     return offset[..., 0] * c + offset[..., 1] * s, offset[..., 1] * c - offset[..., 0] * s
 
 
-def _inside_others(samples: TownSamples, outside: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Returns whether the left and right edges lie inside another lane at the same height (2, n)."""
+def _inside_others(samples: TownSamples, outside: NDArray[np.int64], out: int) -> NDArray[np.bool_]:
+    """Returns whether the inner and outer edges lie inside another lane at the same height (2, n)."""
     hidden = np.zeros((2, len(samples.lane)), dtype=bool)
     tree = cKDTree(samples.centre[outside, :2])
-    for row, sign in enumerate((-1, 1)):
+    for row, sign in enumerate((-out, out)):
         near, where = tree.query(samples.edge(sign)[outside], k=8, distance_upper_bound=3.0)
         candidate = outside[np.minimum(where, len(outside) - 1)]
         inside = np.isfinite(near) & (samples.lane[candidate] != samples.lane[outside][:, None])
@@ -274,6 +277,7 @@ def _border(
     yield Border(
         kind=BorderKind(chain[0][2]),
         sign=sign,
+        outer=sign == town.traffic.sign,
         lanes=lanes,
         street=town.lanes[lanes[0]].street,
         points=line,

@@ -63,22 +63,21 @@ def _posts(town: Town, borders: Borders, stops: Mapping[int, float], signal: Sig
         return
     own = frozenset(lanes)
     for number in lanes:
-        beside = borders.right_neighbour.get(number)
+        beside = borders.outer_neighbour.get(number)
         if beside in own:
             continue
-        lane, sign = town.lanes[number], 1.0
+        lane, sign = town.lanes[number], town.traffic.sign
         if beside is not None:
             # the outermost lanes have their own light
-            lane, sign = town.lanes[_leftmost(borders, own, number)], -1.0
+            lane, sign = town.lanes[_innermost(borders, own, number)], -town.traffic.sign
         station = stops.get(lane.id, lane.length)
         x, y = lane.position(station, sign * (lane.width_at(station) / 2.0 + _SIGN_ASIDE)).tolist()
         yield Post(signal.kind, (round(x, 2), round(y, 2)), signal.lanes)
 
 
-def _leftmost(borders: Borders, lanes: frozenset[int], lane: int) -> int:
-    left = {right: k for k, right in borders.right_neighbour.items()}
+def _innermost(borders: Borders, lanes: frozenset[int], lane: int) -> int:
     seen = {lane}
-    while (beside := left.get(lane, -1)) in lanes and beside not in seen:
+    while (beside := borders.inner_neighbour.get(lane, -1)) in lanes and beside not in seen:
         seen.add(beside)
         lane = beside
     return lane
@@ -120,7 +119,7 @@ class MapLayers:
         self.raised = LevelLookup(samples, self.stretches)
         self.stops = markings.stop_stations(town)
         self.ruled = markings.ruled_lanes(town)
-        shared = {*borders.right_neighbour, *borders.right_neighbour.values()}
+        shared = {*borders.outer_neighbour, *borders.outer_neighbour.values()}
         self.arrows = tuple(lane_arrows(town, shared, self.stops))
         self.pockets = find_pockets(town, borders)
         self.posts = posts(town, borders, self.stops)

@@ -125,7 +125,7 @@ def one_way_places(town: Town, borders: Borders) -> Iterator[tuple[int, float]]:
     """Yields lanes and stations [m] of the arrows along one-way streets."""
     for lane in town.lanes:
         innermost, seen = lane.id, {lane.id}
-        while (beside := borders.left_neighbour.get(innermost, innermost)) not in seen:
+        while (beside := borders.inner_neighbour.get(innermost, innermost)) not in seen:
             seen.add(beside)
             innermost = beside
         if lane.in_junction or innermost in borders.divided or lane.length < _ONE_WAY_SHORTEST:

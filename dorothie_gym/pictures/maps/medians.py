@@ -75,14 +75,14 @@ def _half_strip(line: Border, run: NDArray[np.int64], inset: float) -> Iterator[
     edge = np.stack([np.interp(fine, s, line.points[run, k]) for k in (0, 1)], axis=-1)
     heading = np.interp(fine, s, line.heading[run])
     gap = np.interp(fine, s, line.gap[run])
-    left = np.stack((pn.sin(heading), -pn.cos(heading)), axis=-1)
+    inward = line.sign * np.stack((-pn.sin(heading), pn.cos(heading)), axis=-1)
     radius = np.maximum(gap / 2.0 - inset, 0.0)
     # an end is a half circle: the strip narrows over half of its width
     near = np.clip(np.minimum(fine, s[-1] - fine) - inset, 0.0, None)
     depth = np.clip(radius - near, 0.0, radius)
     half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
-    outer = edge + (gap / 2.0 - half)[:, None] * left
-    inner = edge + (gap / 2.0 + 0.1 * (half > 0.1))[:, None] * left
+    outer = edge + (gap / 2.0 - half)[:, None] * inward
+    inner = edge + (gap / 2.0 + 0.1 * (half > 0.1))[:, None] * inward
     for k in range(0, len(fine) - 1, 8):
         part = slice(k, k + 9)
         if half[part].max() > 0.05:
@@ -140,7 +140,7 @@ class Pocket:
 
 
 def find_pockets(town: Town, borders: Borders) -> tuple[Pocket, ...]:
-    """Returns all turn lanes that open at full width on the left of a continuing lane."""
+    """Returns all turn lanes that open at full width beside a continuing lane, in the middle of the road."""
     found = [lane for lane in town.lanes if _opens(town, borders, lane)]
     starts = np.array([lane.points[0] for lane in found]).reshape(-1, 3)
     heading = np.array([lane.headings[0] for lane in found])
@@ -160,10 +160,10 @@ def find_pockets(town: Town, borders: Borders) -> tuple[Pocket, ...]:
 
 
 def _opens(town: Town, borders: Borders, lane: Lane) -> bool:
-    right = borders.right_neighbour.get(lane.id)
-    if lane.in_junction or right is None or lane.id not in borders.divided or town.predecessors(lane.id):
+    outer = borders.outer_neighbour.get(lane.id)
+    if lane.in_junction or outer is None or lane.id not in borders.divided or town.predecessors(lane.id):
         return False
-    before = town.predecessors(right)
+    before = town.predecessors(outer)
     return bool(before) and not town.lanes[before[0]].in_junction and lane.width_at(0.0) > _WIDE_OPENING
 
 
@@ -193,8 +193,8 @@ def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) ->
     """
     for pocket in found:
         lane = town.lanes[pocket.lane]
-        half = lane.width_at(0.0) / 2.0
-        # from the right side of the turn lane, where the median ended, to its left side
+        half = town.traffic.sign * lane.width_at(0.0) / 2.0
+        # from the outer side of the turn lane, where the median ended, to its inner side
         near, far = pocket.aside - half, pocket.aside + half
         line = [(-pocket.back - _OVERLAP, far), (0.0, far), (pocket.taper, near)]
         other = [(-pocket.back - _OVERLAP, near), (0.0, near)]
@@ -205,8 +205,8 @@ def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) ->
         if not fine:
             continue
         for at in np.arange(_HATCH / 2.0 - pocket.back, pocket.taper - _SLANT - 0.5, _HATCH).tolist():
-            right = far - 2.0 * half * max(0.0, at) / pocket.taper
-            bar = [(at + _SLANT * (right - near) / (2.0 * half), near), (at, right)]
+            outer = far - 2.0 * half * max(0.0, at) / pocket.taper
+            bar = [(at + _SLANT * (outer - near) / (2.0 * half), near), (at, outer)]
             yield Shape(stroke(_placed(lane, bar), max(0.4, pen)), palette.HATCHING, lane.height_at(0.0))
 
 

@@ -24,7 +24,7 @@ _SMOOTHING = 9  # samples
 
 @dataclass(frozen=True, eq=False)
 class Roadway:
-    """Part of a road without a planted median, along its right kerb.
+    """Part of a road without a planted median, along its kerb.
 
     Attributes:
         street: index of the street.
@@ -61,7 +61,7 @@ class _Lines:
         )
 
     def across(self, line: Border, cosine: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
-        """Returns the distance (n,) [m] from a right kerb to the nearest point across the road, and its index.
+        """Returns the distance (n,) [m] from a kerb to the nearest point across the road, and its index.
 
         Only points count whose heading differs from that of the kerb by an angle with a cosine in the given range;
         the distance is infinite without such a point.
@@ -74,9 +74,9 @@ class _Lines:
         near, index = (np.reshape(row, (len(line.heading), -1)) for row in found)
         index = np.minimum(index, len(self.place) - 1)
         offset = self.place[index] - line.points[:, None]
-        right = right_of(line.heading)[:, None]
-        ahead = offset[..., 0] * right[..., 1] - offset[..., 1] * right[..., 0]
-        aside = -(offset[..., :2] * right).sum(axis=-1)
+        out = line.sign * right_of(line.heading)[:, None]
+        ahead = offset[..., 0] * out[..., 1] - offset[..., 1] * out[..., 0]
+        aside = -(offset[..., :2] * out).sum(axis=-1)
         turn = pn.cos(self.heading[index] - line.heading[:, None])
         fits = np.isfinite(near) & (np.abs(ahead) < _AHEAD) & (aside > 1.0) & (np.abs(offset[..., 2]) < SAME_SURFACE)
         fits &= (turn >= cosine[0]) & (turn <= cosine[1])
@@ -100,18 +100,18 @@ def roadways(borders: Borders) -> Iterator[Roadway]:
 
 
 def _of_street(borders: Borders, lines: Sequence[Border]) -> Iterator[Roadway]:
-    right = [line for line in lines if line.kind is BorderKind.EDGE and line.sign > 0]
-    kerbs = _Lines.of(right)
-    left = _Lines.of([line for line in lines if line.kind is BorderKind.EDGE and line.sign < 0])
+    outer = [line for line in lines if line.kind is BorderKind.EDGE and line.outer]
+    kerbs = _Lines.of(outer)
+    inner = _Lines.of([line for line in lines if line.kind is BorderKind.EDGE and not line.outer])
     paint = _Lines.of([line for line in lines if line.kind is BorderKind.CENTRE])
     grass = _Lines.of([x for x in lines if x.kind is BorderKind.MEDIAN and polyline_length(x.points) > SHORTEST_MEDIAN])
-    for number, line in enumerate(right):
-        alone, _ = left.across(line, (0.9, 1.0))
+    for number, line in enumerate(outer):
+        alone, _ = inner.across(line, (0.9, 1.0))
         planted, painted = grass.across(line, (0.9, 1.0))[0], paint.across(line, (-1.0, 1.0))[0]
-        # beyond the left edge another road begins, as beside a ramp
+        # beyond the inner edge another road begins, as beside a ramp
         planted, painted = (np.where(alone < found, np.inf, found) for found in (planted, painted))
         opposite, index = kerbs.across(line, (-1.0, -0.8))
-        # at the mouth of a ramp the left edge is missing, and the next one belongs to another road
+        # at the mouth of a ramp the inner edge is missing, and the next one belongs to another road
         most = max(borders.abreast(lane) for lane in line.lanes) * line.width
         shared = _spread(np.isfinite(painted) & (painted < planted) & np.isfinite(opposite), np.isfinite(planted))
         own = np.where(
@@ -153,7 +153,7 @@ def _runs(line: Border, wanted: NDArray[np.bool_], width: Array) -> Iterator[Roa
     for run in np.split(np.arange(len(wanted)), np.flatnonzero(np.diff(wanted.astype(int)) != 0) + 1):
         if wanted[run[0]] and len(run) > 2:
             part = _filled(width[run], width[run])
-            middle = line.points[run, :2] - (part / 2.0)[:, None] * right_of(line.heading[run])
+            middle = line.points[run, :2] - line.sign * (part / 2.0)[:, None] * right_of(line.heading[run])
             yield Roadway(line.street, middle, line.heading[run], line.points[run, 2], part)
 
 

@@ -207,9 +207,9 @@ def _around_rings(walks: Sequence[tuple[Array, float]], lines: Iterable[Border])
     every = cKDTree(np.concatenate([line for line, _ in walks]))
     for line in lines:
         length = polyline_length(line.points)
-        if line.kind is not BorderKind.EDGE or line.sign < 0 or length > _LONGEST_ARC:
+        if line.kind is not BorderKind.EDGE or not line.outer or length > _LONGEST_ARC:
             continue
-        turns = float(line.heading[0] - line.heading[-1]) / length  # to the left: traffic goes around on the right
+        turns = line.sign * float(line.heading[0] - line.heading[-1]) / length  # away from the kerb
         near, where = (np.asarray(row) for row in tree.query(line.points[[0, -1], :2]))
         if turns < 1.0 / _LARGEST_RING or (near > _FROM_ARM).any():
             continue

@@ -158,15 +158,15 @@ def _carry_out_wish(state: CoWizardState, view: CoWizardView) -> Physical | None
 
 
 def _turn_round(state: CoWizardState, view: CoWizardView) -> Physical | None:
-    """Turns round, or first changes to the leftmost lane, from which a U-turn begins."""
+    """Turns round, or first changes to the innermost lane, from which a U-turn begins."""
     lane = state.town.lanes[view.lane]
     waited = view.time - state.commands.manoeuvre_sent_at
     if lane.in_junction or view.manoeuvring or waited < state.config.command_interval:
         return None
-    left = LinkType.LANE_CHANGE_LEFT
-    if state.town.neighbour(view.lane, left) is not None:
-        if state.town.successors(view.lane) or can_switch_lane(state.town, view.lane, view.station, left):
-            return _switch(state, view, left)
+    inwards = state.town.traffic.to_middle
+    if state.town.neighbour(view.lane, inwards) is not None:
+        if state.town.successors(view.lane) or can_switch_lane(state.town, view.lane, view.station, inwards):
+            return _switch(state, view, inwards)
     if not can_turn_round(state.town, view.lane, u_turn_start(view.station, view.speed)):
         return None
     _note_manoeuvre(state, view)

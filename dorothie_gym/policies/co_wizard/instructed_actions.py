@@ -87,7 +87,7 @@ def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
 
 
 def _do_switch(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    wish = Wish.SWITCH_RIGHT if words.direction is Direction.RIGHT else Wish.SWITCH_LEFT
+    wish = Wish.switch(words.direction, state.town.traffic)
     state.intentions = state.intentions.switching(wish, view.time + state.config.wish_time)
 
 

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.policies.policy import replace
@@ -19,6 +20,13 @@ class Wish(enum.Enum):
     U_TURN = "u_turn"
     SWITCH_LEFT = "switch_left"
     SWITCH_RIGHT = "switch_right"
+
+    @classmethod
+    def switch(cls, direction: Direction | None, traffic: DrivingSide) -> Wish:
+        """Returns the lane change to a side; without one, to the faster lane, towards the middle of the road."""
+        if direction is Direction.RIGHT or (direction is not Direction.LEFT and traffic is DrivingSide.LEFT):
+            return cls.SWITCH_RIGHT
+        return cls.SWITCH_LEFT
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -331,7 +331,7 @@ def _carry_lane(state: CoWizardState, view: CoWizardView, step: PlanStep) -> boo
     if state.plan.stage is StepStage.BEGUN:
         return state.intentions.wish is None and not view.manoeuvring
     if _is_due(state, view, step):
-        wish = Wish.SWITCH_RIGHT if step.direction is Direction.RIGHT else Wish.SWITCH_LEFT
+        wish = Wish.switch(step.direction, state.town.traffic)
         state.intentions = state.intentions.switching(wish, view.time + state.config.wish_time)
         state.plan = state.plan.staged(StepStage.BEGUN, view.time)
     return False

@@ -376,7 +376,8 @@ def _without_lane(
     if first.action is not StepAction.LANE or first.condition is not None or first.distance is not None:
         return steps, None
     sides = {Direction.LEFT: LinkType.LANE_CHANGE_LEFT, Direction.RIGHT: LinkType.LANE_CHANGE_RIGHT}
-    wanted = sides.get(first.direction or Direction.LEFT, LinkType.LANE_CHANGE_LEFT)
+    inwards = state.town.traffic.to_middle  # "change lanes"
+    wanted = inwards if first.direction is None else sides.get(first.direction, inwards)
     if state.town.lanes[view.lane].in_junction or state.town.neighbour(view.lane, wanted) is not None:
         return steps, None
     none = Proposition.of(Predicate.POSSIBLE, action=ActionValue.LANE_SWITCH, direction=first.direction, negated=True)

@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ObjectClass
@@ -183,8 +182,8 @@ class Navigator:
         progress = self.route.to_goal
         held_up = view.standing and view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
         due = not view.manoeuvring and (distance <= slowing_distance(view.speed) or held_up)
-        if due and town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is not None:
-            return _switch(view, 90, 0.0, due=True)
+        if due and town.neighbour(view.lane, town.traffic.to_middle) is not None:
+            return _switch(view, 90 * town.traffic.sign, 0.0, due=True)
         due = due and progress.turns_round_on(view.lane)
         return RouteStep(action=PhysicalAction.U_TURN, distance=max(distance, 0.0), due=due, place=view.lane)
 

@@ -110,11 +110,14 @@ def next_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) ->
 
 
 def _manoeuvre_step(state: CoWizardState, view: CoWizardView, wish: Wish) -> GuidanceStep:
-    """Returns a lane switch or a U-turn; a U-turn begins on the leftmost lane."""
-    leftmost = state.town.neighbour(view.lane, LinkType.LANE_CHANGE_LEFT) is None
-    if wish is Wish.U_TURN and leftmost:
-        return GuidanceStep(("round", view.lane), (ActionValue.U_TURN,))
-    left = wish is not Wish.SWITCH_RIGHT
+    """Returns a lane switch or a U-turn; a U-turn begins on the innermost lane."""
+    inwards = state.town.traffic.to_middle
+    if wish is Wish.U_TURN:
+        if state.town.neighbour(view.lane, inwards) is None:
+            return GuidanceStep(("round", view.lane), (ActionValue.U_TURN,))
+        left = inwards is LinkType.LANE_CHANGE_LEFT
+    else:
+        left = wish is Wish.SWITCH_LEFT
     sector = nearest_sector(90.0 if left else -90.0)
     return GuidanceStep(("lane", view.lane, left), (ActionValue.LANE_SWITCH,), sector)
 

@@ -241,7 +241,9 @@ def _straight_on(
 def _described(
     state: ParticipantState, view: ParticipantView, turn: _Turn, manner: Directions, rng: np.random.Generator
 ) -> _Described:
-    """Returns the turn in the speaker's manner, or else in a plain one."""
+    """Returns the turn in the speaker's manner, or else in a plain one; None for a turn back at a junction."""
+    if turn.junction.direction is Direction.BACK:
+        return None
     options = [said for describe in _MANNERS[manner] if (said := describe(state, view, turn)) is not None]
     if not options:
         return None

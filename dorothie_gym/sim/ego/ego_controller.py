@@ -162,6 +162,7 @@ REASONS: Final[Mapping[int, str]] = MappingProxyType(
         Refusal.PROP_LEFT: "a roadblock is too close on the lane to the left",
         Refusal.PROP_RIGHT: "a roadblock is too close on the lane to the right",
         Refusal.NOT_LEFTMOST: "a U-turn begins on the leftmost lane",
+        Refusal.NOT_RIGHTMOST: "a U-turn begins on the rightmost lane",
         Refusal.NO_ONCOMING: "there is no oncoming lane beside this one",
         Refusal.PROP_AHEAD: "the car is too fast to turn round before the roadblock",
         Refusal.NO_ROOM_TO_TURN: "there is no room left to turn round",

@@ -152,6 +152,7 @@ def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, f
             value_near(points, beside, segment, Y, there),
             value_near(points, beside, segment, HEADING, there),
             value_near(points, beside, segment, HEIGHT, there),
+            town.sign,
         )
         if gap < least:
             found, at, least = other, there, gap
@@ -242,20 +243,20 @@ def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, sta
     """Adds the lanes next to a row of the search that have room for a switch; returns whether the list had room."""
     step = world.steps[row]
     lane, changes, way_out = town.lanes[step.lane], step.changes, town.ways[step.lane].merge
-    left, right = lane.left, lane.right
+    inner, outer = lane.inner, lane.outer
     if way_out >= 0 and not _is_seen(world, root, way_out) and not _reach(world, way_out, row, changes, True):
         return False
     if changes == MOST_CHANGES or not _has_room(town, world, row, station):
         return True
     # lanes that end lead nowhere
-    if left >= 0 and town.ways[left].merge >= 0:
-        left = -1
-    if right >= 0 and town.ways[right].merge >= 0:
-        right = -1
-    if left >= 0 and not _is_seen(world, root, left) and not _reach(world, left, row, changes + 1, True):
+    if inner >= 0 and town.ways[inner].merge >= 0:
+        inner = -1
+    if outer >= 0 and town.ways[outer].merge >= 0:
+        outer = -1
+    if inner >= 0 and not _is_seen(world, root, inner) and not _reach(world, inner, row, changes + 1, True):
         return False
-    if right >= 0 and not _is_seen(world, root, right):
-        return _reach(world, right, row, changes + 1, True)
+    if outer >= 0 and not _is_seen(world, root, outer):
+        return _reach(world, outer, row, changes + 1, True)
     return True
 
 

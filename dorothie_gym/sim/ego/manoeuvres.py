@@ -211,8 +211,8 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     lane, station = town.lanes[plan.lane], plan.station
     if _is_busy(town, world):
         return Refusal.IN_MANOEUVRE, -1, 0.0, 0.0
-    if lane.left >= 0 and not _leads_nowhere(town, plan.lane, station):
-        return Refusal.NOT_LEFTMOST, -1, 0.0, 0.0
+    if lane.inner >= 0 and not _leads_nowhere(town, plan.lane, station):
+        return Refusal.NOT_LEFTMOST if town.sign > 0.0 else Refusal.NOT_RIGHTMOST, -1, 0.0, 0.0
     begin = station + LEAD * (speed > EGO_MOVING) + _u_turn_braking(speed, U_TURN_SPEED * U_TURN_SPEED)
     other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other >= 0:

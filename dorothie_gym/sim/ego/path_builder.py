@@ -268,10 +268,11 @@ def switch(
 
 @compiled
 def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, start: float, write: bool) -> None:
-    """Lays the stretch from a lane to the oncoming one on its left.
+    """Lays the stretch from a lane to the oncoming one across the middle of the road.
 
-    Where the lanes are closer than two radii the ego first swings out: arcs right, left by more than a half circle,
-    right again, whose lateral shifts add up to the distance d of the lanes: cos(swing) = (d + 2 r) / (4 r).
+    Where the lanes are closer than two radii the ego first swings out: arcs to the kerb, away from it by more than a
+    half circle, to the kerb again, whose lateral shifts add up to the distance d of the lanes:
+    cos(swing) = (d + 2 r) / (4 r).
 
     Args:
         town: arrays of the town.
@@ -292,15 +293,15 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
         append(world, x, y, station, limit, oncoming, True)
     for k in range(3 if swings else 2):
         if swings:
-            right, angle = k != 1, math.pi + 2.0 * swing if k == 1 else swing
+            outward, angle = k != 1, math.pi + 2.0 * swing if k == 1 else swing
         else:
-            right, angle = False, math.pi / 2.0
+            outward, angle = False, math.pi / 2.0
             if k == 1 and gap - 2.0 * radius > 0.0:
                 x, y = x + (gap - 2.0 * radius) * pm.cos(course), y + (gap - 2.0 * radius) * pm.sin(course)
                 if count_points(world, 1, write):
                     append(world, x, y, station, limit, oncoming, True)
         steps = max(2, math.ceil(radius * angle / (PATH_SPACING / 2.0)))
-        turn = angle / steps if right else -(angle / steps)  # headings are clockwise
+        turn = town.sign * (angle / steps if outward else -(angle / steps))  # headings are clockwise
         chord = 2.0 * radius * pm.sin(abs(turn) / 2.0)
         if count_points(world, steps, write):
             for _ in range(steps):

@@ -64,7 +64,7 @@ AVOIDING = 1.6
 """Distance within which pedestrians step out of each other's way [m]."""
 
 PASSING_OFFSET = 0.05
-"""Offset to the right at which another pedestrian is passed on the left [m]."""
+"""Offset to the side that pedestrians keep to, at which another one is passed on the other side [m]."""
 
 SPACE = 0.55
 """Minimum distance between pedestrians, from centre to centre [m]."""
@@ -96,13 +96,23 @@ def note_progress(walker: PedestrianRecord, time: float) -> None:
 
 @compiled
 def walk_towards(
-    world: WorldArrays, p: int, x: float, y: float, cos: float, sin: float, lateral: float, half: float, time: float
+    world: WorldArrays,
+    p: int,
+    sign: float,
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    lateral: float,
+    half: float,
+    time: float,
 ) -> bool:
     """Sets direction and speed of a pedestrian towards a place, if others leave room.
 
     Args:
         world: arrays of the world.
         p: the pedestrian.
+        sign: that of the town's `DrivingSide`, to which pedestrians keep too.
         x: place [m].
         y: place [m].
         cos: cosine of the direction of its footway.
@@ -121,7 +131,7 @@ def walk_towards(
     if distance < ARRIVED:
         return True
     step = min(walker.pace * time, distance)
-    dx, dy = _past_others(world, p, dx / distance, dy / distance, cos, sin, lateral)
+    dx, dy = _past_others(world, p, sign, dx / distance, dy / distance, cos, sin, lateral)
     aside = lateral + (dy * cos - dx * sin) * step
     if abs(aside) > max(half - EDGE_MARGIN, 0.0) and abs(aside) > abs(lateral):
         # along the edge of the footway instead
@@ -139,11 +149,11 @@ def walk_towards(
 
 @inlined
 def _past_others(
-    world: WorldArrays, p: int, cos: float, sin: float, way_cos: float, way_sin: float, lateral: float
+    world: WorldArrays, p: int, sign: float, cos: float, sin: float, way_cos: float, way_sin: float, lateral: float
 ) -> tuple[float, float]:
     """Returns the direction that leads past obstructing pedestrians, on the side with more room.
 
-    Oncoming pedestrians, which keep to their right, are passed on the right, slower ones on the left. The arguments are
+    Oncoming pedestrians, which keep to their side, are passed on that side, slower ones on the other. The arguments are
     as in `walk_towards`; the first direction is the one to the place.
     """
     walker = world.pedestrians[p]
@@ -153,8 +163,8 @@ def _past_others(
         dx, dy = other.x - walker.x, other.y - walker.y
         if abs(dx) > AVOIDING or abs(dy) > AVOIDING or q == p or other.state == Walk.EMPTY:
             continue
-        push = _push(dx, dy, 0.0, cos, sin)
-        if lateral + dy * way_cos - dx * way_sin > PASSING_OFFSET:
+        push = sign * _push(dx, dy, 0.0, cos, sin)
+        if sign * (lateral + dy * way_cos - dx * way_sin) > PASSING_OFFSET:
             push = -push
         x, y = x - push * sin, y + push * cos
     for q in range(len(world.props)):
@@ -162,8 +172,8 @@ def _past_others(
         dx, dy = prop.x - walker.x, prop.y - walker.y
         if abs(dx) > SIGHT or abs(dy) > SIGHT or not prop.present:
             continue
-        push = _push(dx, dy, 0.5 * (max(prop.length, prop.width) - WALKER_SIZE), cos, sin)
-        if lateral + dy * way_cos - dx * way_sin > PASSING_OFFSET:
+        push = sign * _push(dx, dy, 0.5 * (max(prop.length, prop.width) - WALKER_SIZE), cos, sin)
+        if sign * (lateral + dy * way_cos - dx * way_sin) > PASSING_OFFSET:
             push = -push
         x, y = x - push * sin, y + push * cos
     length = math.sqrt(x * x + y * y)  # at least 1: others are avoided sideways

@@ -21,7 +21,7 @@ from dorothie_gym.sim.pedestrians.pacing import (
     walk_towards,
 )
 from dorothie_gym.sim.pedestrians.walkway_position import (
-    KEEP_RIGHT,
+    SIDE_KEPT,
     closest_walk,
     enter_next,
     find_segment,
@@ -101,7 +101,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     along = walker.station - points[k, 2]
     cos, sin = (points[k + 1, 0] - points[k, 0]) / length, (points[k + 1, 1] - points[k, 1]) / length
     home_x, home_y = points[k, 0] + along * cos, points[k, 1] + along * sin
-    cos, sin = sin, -cos  # to the left: across the road
+    cos, sin = town.sign * sin, -town.sign * cos  # across the road
     dx, dy = walker.x - home_x, walker.y - home_y
     gone, aside = dx * cos + dy * sin, dy * cos - dx * sin
     if walker.mouth == THERE:
@@ -119,7 +119,7 @@ def stray(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     onward = 1.0 if walker.mouth == OVER else -1.0
     ahead = gone + onward * WALK_AHEAD
     x, y = home_x + ahead * cos, home_y + ahead * sin
-    if walk_towards(world, p, x, y, onward * cos, onward * sin, onward * aside, CORRIDOR, time):
+    if walk_towards(world, p, town.sign, x, y, onward * cos, onward * sin, onward * aside, CORRIDOR, time):
         walker.waited = 0.0
         return
     walker.waited += time
@@ -251,7 +251,7 @@ def wait(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
     far = aside - min(max(aside, -FROM_PAINT), FROM_PAINT)
     x += far * crossing.sin + inward * cos - beside * sin
     y += -far * crossing.cos + inward * sin + beside * cos
-    walk_towards(world, p, x, y, cos, sin, 0.0, math.inf, time)
+    walk_towards(world, p, town.sign, x, y, cos, sin, 0.0, math.inf, time)
     if abs(walker.x - x) > READY or abs(walker.y - y) > READY:
         ready = False
     else:
@@ -275,9 +275,10 @@ def cross(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
         return
     cos, sin = walker.direction * crossing.cos, walker.direction * crossing.sin
     ahead = walker.station + walker.direction * WALK_AHEAD
-    x = crossing.x[0] + ahead * crossing.cos - KEEP_RIGHT * sin
-    y = crossing.y[0] + ahead * crossing.sin + KEEP_RIGHT * cos
-    if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, HALF_DEPTH, time):
+    aside = town.sign * SIDE_KEPT
+    x = crossing.x[0] + ahead * crossing.cos - aside * sin
+    y = crossing.y[0] + ahead * crossing.sin + aside * cos
+    if walk_towards(world, p, town.sign, x, y, cos, sin, walker.direction * lateral, HALF_DEPTH, time):
         walker.waited = 0.0
         return
     walker.waited += time
@@ -410,8 +411,8 @@ def _stroll(town: TownArrays, world: WorldArrays, p: int, time: float) -> None:
             return
     elif walker.waited >= 0.0 and comes_to_crosswalk(town, walker, way, time):
         return
-    x, y, cos, sin = place_beside(town, walker, walker.station + walker.direction * WALK_AHEAD, side_kept(way))
-    if walk_towards(world, p, x, y, cos, sin, walker.direction * lateral, way.half_width, time):
+    x, y, cos, sin = place_beside(town, walker, walker.station + walker.direction * WALK_AHEAD, side_kept(town, way))
+    if walk_towards(world, p, town.sign, x, y, cos, sin, walker.direction * lateral, way.half_width, time):
         walker.waited = min(walker.waited + time, 0.0)
         return
     walker.waited += time
@@ -426,7 +427,7 @@ def place_walker(town: TownArrays, walker: PedestrianRecord) -> None:
     walker.waited, walker.staying, walker.crash_age, walker.far = 0.0, 0.0, 0.0, 0.0
     way = town.walks[walker.walk]
     find_segment(town, walker)
-    walker.x, walker.y, walker.cos, walker.sin = place_beside(town, walker, walker.station, side_kept(way))
+    walker.x, walker.y, walker.cos, walker.sin = place_beside(town, walker, walker.station, side_kept(town, way))
     locate(town, walker)
     walker.heading = pm.atan2(walker.sin, walker.cos)
     walker.left_x, walker.left_y = walker.x, walker.y

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lanes, rightmost
+from dorothie_gym.maps.lane_neighbours import LaneEdges, innermost, oncoming_lanes, outermost
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.pedestrians.pacing import FROM_ENDS, FROM_JUNCTION, KERB, SHORTEST_WALK, WALK_STEP
 from dorothie_gym.support import portable_arrays as pn
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_records import LaneRecord, WalkwayRecord
 
 
-KEEP_RIGHT = 0.4
-"""Offset to the right of the centre at which pedestrians walk [m], so that they pass each other."""
+SIDE_KEPT = 0.4
+"""Offset at which pedestrians walk from the centre, to the side of the traffic [m], so that they pass each other."""
 
 FROM_EDGE = 0.4
 """Minimum distance to the edge of the footway [m]."""
 
 
 @inlined
-def side_kept(way: WalkwayRecord) -> float:
+def side_kept(town: TownArrays, way: WalkwayRecord) -> float:
     """Returns the offset to the right of the centre of a footway at which pedestrians walk [m]."""
-    return float(min(KEEP_RIGHT, max(way.half_width - FROM_EDGE, 0.0)))
+    return float(town.sign * min(SIDE_KEPT, max(way.half_width - FROM_EDGE, 0.0)))
 
 
 @inlined
@@ -150,9 +150,9 @@ class StreetWalk(NamedTuple):
     """A footway beside a lane.
 
     Attributes:
-        lane: its id, the rightmost one of its direction.
+        lane: its id, the outermost one of its direction.
         points: (n, 6) x, y, station, heading, height, and the distance to the kerb across the road, at a right angle
-            to the left, or 0 where the road is not crossed [m].
+            from the kerb, or 0 where the road is not crossed [m].
     """
 
     lane: int
@@ -168,7 +168,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
         town: the town.
         edges: edges of its lanes.
     """
-    beside = [_beside(points, lanes[lane.id]) for lane in town.lanes]
+    beside = [_beside(points, lanes[lane.id], town.traffic.sign) for lane in town.lanes]
     rows = [(k, row) for k, row in enumerate(beside) if row is not None]
     if not rows:
         return []
@@ -185,7 +185,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
     if not found:  # short roads, or lanes on both sides
         return []
     across = [_across(points, lanes, town, walk) for walk in found]
-    far = [_far(walk.points, way) for walk, way in zip(found, across, strict=True)]
+    far = [_far(walk.points, town.traffic.sign * way) for walk, way in zip(found, across, strict=True)]
     landing = np.split(edges.free(np.concatenate(far), KERB / 2), np.cumsum([len(each) for each in far])[:-1])
     return [
         StreetWalk(walk.lane, _finished(walk.points, way * lands))
@@ -193,15 +193,15 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
     ]
 
 
-def _beside(points: Array, lane: LaneRecord) -> Array | None:
+def _beside(points: Array, lane: LaneRecord, sign: int) -> Array | None:
     """Returns x, y, station on the lane, heading, height, 0 at the kerb of a lane; None if there is no footway."""
     count = int((lane.length - 2.0 * FROM_ENDS) / WALK_STEP) + 1
-    if lane.right >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
+    if lane.outer >= 0 or lane.junction >= 0 or (count - 1) * WALK_STEP < SHORTEST_WALK:
         return None
-    return _offset(points, lane, np.linspace(FROM_ENDS, FROM_ENDS + (count - 1) * WALK_STEP, count), 1.0)
+    return _offset(points, lane, np.linspace(FROM_ENDS, FROM_ENDS + (count - 1) * WALK_STEP, count), sign)
 
 
-def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Array:
+def _offset(points: Array, lane: LaneRecord, stations: Array, side: int) -> Array:
     """Returns the rows of `_beside` at the given stations, to the right of a lane (side 1) or to the left (-1)."""
     own = points[lane.first : lane.last + 1]
     x, y, heading, height, width = (np.interp(stations, own[:, 2], own[:, k]) for k in (0, 1, 3, 4, 5))
@@ -212,27 +212,27 @@ def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Ar
 
 
 def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: StreetWalk) -> Array:
-    """Returns the distance to the left over all lanes of both directions (n,) [m], 0 where the road is not crossed."""
-    row, own = walk.points, town.lanes[walk.lane]
-    far, side = leftmost(town, walk.lane), -1.0
+    """Returns the distance across all lanes of both directions (n,) [m], 0 where the road is not crossed."""
+    row, own, sign = walk.points, town.lanes[walk.lane], town.traffic.sign
+    far, side = innermost(town, walk.lane), -sign
     middle = own.position(float(row[len(row) // 2, 2]))
     oncoming = oncoming_lanes(town).at(far, town.lanes[far].project(middle)[0])
     if oncoming is not None:
-        far, side = rightmost(town, oncoming.lane), 1.0
+        far, side = outermost(town, oncoming.lane), sign
     stations = np.linspace(0.0, lanes[far].length, int(lanes[far].length) + 2)
     kerb = _offset(points, lanes[far], stations, side)
     dx, dy = (kerb[None, :, k] - row[:, None, k] for k in (0, 1))
     cos, sin = pn.cos(row[:, 3, None]), pn.sin(row[:, 3, None])
-    along, left = np.abs(dx * cos + dy * sin), dx * sin - dy * cos
-    along[(left < NARROWEST_ROAD) | (left > WIDEST_ROAD)] = np.inf
+    along, over = np.abs(dx * cos + dy * sin), sign * (dx * sin - dy * cos)
+    along[(over < NARROWEST_ROAD) | (over > WIDEST_ROAD)] = np.inf
     nearest = along.argmin(axis=1)
     rows = np.arange(len(row))
     crosses = (along[rows, nearest] < 1.0) & (row[:, 2] > FROM_JUNCTION) & (row[:, 2] < own.length - FROM_JUNCTION)
-    return np.where(crosses, left[rows, nearest], 0.0)
+    return np.where(crosses, over[rows, nearest], 0.0)
 
 
 def _far(row: Array, across: Array) -> Array:
-    """Returns the places across the road (n, 3) [m]."""
+    """Returns the places at distances to the left (n,), across the road (n, 3) [m]."""
     return np.column_stack((row[:, 0] + across * pn.sin(row[:, 3]), row[:, 1] - across * pn.cos(row[:, 3]), row[:, 4]))
 
 

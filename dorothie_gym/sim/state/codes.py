@@ -169,6 +169,7 @@ class Refusal(enum.IntEnum):
     NO_CHOICE = 19
     SAME_TURN = 20
     TURN_TOO_CLOSE = 21
+    NOT_RIGHTMOST = 22
 
 
 CARRIED_OUT, NO_SPACE = int(Refusal.NONE), int(Refusal.NO_SPACE)

@@ -313,7 +313,7 @@ class VehicleRecord:
     length: Float  # [m]
     width: Float
     radius: Float  # half its diagonal [m]
-    to_right: Float  # offset that it keeps in its lane [m]
+    to_right: Float  # offset to the right that it keeps in its lane [m]
     station: Float  # on the lane that it follows [m]
     lateral: Float
     own_station: Float  # on the closest lane [m]

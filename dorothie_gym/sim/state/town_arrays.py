@@ -80,7 +80,7 @@ class TownArrays(NamedTuple):
         walk_points: (q, 6) points of the footways, as `points`; of those beside streets the last column is the
             distance to the kerb across, 0 where the road is not crossed [m].
         walks: footways: the pavements with the town's own ids, the paths between their ends, the paths beside
-            the rightmost lanes.
+            the lanes at the kerb.
         mouths: mouths of crosswalks, those of a pavement in the order of their stations.
         crossings: crosswalks.
         passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
@@ -89,6 +89,7 @@ class TownArrays(NamedTuple):
         ways: continuations of each lane, by the lanes' ids.
         exits: exits from the ends of lanes.
         lane_lists: int32 lists of lanes, see `ways`.
+        sign: factor from a distance towards the kerb to a distance to the right, that of the town's `DrivingSide`.
         flat: whether all lanes are so level that heights do not matter.
         wide: whether any lane is wider than `WIDE_LANE`.
     """
@@ -114,6 +115,7 @@ class TownArrays(NamedTuple):
     ways: RecordArray[LaneExitsRecord]
     exits: RecordArray[ExitRecord]
     lane_lists: NDArray[np.int32]
+    sign: float
     flat: bool
     wide: bool
 
@@ -158,6 +160,7 @@ def empty_town() -> TownArrays:
         ways=empty_records(LaneExitsRecord, 0),
         exits=empty_records(ExitRecord, 0),
         lane_lists=np.zeros(0, dtype=np.int32),
+        sign=1.0,
         flat=True,
         wide=False,
     )
@@ -183,7 +186,7 @@ def _build(network: TownNetwork) -> TownArrays:
         network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
         cells.origin, cells.bounds, cells.entries,
         walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages, _mouths(town, lanes),
-        _lines(town), *build_exits(town, lanes), bool(high - low < LEVEL_TOWN),
+        _lines(town), *build_exits(town, lanes), float(town.traffic.sign), bool(high - low < LEVEL_TOWN),
         bool(network.table.points[:, WIDTH].max() > WIDE_LANE),
     )  # fmt: skip
 
@@ -198,7 +201,7 @@ def _describe(record: LaneRecord, lane: Lane, row: int, table: LaneTable) -> Non
     record.left_edge, record.low_edge, record.right_edge, record.high_edge = table.boxes[row]
     record.first, record.last = table.offsets[row], table.offsets[row + 1] - 1
     record.rank = row
-    for name in ("left", "right", "junction", "exit", "programme", "place"):
+    for name in ("left", "right", "inner", "outer", "junction", "exit", "programme", "place"):
         setattr(record, name, NOBODY)
 
 
@@ -223,7 +226,12 @@ def _link(town: Town, lanes: RecordArray[LaneRecord]) -> NDArray[np.int32]:
         record.successor, record.successors = len(pool), len(after)
         record.predecessor, record.predecessors = len(pool) + len(after), len(before)
         pool += after + before
-        for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
+        for name, side in (
+            ("left", LinkType.LANE_CHANGE_LEFT),
+            ("right", LinkType.LANE_CHANGE_RIGHT),
+            ("inner", town.traffic.to_middle),
+            ("outer", town.traffic.to_kerb),
+        ):
             beside = town.neighbour(lane.id, side)
             setattr(record, name, NOBODY if beside is None else beside)
     return np.array(pool, dtype=np.int32)

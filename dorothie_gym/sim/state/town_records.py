@@ -35,6 +35,8 @@ class LaneRecord:
     predecessors: Int32
     left: Int32  # lanes that one may change to
     right: Int32
+    inner: Int32  # the same lanes, by their side: towards the middle of the road and towards the kerb
+    outer: Int32
     junction: Int32  # junction that it crosses
     exit: Int32  # of a connector: the first lane beyond the junction
     place: Int32  # of a connector: its place among those of its junction

@@ -113,10 +113,10 @@ CYCLIST_ROADS = 60.5 / 3.6
 """Highest speed limit of lanes with cyclists [m/s]."""
 
 CYCLIST_BEFORE, CYCLIST_BEHIND = 6.0, 15.0
-"""Gaps ahead and behind on the lane to the right with which a cyclist moves over to it [m]."""
+"""Gaps ahead and behind on the lane towards the kerb with which a cyclist moves over to it [m]."""
 
 CYCLIST_FROM_EDGE = 0.9
-"""Distance of a cyclist from the right edge of the lane [m]."""
+"""Distance of a cyclist from the edge of the lane at the kerb [m]."""
 
 # --- Respawning -------------------------------------------------------------------------------------------------------
 

@@ -123,7 +123,7 @@ def faces_turning_car(world: WorldArrays, vehicle: VehicleRecord, turning: bool)
 
 @compiled
 def _bring_back(town: TownArrays, world: WorldArrays, i: int) -> None:
-    """Puts a vehicle on another lane where there is room for it; cyclists to the right of slow roads."""
+    """Puts a vehicle on another lane where there is room for it; cyclists to the kerb of slow roads."""
     vehicle = world.vehicles[i]
     vehicle.key, vehicle.touched = new_key(world), False
     world.clock[0].towed += 1
@@ -132,7 +132,7 @@ def _bring_back(town: TownArrays, world: WorldArrays, i: int) -> None:
         lane = town.lanes[number]
         if lane.junction >= 0 or lane.length < SHORTEST or draw(vehicle) * USUAL_LENGTH > lane.length:
             continue
-        if vehicle.kind == Kind.CYCLIST and not (lane.right < 0 and lane.cycling):
+        if vehicle.kind == Kind.CYCLIST and not (lane.outer < 0 and lane.cycling):
             continue
         station = CAR_LENGTH + draw(vehicle) * (lane.length - 2.0 * CAR_LENGTH)
         if is_free(town, world, number, station, i, OUT_OF_SIGHT):
@@ -232,7 +232,7 @@ def put_on_lane(town: TownArrays, vehicle: VehicleRecord, number: int, station: 
     lane, points = town.lanes[number], town.points
     heading = value_near(points, lane, lane.first, 3, station)
     vehicle.lane = number
-    keep_side(vehicle, lane)
+    keep_side(town, vehicle, lane)
     vehicle.cos, vehicle.sin = pm.cos(heading), pm.sin(heading)
     vehicle.x = value_near(points, lane, lane.first, 0, station) - vehicle.to_right * vehicle.sin
     vehicle.y = value_near(points, lane, lane.first, 1, station) + vehicle.to_right * vehicle.cos

@@ -61,16 +61,16 @@ def follow_road(town: TownArrays, vehicle: VehicleRecord) -> None:
         for k in range(1, vehicle.planned):
             vehicle.plan[k - 1] = vehicle.plan[k]
         vehicle.planned -= 1
-        keep_side(vehicle, town.lanes[vehicle.plan[0]])
+        keep_side(town, vehicle, town.lanes[vehicle.plan[0]])
         locate(town, vehicle)
         extend(town, vehicle)
 
 
 @inlined
-def keep_side(vehicle: VehicleRecord, lane: LaneRecord) -> None:
-    """Sets the offset in a lane: cyclists keep to the right edge, cars to the centre."""
+def keep_side(town: TownArrays, vehicle: VehicleRecord, lane: LaneRecord) -> None:
+    """Sets the offset in a lane: cyclists keep to the edge at the kerb, cars to the centre."""
     if vehicle.kind == Kind.CYCLIST:
-        vehicle.to_right = max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
+        vehicle.to_right = town.sign * max(lane.half_width - CYCLIST_FROM_EDGE, 0.0)
 
 
 @inlined
@@ -95,7 +95,7 @@ def update_lane(town: TownArrays, vehicle: VehicleRecord) -> None:
 def take(town: TownArrays, vehicle: VehicleRecord, lane: int) -> None:
     """Makes a vehicle follow a lane, and extends the plan."""
     vehicle.plan[0], vehicle.planned = lane, 1
-    keep_side(vehicle, town.lanes[lane])
+    keep_side(town, vehicle, town.lanes[lane])
     locate(town, vehicle)
     extend(town, vehicle)
 
@@ -300,8 +300,8 @@ def change_lanes(town: TownArrays, world: WorldArrays, i: int) -> None:
     if vehicle.kind == Kind.CYCLIST:
         _move_over(town, world, i, lane)
         return
-    _consider(town, world, i, lane, int(lane.left))
-    _consider(town, world, i, lane, int(lane.right))
+    _consider(town, world, i, lane, int(lane.inner))
+    _consider(town, world, i, lane, int(lane.outer))
 
 
 @compiled
@@ -321,14 +321,14 @@ def _consider(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord, si
 
 @compiled
 def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -> None:
-    """Changes the lane of a cyclist to the right if it may ride there and has room, and never to the left."""
+    """Changes the lane of a cyclist towards the kerb if it may ride there and has room, and never to the middle."""
     vehicle = world.vehicles[i]
-    if lane.right < 0 or not town.lanes[lane.right].cycling or town.lanes[lane.right].successors == 0:
+    if lane.outer < 0 or not town.lanes[lane.outer].cycling or town.lanes[lane.outer].successors == 0:
         return
-    station, _, _ = project(town, lane.right, vehicle.x, vehicle.y)
-    _, ahead, _, behind = around(town, world, lane.right, station, i)
+    station, _, _ = project(town, lane.outer, vehicle.x, vehicle.y)
+    _, ahead, _, behind = around(town, world, lane.outer, station, i)
     if ahead > CYCLIST_BEFORE and behind > CYCLIST_BEHIND:
-        take(town, vehicle, int(lane.right))
+        take(town, vehicle, int(lane.outer))
 
 
 @compiled

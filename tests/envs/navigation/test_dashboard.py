@@ -14,9 +14,11 @@ from dorothie_gym.envs.navigation.dashboard import (
     WIDTH,
     Readings,
     draw_dashboard,
+    icon_of,
     rows_of_dashboard,
     show_dashboard,
 )
+from dorothie_gym.maps import DrivingSide
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.navigation.observation_fields import SECTORS
 from tests.envs.dashboard_reader import distance_on, instruction_on, planned_on, speed_on, wanted_on
@@ -96,3 +98,10 @@ def test_dashboard_of_a_larger_picture_is_the_small_one_enlarged() -> None:
     readings = Readings(action=ActionValue.J_TURN, sector=3, distance=40.0, speed=9.0, wanted=11.0, limit=13.9)
     show_dashboard(picture, readings)
     np.testing.assert_array_equal(picture[-2 * HEIGHT :][::2, ::2], draw_dashboard(readings))
+
+
+def test_a_u_turn_leads_away_from_the_side_of_the_traffic() -> None:
+    panels = [draw_dashboard(Readings(action=ActionValue.U_TURN, traffic=side)) for side in DrivingSide]
+    (right, left) = (icon_of(ActionValue.U_TURN, None, side) for side in DrivingSide)
+    np.testing.assert_array_equal(left, right[:, ::-1])
+    assert not np.array_equal(*panels)

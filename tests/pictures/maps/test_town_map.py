@@ -66,7 +66,7 @@ def test_dashes_part_lanes_of_the_same_direction() -> None:
     plan = MapLayers(Town(name="wide", lanes=lanes, links=[], junctions=[]))
     inner = [border for border in plan.borders.lines if border.kind is BorderKind.LANE]
     assert [(border.lanes, border.sign) for border in inner] == [((1,), -1)]
-    assert plan.borders.right_neighbour == {0: 1}
+    assert plan.borders.outer_neighbour == {0: 1}
 
 
 @pytest.mark.parametrize("upper_first", [True, False])

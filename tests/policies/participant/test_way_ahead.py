@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import DrivingPlan, understand, word_acts
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.maps import LinkType, Town, load_town
 from dorothie_gym.ontology import DialogueMove, ObjectClass, Role
 from dorothie_gym.policies import ScriptedCoWizard, ScriptedParticipant
 from dorothie_gym.policies.co_wizard.plan_points import Landing, find_point
@@ -22,7 +24,7 @@ from dorothie_gym.policies.route_progress import RouteProgress
 class Drive:
     """Car at the start of a session, and what both speakers see."""
 
-    def __init__(self, town: str, seed: int) -> None:
+    def __init__(self, town: str | Town, seed: int) -> None:
         env = DuoWizardEnv(town=town)
         observations, _ = env.reset(seed=seed)
         self.town = env.town
@@ -125,3 +127,13 @@ def test_no_more_steps_than_asked_for(drives):
             for count in (1, 2):
                 steps = way_ahead(drive.state, drive.view, count, Directions.TURNS, np.random.default_rng(0))
                 assert len(steps) <= count
+
+
+def test_a_turn_back_at_a_junction_is_not_described_as_a_turn_to_a_side() -> None:
+    """SUMO's maps have such turns, also at junctions with lights."""
+    town = load_town("brookside")
+    links = [replace(link, type=LinkType.U_TURN) if link.type is LinkType.LEFT else link for link in town.links]
+    parts = ("lanes", "junctions", "streets", "sites", "signals", "crosswalks", "sidewalks", "programmes")
+    drive = Drive(Town(name="back", links=links, **{part: getattr(town, part) for part in parts}), 3)
+    said = [step.step for manner in Directions for _, way in drive.ways(manner) for step in way]
+    assert said and all(step.direction is not Direction.BACK for step in said)

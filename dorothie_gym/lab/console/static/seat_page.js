@@ -56,6 +56,7 @@ async function greet(link, hello) {
     const answer = await fetch(`/towns/${encodeURIComponent(hello.town)}.json`);
     page.map.setTown({ ...await answer.json(), name: hello.town }, hello.streets);
   } else { page.map.names = hello.streets; page.map.base = null; }
+  document.body.classList.toggle('left-hand', hello.traffic === 'left');
   document.body.dataset.ready = hello.seat;
 }
 

@@ -155,11 +155,12 @@ def _frontages(layers: MapLayers) -> Iterator[_Frontage]:
         if line.kind is BorderKind.EDGE:
             for run in held(line, layers.raised, wanted=False):
                 yield _Frontage(line.points[run, :2], line.heading[run] + line.sign * np.pi / 2.0)
+    sign = layers.town.traffic.sign
     for lane in layers.town.lanes:
         if lane.in_junction and lane.length > _SHORTEST and not layers.raised.hold(lane.points).any():
             stations = sample(lane, 0.0, lane.length, 2.0)
-            points = side_line(lane, stations, widths_at(lane, stations) / 2.0)
-            yield _Frontage(points, np.interp(stations, lane.stations, lane.headings) + np.pi / 2.0)
+            points = side_line(lane, stations, sign * widths_at(lane, stations) / 2.0)
+            yield _Frontage(points, np.interp(stations, lane.stations, lane.headings) + sign * np.pi / 2.0)
 
 
 class _Quarters:

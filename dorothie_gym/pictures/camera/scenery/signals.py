@@ -94,7 +94,7 @@ def _foot(layers: MapLayers, ground: Heights, at: tuple[float, float], road: flo
 
 
 def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: list[_Head]) -> list[_Head]:
-    """Returns the lights on the far sides of junctions: on the right of the exit that leads straight on."""
+    """Returns the lights on the far sides of junctions: at the kerb of the exit that leads straight on."""
     town = layers.town
     found: list[_Head] = []
     for post, head in zip(layers.posts, heads, strict=True):
@@ -103,8 +103,9 @@ def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: 
         exits = [e for lane in post.lanes for e in town.exits(lane) if e.junction_id >= 0 and abs(e.angle) < _STRAIGHT]
         if not exits:
             continue
-        target = town.lanes[layers.borders.rightmost(min(exits, key=lambda e: abs(e.angle)).lane)]
-        x, y = target.position(_FAR, target.width_at(0.0) / 2.0 + _FAR_ASIDE).tolist()
+        target = town.lanes[layers.borders.outermost(min(exits, key=lambda e: abs(e.angle)).lane)]
+        aside = town.traffic.sign * (target.width_at(0.0) / 2.0 + _FAR_ASIDE)
+        x, y = target.position(_FAR, aside).tolist()
         others = [row.at for row in (*heads, *found)]
         room = free_of(np.array([shapely.Point(x, y).buffer(0.3)]), clearance.lanes)[0]
         if room and all(pm.dist((x, y), other) > _HEADS_APART for other in others):
@@ -215,18 +216,18 @@ class Blade(NamedTuple):
 
 
 def plan_blades(layers: MapLayers, clearance: Clearance) -> list[Blade]:
-    """Returns the corners with street names: on the right of each approach to a junction, where there is room."""
+    """Returns the corners with street names: at the kerb of each approach to a junction, where there is room."""
     town = layers.town
     found: list[Blade] = []
     for lane in town.lanes:
-        if lane.in_junction or lane.street == NO_STREET or lane.id in layers.borders.right_neighbour:
+        if lane.in_junction or lane.street == NO_STREET or lane.id in layers.borders.outer_neighbour:
             continue
         exits = [e for e in town.exits(lane.id) if e.junction_id >= 0]
         others = {town.lanes[e.lane].street: None for e in exits}
         cross = [street for street in others if street not in (lane.street, NO_STREET)]
         if not exits:
             continue
-        at = _corner(lane, clearance, found)
+        at = _corner(lane, town.traffic.sign, clearance, found)
         if at is None:
             continue
         heading = lane.heading_at(lane.length)
@@ -235,9 +236,9 @@ def plan_blades(layers: MapLayers, clearance: Clearance) -> list[Blade]:
     return found
 
 
-def _corner(lane: Lane, clearance: Clearance, others: list[Blade]) -> tuple[float, float] | None:
+def _corner(lane: Lane, sign: int, clearance: Clearance, others: list[Blade]) -> tuple[float, float] | None:
     for aside in _CORNER:
-        x, y = lane.position(lane.length - 0.5, lane.width_at(lane.length) / 2.0 + aside).tolist()
+        x, y = lane.position(lane.length - 0.5, sign * (lane.width_at(lane.length) / 2.0 + aside)).tolist()
         apart = all(pm.hypot(x - blade.at[0], y - blade.at[1]) > _CORNERS_APART for blade in others)
         if apart and free_of(np.array([shapely.Point(x, y).buffer(0.15)]), clearance.lanes)[0]:
             return x, y

@@ -36,7 +36,7 @@ def lamp_places(layers: MapLayers, clearance: Clearance) -> Array:
     posts = np.array([post.at for post in layers.posts]).reshape(-1, 2)
     kept = np.zeros((0, 2))
     for line in layers.borders.lines:
-        if line.kind is not BorderKind.EDGE or line.sign < 0:
+        if line.kind is not BorderKind.EDGE or not line.outer:
             continue
         stations = polyline_stations(line.points)
         at = np.arange(_FIRST, stations[-1] - 5.0, _SPACING)
