@@ -41,8 +41,13 @@ def read_yaml_town(path: str | FilePath) -> Town:
 
 def import_yaml_town(path: str | FilePath) -> tuple[Town, ImportNotes]:
     """Compiles a town file like `read_yaml_town`; also returns what was repaired: lanes that were too long."""
-    notes = ImportNotes(str(path))
-    return cut_long_lanes(compile_town(lay_out(read_plan(FilePath(path)))), notes), notes
+    return town_of_layout(lay_out(read_plan(FilePath(path))), str(path))
+
+
+def town_of_layout(layout: Layout, source: str) -> tuple[Town, ImportNotes]:
+    """Compiles a layout like `import_yaml_town`; `source` is its name in messages."""
+    notes = ImportNotes(source)
+    return cut_long_lanes(compile_town(layout), notes), notes
 
 
 def compile_town(layout: Layout) -> Town:

@@ -1,0 +1,98 @@
+"""Names of generated towns: `generated:SEED`, optionally with the size and the style of the town."""
+
+from __future__ import annotations
+
+import enum
+import re
+from dataclasses import dataclass
+from typing import NoReturn
+
+from dorothie_gym.errors import TownError, did_you_mean
+
+PREFIX = "generated:"
+"""Start of the name of each generated town."""
+MOST_SEED = 10**12
+"""Seeds are smaller than this number."""
+
+_SEED = re.compile("[0-9]{1,12}")
+
+
+class TownSize(enum.StrEnum):
+    """Size of a generated town: about 8, 16 or 28 junctions."""
+
+    SMALL = "small"
+    MEDIUM = "medium"
+    LARGE = "large"
+
+
+class TownStyle(enum.StrEnum):
+    """Plan of the streets of a generated town."""
+
+    GRID = "grid"
+    ORGANIC = "organic"
+    RADIAL = "radial"
+    MIXED = "mixed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TownSpecification:
+    """What determines a generated town.
+
+    Attributes:
+        seed: seed, from 0 to `MOST_SEED` - 1.
+        size: size; None lets the seed choose.
+        style: plan of the streets; None lets the seed choose.
+    """
+
+    seed: int
+    size: TownSize | None = None
+    style: TownStyle | None = None
+
+    def __post_init__(self) -> None:
+        """Checks the seed."""
+        if not 0 <= self.seed < MOST_SEED:
+            raise ValueError(f"seed is {self.seed}; it must be from 0 to {MOST_SEED - 1}")
+
+    def __str__(self) -> str:
+        """Returns the name of the town, always spelt in the same way."""
+        options = (("size", self.size), ("style", self.style))
+        return f"{PREFIX}{self.seed}" + "".join(f",{key}={value}" for key, value in options if value is not None)
+
+
+def is_generated(name: str) -> bool:
+    """Returns whether a name is that of a generated town, correct or not."""
+    return name.startswith(PREFIX)
+
+
+def parse_specification(name: str) -> TownSpecification:
+    """Returns the specification that a name states, such as `generated:7,size=small,style=grid`.
+
+    Raises:
+        TownError: with the remedy.
+    """
+    seed, *options = name.removeprefix(PREFIX).split(",")
+    if not is_generated(name) or not _SEED.fullmatch(seed):
+        _fail(name, f"its seed is {seed!r}; write a whole number from 0 to {MOST_SEED - 1}, such as 'generated:7'")
+    values: dict[str, str] = {}
+    for option in options:
+        key, equals, value = option.partition("=")
+        if not equals or key not in _OPTIONS:
+            _fail(name, f"unknown option {option!r}; {did_you_mean(key, _OPTIONS)}known are size=... and style=...")
+        if key in values:
+            _fail(name, f"{key!r} is there twice; remove one")
+        known = [str(member) for member in _OPTIONS[key]]
+        if value not in known:
+            _fail(name, f"{key} is {value!r}; {did_you_mean(value, known)}known are {', '.join(known)}")
+        values[key] = value
+    return TownSpecification(
+        seed=int(seed),
+        size=TownSize(values["size"]) if "size" in values else None,
+        style=TownStyle(values["style"]) if "style" in values else None,
+    )
+
+
+_OPTIONS: dict[str, type[TownSize] | type[TownStyle]] = {"size": TownSize, "style": TownStyle}
+
+
+def _fail(name: str, reason: str) -> NoReturn:
+    raise TownError(name, "town", reason)
