@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from dorothie_gym.errors import InputFileError, TownError, did_you_mean
 from dorothie_gym.maps import generated, opendrive, yaml  # lazy: their parsers are slow to import
 from dorothie_gym.maps.cache import through_cache
-from dorothie_gym.maps.generated.specification import TownSpecification, is_generated, parse_specification
+from dorothie_gym.maps.generated.specification import TownSeries, TownSpecification, is_generated, parse_specification
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
@@ -67,6 +67,17 @@ def load_town(name_or_path: str | Path) -> Town:
         return _generate(parse_specification(str(name_or_path)))[0]
     with _located(name_or_path) as path:
         return _load(path)
+
+
+def town_at(source: str | Path | Town | TownSeries, seed: int) -> Town:
+    """Returns the town of a session: the one that is given or named, or that of the seed in a series of towns.
+
+    Raises:
+        TownError: as `load_town`.
+    """
+    if isinstance(source, Town):
+        return source
+    return load_town(source.name(seed) if isinstance(source, TownSeries) else source)
 
 
 def import_report(name_or_path: str | Path) -> tuple[ImportNote, ...]:

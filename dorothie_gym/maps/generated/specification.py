@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import enum
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import NoReturn, TypedDict
 
 from dorothie_gym.errors import TownError, did_you_mean
 
-PREFIX = "generated:"
+SERIES = "generated"
+"""Name of the series of all generated towns."""
+PREFIX = f"{SERIES}:"
 """Start of the name of each generated town."""
 MOST_SEED = 10**12
 """Seeds are smaller than this number."""
 
 _SEED = re.compile("[0-9]{1,12}")
+_NEXT_NAME = re.compile(r",(?!\s*(?:size|style|traffic)\s*=)")
 
 
 class TownSize(enum.StrEnum):
@@ -59,6 +63,43 @@ class TownSpecification:
         return f"{PREFIX}{self.seed}" + "".join(f",{key}={value}" for key, value in options if value is not None)
 
 
+@dataclass(frozen=True, kw_only=True)
+class TownSeries:
+    """Generated towns of one size and style, one for each seed.
+
+    Attributes:
+        size: size; None lets the seed choose.
+        style: plan of the streets; None lets the seed choose.
+    """
+
+    size: TownSize | None = None
+    style: TownStyle | None = None
+
+    def name(self, seed: int) -> str:
+        """Returns the name of the town of a seed; seeds from `MOST_SEED` on begin with 0 again."""
+        return str(TownSpecification(seed=seed % MOST_SEED, size=self.size, style=self.style))
+
+    def pool(self, count: int) -> tuple[str, ...]:
+        """Returns the names of the first towns."""
+        return tuple(self.name(seed) for seed in range(count))
+
+
+def parse_series(name: object) -> TownSeries | None:
+    """Returns the series that a name states, such as `generated` or `generated,size=small`; None for another name.
+
+    Raises:
+        TownError: with the remedy.
+    """
+    first, *options = name.split(",") if isinstance(name, str) else [""]
+    return TownSeries(**_read_options(str(name), options)) if first == SERIES else None
+
+
+def split_names(text: str) -> list[str]:
+    """Returns the names in a list with commas; the options of a generated town belong to its name."""
+    parts = [part.strip() for part in _NEXT_NAME.split(text)]
+    return [part for part in parts if part]
+
+
 def is_generated(name: str) -> bool:
     """Returns whether a name is that of a generated town, correct or not."""
     return name.startswith(PREFIX)
@@ -73,9 +114,20 @@ def parse_specification(name: str) -> TownSpecification:
     seed, *options = name.removeprefix(PREFIX).split(",")
     if not is_generated(name) or not _SEED.fullmatch(seed):
         _fail(name, f"its seed is {seed!r}; write a whole number from 0 to {MOST_SEED - 1}, such as 'generated:7'")
+    return TownSpecification(seed=int(seed), **_read_options(name, options))
+
+
+class _Options(TypedDict):
+    size: TownSize | None
+    style: TownStyle | None
+
+
+def _read_options(name: str, options: Sequence[str]) -> _Options:
     values: dict[str, str] = {}
     for option in options:
         key, equals, value = option.partition("=")
+        if key == "traffic":
+            _fail(name, "generated towns have right-hand traffic only; remove 'traffic'")
         if not equals or key not in _OPTIONS:
             _fail(name, f"unknown option {option!r}; {did_you_mean(key, _OPTIONS)}known are size=... and style=...")
         if key in values:
@@ -84,11 +136,10 @@ def parse_specification(name: str) -> TownSpecification:
         if value not in known:
             _fail(name, f"{key} is {value!r}; {did_you_mean(value, known)}known are {', '.join(known)}")
         values[key] = value
-    return TownSpecification(
-        seed=int(seed),
-        size=TownSize(values["size"]) if "size" in values else None,
-        style=TownStyle(values["style"]) if "style" in values else None,
-    )
+    return {
+        "size": TownSize(values["size"]) if "size" in values else None,
+        "style": TownStyle(values["style"]) if "style" in values else None,
+    }
 
 
 _OPTIONS: dict[str, type[TownSize] | type[TownStyle]] = {"size": TownSize, "style": TownStyle}
