@@ -19,21 +19,27 @@ from dorothie_gym.maps.generated.town_draft import StreetDraft, TownDraft, town_
 from dorothie_gym.maps.yaml.compile import town_of_layout
 from dorothie_gym.maps.yaml.layout import Layout, lay_out
 from dorothie_gym.maps.yaml.schema import parse_plan
+from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.generated.growth import Drawer
+    from dorothie_gym.maps.generated.street_graph import StreetGraph
     from dorothie_gym.maps.import_notes import ImportNotes
     from dorothie_gym.maps.town import Town
 
 JUNCTIONS = {TownSize.SMALL: (7, 10), TownSize.MEDIUM: (12, 21), TownSize.LARGE: (22, 34)}
 """Smallest and largest number of junctions of each size."""
-MOST_ATTEMPTS = 60
-"""Number of drafts that are drawn for a town; about one in three fits the numbers and the rules of the language."""
+MOST_ATTEMPTS = 150
+"""Largest number of drafts of a town, of which about one in three is a town of its size and can be laid out."""
 _SPEED = {TownSize.SMALL: 40, TownSize.MEDIUM: 40, TownSize.LARGE: 50}
 _RADIUS = {TownStyle.GRID: 22, TownStyle.ORGANIC: 70, TownStyle.RADIAL: 120, TownStyle.MIXED: 40}
 """Largest radius of bends [m]."""
 LARGEST_BLOCK = 52_000.0
 """Largest area of a block [m^2]: five hectares, about 200 m by 250 m."""
+LONGEST_LINE = 420.0
+"""Largest length of a street between two junctions [m]."""
+CIRCUITY = {TownSize.SMALL: 1.25, TownSize.MEDIUM: 1.15, TownSize.LARGE: 1.15}
+"""Largest sum of lengths between junctions, relative to the straight distances; a small town has more rim."""
 _DRAWERS: dict[TownStyle, Drawer] = {
     TownStyle.GRID: draw_grid,
     TownStyle.ORGANIC: draw_organic,
@@ -90,7 +96,7 @@ def draft(specification: TownSpecification, attempt: int = 0) -> TownDraft | Non
     chains = join_streets(graph, MOST_STREETS - len(rings))
     if not least <= len(graph.places) <= most or len(chains) > MOST_STREETS - len(rings):
         return None
-    if max(graph.blocks()) > LARGEST_BLOCK:
+    if not _is_plausible(graph, size):
         return None
     town = TownDraft(
         name=str(specification),
@@ -105,6 +111,15 @@ def draft(specification: TownSpecification, attempt: int = 0) -> TownDraft | Non
     add_turn_lanes(town)
     round_bends(town, _RADIUS[style])
     return town if is_strongly_connected(town) else None
+
+
+def _is_plausible(graph: StreetGraph, size: TownSize) -> bool:
+    """Returns whether the blocks and streets are as large, and as straight, as those of a real town."""
+    lengths = [graph.length(k) for k in graph.edges]
+    straight = [pm.dist(graph.places[edge.start], graph.places[edge.end]) for edge in graph.edges.values()]
+    if max(lengths) > LONGEST_LINE or sum(lengths) > CIRCUITY[size] * sum(straight):
+        return False
+    return max(graph.blocks()) <= LARGEST_BLOCK
 
 
 def _name(town: TownDraft, rng: np.random.Generator, rings: dict[int, int]) -> None:

@@ -15,9 +15,9 @@ from dorothie_gym.support.portable_math import wrap_radians
 if TYPE_CHECKING:
     from dorothie_gym.maps.generated.specification import TownSize
 
-SMALLEST_ANGLE = math.radians(58.0)
+SMALLEST_ANGLE = math.radians(54.0)
 """Smallest angle between two lines at a junction before lines are bent [rad]."""
-BENT_ANGLE = math.radians(52.0)
+BENT_ANGLE = math.radians(50.0)
 """The same after lines are bent [rad]."""
 SHARPEST_CORNER = math.radians(102.0)
 """Largest change of direction at a bend [rad], if there is a choice."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 _LATTICE = {TownSize.SMALL: (3, 3), TownSize.MEDIUM: (3, 3), TownSize.LARGE: (4, 4)}
-_PLACES = {TownSize.SMALL: 8, TownSize.MEDIUM: 17, TownSize.LARGE: 22}
+_PLACES = {TownSize.SMALL: 7, TownSize.MEDIUM: 17, TownSize.LARGE: 22}
 _SPACING, _LONGEST = 84.0, 172.0  # [m]
 _THINNED = {TownSize.SMALL: 1, TownSize.MEDIUM: 2, TownSize.LARGE: 4}
 

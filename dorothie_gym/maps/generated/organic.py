@@ -11,10 +11,10 @@ from dorothie_gym.maps.generated.street_graph import GridPoint, StreetGraph
 if TYPE_CHECKING:
     import numpy as np
 
-_PLACES = {TownSize.SMALL: 19, TownSize.MEDIUM: 29, TownSize.LARGE: 42}
+_PLACES = {TownSize.SMALL: 18, TownSize.MEDIUM: 29, TownSize.LARGE: 40}
 """Number of places from which junctions and bends grow."""
 _SPACING = 84.0  # [m] smallest distance of two places
-_LONGEST = 176.0  # [m] longest line
+_LONGEST = 190.0  # [m] longest line
 _THINNED = {TownSize.SMALL: 1, TownSize.MEDIUM: 3, TownSize.LARGE: 6}
 
 
