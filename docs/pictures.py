@@ -94,7 +94,7 @@ def draw_midtown(path: Path) -> None:
 
 
 GENERATED_TOWNS: Final = (
-    "generated:1,size=medium,style=grid", "generated:2,size=large,style=organic",
+    "generated:2,size=large,style=grid", "generated:5,size=large,style=organic",
     "generated:3,size=medium,style=radial", "generated:2,size=large,style=mixed",
 )  # fmt: skip
 """Towns on the picture of docs/towns.md, row by row."""

@@ -17,7 +17,7 @@ _LINES = {TownSize.SMALL: ((4, 3), (4, 3)), TownSize.MEDIUM: ((5, 4), (4, 5)), T
 """Numbers of lines in both directions, one of which is drawn."""
 _THINNED = {TownSize.SMALL: 1, TownSize.MEDIUM: 2, TownSize.LARGE: 3}
 _NARROWEST, _WIDEST = 84, 128  # [m] distances of parallel streets
-_JITTER = 5  # [m] by which a junction lies off its line
+_JITTER = 7  # [m] by which a junction lies off its line
 
 
 def draw_grid(rng: np.random.Generator, size: TownSize) -> StreetGraph:

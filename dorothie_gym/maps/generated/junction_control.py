@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 RING_ARC = 37.0
 """Distance of two streets along the ring of a roundabout [m]."""
 _SMALLEST_RING, _LARGEST_RING = 18, 40  # [m] radius
-_RING_BLOCK = 50.0  # [m] shortest distance from the ring to the next junction
+_RING_BLOCK, _JUNCTION = 50.0, 14.0  # [m] shortest distance from the ring to the next junction, and radius of that one
 _RINGS = {TownSize.SMALL: 1, TownSize.MEDIUM: 1, TownSize.LARGE: 2}
 _CIRCUS = ("Circus", "Round", "Cross")
 
@@ -48,8 +48,8 @@ def _radius(graph: StreetGraph, node: int) -> int:
 def _has_ring_room(graph: StreetGraph, node: int, radius: int, others: dict[int, int]) -> bool:
     for k in graph.at(node):
         far = graph.edges[k].far(node)
-        room = pm.dist(*graph.points(k, node)[:2]) - radius - others.get(far, 14)
-        if room < _RING_BLOCK or graph.edges[k].bends:
+        room = pm.dist(*graph.points(k, node)[:2]) - radius - _JUNCTION
+        if far in others or room < _RING_BLOCK or graph.edges[k].bends:
             return False
     return True
 
@@ -86,7 +86,7 @@ def separate(
     """
     if rng.random() >= _SEPARATED_SHARE[size]:
         return {}
-    height = _UNDER if rng.random() < 0.6 else _OVER
+    height = _UNDER if rng.random() < 0.5 else _OVER
     for node in shuffled(rng, sorted(graph.places)):
         if node in taken:
             continue

@@ -50,7 +50,7 @@ class Chain:
 
 
 def join_streets(graph: StreetGraph, most: int = MOST_STREETS) -> list[Chain]:
-    """Joins lines to streets: the most straight continuations first, and further ones while there are too many.
+    """Joins lines to streets: the most straight continuations first, then others while there are too many streets.
 
     A street visits no junction twice, unless it is a ring.
 
@@ -63,18 +63,20 @@ def join_streets(graph: StreetGraph, most: int = MOST_STREETS) -> list[Chain]:
     """
     chains = {k: Chain((edge.start, edge.end), (k,)) for k, edge in sorted(graph.edges.items())}
     used: set[tuple[int, int]] = set()  # (junction, line) where a street continues
-    for turn, node, first, second in _continuations(graph):
-        if turn > _STRAIGHT_ON and len(set(chains.values())) <= most:
-            break
-        if (node, first) in used or (node, second) in used:
-            continue
-        joined = _joined(chains[first], chains[second], node)
-        enough = len(set(chains.values())) <= most
-        if joined is not None and not (enough and sum(turn > _CORNER for turn in joined.turns(graph)) > 1):
+    continuations = _continuations(graph)
+    straight = [each for each in continuations if each[0] <= _STRAIGHT_ON]
+    for strict, choice in ((True, straight), (False, continuations)):
+        for _, node, first, second in choice:
+            if not strict and len(set(chains.values())) <= most:
+                break
+            if (node, first) in used or (node, second) in used:
+                continue
+            joined = _joined(chains[first], chains[second], node)
+            if joined is None or (strict and sum(turn > _CORNER for turn in joined.turns(graph)) > 1):
+                continue
             used |= {(node, first), (node, second)}
             chains.update(dict.fromkeys(joined.edges, joined))
-    found = sorted(set(chains.values()), key=lambda chain: (-chain.length(graph), chain.edges))
-    return found
+    return sorted(set(chains.values()), key=lambda chain: (-chain.length(graph), chain.edges))
 
 
 def _continuations(graph: StreetGraph) -> list[tuple[float, int, int, int]]:

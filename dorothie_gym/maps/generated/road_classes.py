@@ -24,7 +24,7 @@ _AVENUES = {TownSize.SMALL: 0, TownSize.MEDIUM: 1, TownSize.LARGE: 2}
 _AVENUE_BLOCK, _WIDE_BLOCK = 84.0, 76.0  # [m] shortest block of an avenue, and of another street of several lanes
 _AVENUE_ANGLE, _WIDE_ANGLE = math.radians(66.0), math.radians(60.0)  # smallest angle to other streets
 _SHORTEST_WIDE, _STRAIGHT = 240.0, math.radians(100.0)  # [m], and largest sum of changes of direction [rad]
-_POCKET_BLOCK = 108.0  # [m] shortest block with left-turn lanes
+_POCKET_BLOCK = 94.0  # [m] shortest block with left-turn lanes
 _PARALLEL, _PAIR_DISTANCE, _SHORTEST_PAIR = math.radians(22.0), (60.0, 170.0), 190.0
 _JUNCTION, _SMALLEST_RADIUS, _VISIBLE = 24.0, 16, math.radians(1.0)
 """Room of a junction [m], smallest radius of a bend that is set [m], and smallest change of direction [rad]."""
