@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.generated.growth import between, curve, grow, prune, scatter, thin
@@ -30,7 +31,10 @@ def draw_mixed(rng: np.random.Generator, size: TownSize) -> StreetGraph:
                 graph.add((i - 1) * down + j, i * down + j)
             if j:
                 graph.add(i * down + j - 1, i * down + j)
-    half = int(_SPACING * (0.62 * _PLACES[size] * 2) ** 0.5), int(_SPACING * (0.5 * _PLACES[size]) ** 0.5 + 40)
+    half = (
+        int(_SPACING * math.sqrt(0.62 * _PLACES[size] * 2)),
+        int(_SPACING * math.sqrt(0.5 * _PLACES[size]) + 40),
+    )
     taken = list(graph.places.values())
     found = scatter(rng, taken, half, _SPACING, 2 * _PLACES[size])
     for place in [p for p in found if p[0] < 0][: _PLACES[size]]:

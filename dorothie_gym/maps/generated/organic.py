@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.generated.growth import between, curve, grow, prune, scatter, thin
@@ -22,7 +23,7 @@ def draw_organic(rng: np.random.Generator, size: TownSize) -> StreetGraph:
     """Returns the junctions and lines of a town that grew along a main street."""
     count = _PLACES[size]
     # a place takes about 0.8 of the square of its distance to the next one in a random packing
-    half_width = int(_SPACING * (0.62 * count) ** 0.5)
+    half_width = int(_SPACING * math.sqrt(0.62 * count))
     half = half_width, int(half_width * between(rng, 62, 90) / 100)
     street = _main_street(rng, half_width)
     graph = StreetGraph(places=dict(enumerate(street)))

@@ -14,7 +14,7 @@ SERIES = "generated"
 """Name of the series of all generated towns."""
 PREFIX = f"{SERIES}:"
 """Start of the name of each generated town."""
-MOST_SEED = 10**12
+MOST_SEED = 1_000_000_000_000
 """Seeds are smaller than this number."""
 
 _SEED = re.compile("[0-9]{1,12}")
