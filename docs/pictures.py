@@ -93,6 +93,25 @@ def draw_midtown(path: Path) -> None:
     _reduce(path)
 
 
+GENERATED_TOWNS: Final = (
+    "generated:2,size=large,style=grid", "generated:5,size=large,style=organic",
+    "generated:3,size=medium,style=radial", "generated:2,size=large,style=mixed",
+)  # fmt: skip
+"""Towns on the picture of docs/towns.md, row by row."""
+
+
+def draw_generated_towns(path: Path) -> None:
+    """Draws the maps of four generated towns."""
+    width, height = 900, 700
+    sheet = Image.new("RGB", (2 * width, 2 * height))
+    for k, name in enumerate(GENERATED_TOWNS):
+        town_picture(load_town(name), path, size=(width, height))
+        with Image.open(path) as image:
+            sheet.paste(image, (k % 2 * width, k // 2 * height))
+    sheet.save(path)
+    _reduce(path)
+
+
 WINDSCREEN_TOWN, WINDSCREEN_SEED, WINDSCREEN_SECONDS = "midtown", 7, 52.0
 WINDSCREEN_FRAME = 684
 WINDSCREEN_FILM = range(1215, 1545, 3)
@@ -271,6 +290,7 @@ def _reduce(path: Path) -> None:
 PICTURES: Final[Mapping[str, Callable[[Path], None]]] = {
     "session": draw_first_session,
     "midtown": draw_midtown,
+    "generated_towns": draw_generated_towns,
     "windscreen": draw_windscreen,
     "film": draw_film,
     "camera": draw_camera,

@@ -10,6 +10,7 @@ from dorothie_gym import maps as town_maps
 from dorothie_gym import policies as players
 from dorothie_gym import tasks
 from dorothie_gym._registration import environment_ids
+from dorothie_gym.maps.generated.specification import PREFIX as GENERATED_TOWNS
 from dorothie_gym.ontology.roles import Role
 
 ROLE_MODELS: Final = ("co-wizard", "participant")
@@ -23,14 +24,19 @@ Completion: TypeAlias = Callable[[str], list[str]]
 
 
 def complete_town(incomplete: str) -> list[str]:
-    """Returns the shipped towns and the map files that begin with a text."""
-    return _names(incomplete, town_maps.town_names()) + list(_paths(incomplete, (".yaml", ".yml", ".xodr")))
+    """Returns the shipped towns, the start of generated ones, and the map files that begin with a text."""
+    return _names(incomplete, (*town_maps.town_names(), GENERATED_TOWNS)) + list(
+        _paths(incomplete, (".yaml", ".yml", ".xodr"))
+    )
 
 
 def complete_towns(incomplete: str) -> list[str]:
     """Returns the completions of the last name in a list of towns, with the names before it."""
     before, comma, last = incomplete.rpartition(",")
-    return [before + comma + name for name in _names(last, ("seen", "unseen", "all", *town_maps.town_names()))]
+    return [
+        before + comma + name
+        for name in _names(last, ("seen", "unseen", "all", *town_maps.town_names(), GENERATED_TOWNS))
+    ]
 
 
 def complete_storyboard(incomplete: str) -> list[str]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shlex
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from dorothie_gym import maps as town_maps
+from dorothie_gym.cli.completion import complete_towns
 from dorothie_gym.cli.options import AsJson, MaxSeconds, Perception, Players, Ray, Speech, WordErrors, env_config
 from dorothie_gym.cli.output import (
     FAILED,
@@ -22,6 +25,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
+from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.session.config import PerceptionModel
 from dorothie_gym.support.processors import available_processors
@@ -31,6 +35,15 @@ def generate(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the corpus; a started corpus is resumed.")],
     sessions: Annotated[int, typer.Option(min=1, help="Number of sessions, divided into folds as in the paper.")] = 183,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the corpus; equal seeds give equal corpora.")] = 0,
+    towns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="Towns of the seen folds, which take turns: seen|unseen|all|NAME,...; generated is another town for"
+            " each session.",
+            autocompletion=complete_towns,
+        ),
+    ] = None,
     workers: Players = None,
     max_seconds: MaxSeconds = None,
     word_errors: WordErrors = None,
@@ -45,6 +58,7 @@ def generate(
     """
     with reporting_errors():
         config = env_config(max_seconds, word_errors, perception, speech)
+        seen = town_maps.SEEN_TOWNS if towns is None else closed_loop.parse_towns(towns)
         try:
             compile_first(pictures=perception is PerceptionModel.CAMERA)
             begun = time.perf_counter()
@@ -53,13 +67,14 @@ def generate(
                     out,
                     sessions=sessions,
                     seed=seed,
+                    towns=seen,
                     workers=workers or available_processors(),
                     ray=ray,
                     config=config,
                     on_session=on_session,
                 )
         except KeyboardInterrupt:
-            _exit_interrupted(out, sessions, seed, max_seconds, word_errors, perception, speech)
+            _exit_interrupted(out, sessions, seed, towns, max_seconds, word_errors, perception, speech)
         except ProcessError as error:
             fail(str(error), FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
@@ -79,13 +94,17 @@ def _exit_interrupted(
     out: Path,
     sessions: int,
     seed: int,
+    towns: str | None,
     max_seconds: float | None,
     word_errors: float | None,
     perception: PerceptionModel,
     speech: bool,
 ) -> None:
-    done = rollouts.finished_sessions(out, sessions=sessions, seed=seed)
+    seen = town_maps.SEEN_TOWNS if towns is None else closed_loop.parse_towns(towns)
+    done = rollouts.finished_sessions(out, sessions=sessions, seed=seed, towns=seen)
     command = f"dorothie-gym generate --sessions {sessions} --seed {seed} --out {out}"
+    if towns is not None:
+        command += f" --towns {shlex.quote(towns)}"
     if max_seconds is not None:
         command += f" --max-seconds {max_seconds:g}"
     if word_errors is not None:

@@ -20,6 +20,7 @@ from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
 from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology.roles import AGENT_ROLES
+from dorothie_gym.session.recording.files import safe_name
 
 FAULTY = 1
 """Exit code for a town that has faults."""
@@ -52,7 +53,7 @@ def towns(
         _list_towns(check, picture, as_json)
         return
     if picture == Path(OWN_NAME):
-        picture = Path(f"{Path(town).stem}.png")
+        picture = Path(f"{safe_name(Path(town).stem)}.png")
     if picture is not None:
         check_picture(picture)
     with reporting_errors():

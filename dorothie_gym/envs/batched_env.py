@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.maps.town import Town
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_batch import SessionBatch
@@ -20,7 +21,10 @@ from dorothie_gym.support.copying import Restorable, taken
 from dorothie_gym.support.processors import available_processors
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
-"""A town, or several over which the environments of a batch cycle."""
+"""A town, or several over which the environments of a batch cycle; "generated" stands for the first of a series."""
+
+POOL = 64
+"""Largest number of towns of a series in a batch: each is a batch of its own."""
 
 
 C = TypeVar("C", bound=EnvConfig | NavigationConfig)
@@ -63,6 +67,8 @@ class BatchedEnv(Restorable, Generic[C, B]):
         names = [town] if isinstance(town, str | Path | Town) else list(town)
         if not names:
             raise ValueError("town is an empty sequence; it must name at least one town")
+        series = [(name, parse_series(name)) for name in names]
+        names = [each for name, own in series for each in (own.pool(min(POOL, num_envs)) if own else (name,))]
         loaded = [each if isinstance(each, Town) else load_town(each) for each in names]
         self.towns = [loaded[number % len(loaded)] for number in range(num_envs)]
         self.num_envs, self.render_mode, self.config = num_envs, render_mode, config

@@ -78,7 +78,8 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     its landmark. Truncates after `EnvConfig.max_seconds` or `max_cycles` decisions.
 
     ## Arguments
-    - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
+    - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`. `"generated:SEED"` is a generated town;
+      `"generated"` is another one for each seed of a session.
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
     - `config`: `EnvConfig`, or a mapping of its fields.
     - `render_mode`: None, `"rgb_array"` or `"human"`.

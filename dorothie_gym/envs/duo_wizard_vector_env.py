@@ -94,7 +94,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
 
         Args:
             num_envs: number of environments.
-            town: a town as in `DuoWizardEnv`, or several over which the environments cycle.
+            town: a town as in `DuoWizardEnv`, or several over which the environments cycle. "generated" stands for the
+                first generated towns: one for each environment, at most 64.
             storyboard: as in `DuoWizardEnv`.
             config: as in `DuoWizardEnv`, with symbolic perception. Pictures of a camera are drawn on the threads.
             render_mode: None or "rgb_array".

@@ -64,7 +64,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
     `info["reason"]` is "arrived", "gave up" or "out of time".
 
     ## Arguments
-    - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
+    - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`. `"generated:SEED"` is a generated town;
+      `"generated"` is another one for each seed of a session.
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
     - `guidance`: "turns" (before each junction) or "goals" (by name, where the place is on the Co-Wizard's map).
     - `traffic`: "none", "light", "medium" or "heavy".

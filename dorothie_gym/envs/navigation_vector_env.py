@@ -46,7 +46,8 @@ class NavigationVectorEnv(DrivingVectorEnv):
 
     ## Arguments
     - `num_envs`: number of environments.
-    - `town`: a town as in `NavigationEnv`, or a sequence of towns over which the environments cycle.
+    - `town`: a town as in `NavigationEnv`, or a sequence of towns over which the environments cycle. `"generated"`
+      stands for the first generated towns: one for each environment, at most 64.
     - `threads`: maximum number of threads that step the environments, by default one per processor.
     - `autoreset_mode`: Gymnasium's. `options["reset_mask"]` of `reset` resets some environments only.
     - `render_mode`: None or `"rgb_array"`; `render()` draws the first environment, `render_one(number)` any.

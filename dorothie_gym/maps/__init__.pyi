@@ -6,8 +6,11 @@ from .catalogue import describe as describe
 from .catalogue import fold_of as fold_of
 from .catalogue import import_report as import_report
 from .catalogue import load_town as load_town
+from .catalogue import town_at as town_at
 from .catalogue import town_names as town_names
 from .driving_side import DrivingSide as DrivingSide
+from .generated.specification import TownSeries as TownSeries
+from .generated.specification import parse_series as parse_series
 from .import_notes import ImportNote as ImportNote
 from .import_notes import NoteAction as NoteAction
 from .import_notes import NoteKind as NoteKind

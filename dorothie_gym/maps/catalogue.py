@@ -15,8 +15,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dorothie_gym.errors import InputFileError, TownError, did_you_mean
-from dorothie_gym.maps import opendrive, yaml  # lazy: their parsers are slow to import
+from dorothie_gym.maps import generated, opendrive, yaml  # lazy: their parsers are slow to import
 from dorothie_gym.maps.cache import through_cache
+from dorothie_gym.maps.generated.specification import TownSeries, TownSpecification, is_generated, parse_specification
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
@@ -53,14 +54,30 @@ def fold_of(name: str) -> str | None:
 def load_town(name_or_path: str | Path) -> Town:
     """Loads a town by name, or from a file (`.xodr` for OpenDRIVE, `.yaml` or `.yml` for the town language).
 
+    Names are those of shipped towns, and `generated:SEED` with the options `size` and `style`
+    (`dorothie_gym.maps.generated.specification`).
+
     Towns are cached: within a process as objects, between processes as archives in the user's cache folder
     (`dorothie_gym.maps.cache`). An entry is valid until its file changes. Do not modify a town.
 
     Raises:
         TownError: no town or file has this name, or the file is invalid.
     """
+    if is_generated(str(name_or_path)):
+        return _generate(parse_specification(str(name_or_path)))[0]
     with _located(name_or_path) as path:
         return _load(path)
+
+
+def town_at(source: str | Path | Town | TownSeries, seed: int) -> Town:
+    """Returns the town of a session: the one that is given or named, or that of the seed in a series of towns.
+
+    Raises:
+        TownError: as `load_town`.
+    """
+    if isinstance(source, Town):
+        return source
+    return load_town(source.name(seed) if isinstance(source, TownSeries) else source)
 
 
 def import_report(name_or_path: str | Path) -> tuple[ImportNote, ...]:
@@ -69,6 +86,8 @@ def import_report(name_or_path: str | Path) -> tuple[ImportNote, ...]:
     Raises:
         TownError: no town or file has this name, or the file is invalid.
     """
+    if is_generated(str(name_or_path)):
+        return _generate(parse_specification(str(name_or_path)))[1].sorted()
     with _located(name_or_path) as path:
         _stamp(path)
         return _import(path)[1].sorted()
@@ -87,17 +106,21 @@ def _located(name_or_path: str | Path) -> Iterator[Path]:
             str(name_or_path),
             "town",
             f"there is no such town; {did_you_mean(str(name_or_path), town_names())}"
-            f"known towns are {', '.join(town_names())}, and files end in .xodr or .yaml",
+            f"known towns are {', '.join(town_names())} and generated:SEED, and files end in .xodr or .yaml",
         )
     yield path
 
 
 def find_town(name: str, maps: Path | None) -> Town | None:
-    """Returns the town that a recording names: a shipped one, or a file `<name>.xodr` or `.yaml` in `maps`; or None.
+    """Returns the town that a recording names, or None.
+
+    It is a shipped or generated one, or a file `<name>.xodr` or `.yaml` in `maps`.
 
     Raises:
         TownError: the file is malformed.
     """
+    if is_generated(name):
+        return load_town(name)
     if not _PLAIN_NAME.fullmatch(name):  # a name from a file must not be a path
         return None
     if name in town_names():
@@ -133,6 +156,14 @@ def _stamp(path: Path) -> tuple[Path, int, int]:
 def _read(path: Path, _modified: int, _size: int) -> Town:
     """Reads each version of a file once per process; modification time and size distinguish versions."""
     return through_cache(path, _compile)
+
+
+@lru_cache(maxsize=16)
+def _generate(specification: TownSpecification) -> tuple[Town, ImportNotes]:
+    """Generates each town once per process, as long as it is among the last ones."""
+    town, notes = generated.generate_town(specification)
+    check_extent(town, town.name)
+    return town, notes
 
 
 def _compile(path: Path) -> Town:

@@ -18,7 +18,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym import maps  # lazy: a town that is given needs no reader
-from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.live_session import LiveSession, StepBegun
@@ -35,6 +35,7 @@ from dorothie_gym.support.copying import Restorable
 from dorothie_gym.support.input_files import settings_of
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
     from dorothie_gym.session.recording.header import SessionHeader
     from dorothie_gym.session.session_log import SessionSummary
     from dorothie_gym.sim.traffic_rules import WorldEvent
@@ -62,14 +63,13 @@ class SessionEngine(Restorable):
     Environments are views of an engine; corpora, rollouts and replay checks step it without one.
 
     Args:
-        town: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
+        town: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`; "generated" is another one for each seed.
         storyboard: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one in each reset.
         config: settings of the sessions, also as a mapping, like that in the JSON of `env.spec`.
         max_cycles: decisions until truncation, instead of `config.max_seconds`.
         limits: sizes of the spaces, to make them larger than the town needs.
 
     Attributes:
-        town: the map.
         template: template of the storyboards, or None.
         config: see above.
         max_cycles: see above.
@@ -89,12 +89,12 @@ class SessionEngine(Restorable):
     ) -> None:
         if max_cycles is not None and max_cycles < 1:
             raise ValueError(f"max_cycles is {max_cycles}; it must be at least 1")
-        self.town = town if isinstance(town, Town) else maps.load_town(town)
+        self._series = parse_series(town)
+        self._town = maps.town_at(self._series or town, 0)
         self.template = template_option(storyboard)
         self.config = EnvConfig() if config is None else settings_of(config, EnvConfig, "config")
         self.max_cycles = max_cycles
-        self.limits = limits or SpaceLimits.for_town(self.town)
-        self._network = network_of(self.town)
+        self.limits = limits or SpaceLimits.for_town(self._town)
         self._decoders = {str(role): (role, ActionDecoder(role, self.limits)) for role in AGENT_ROLES}
         self._seeds = np.random.default_rng()
         self._session: LiveSession | None = None
@@ -107,7 +107,7 @@ class SessionEngine(Restorable):
 
     def compatibility(self) -> dict[str, object]:
         """Returns the town and the settings."""
-        return {**super().compatibility(), "the town": self.town.identity, "the settings": self.config}
+        return {**super().compatibility(), "the town": self._series or self._town.identity, "the settings": self.config}
 
     @property
     def engine(self) -> SessionEngine:
@@ -128,10 +128,17 @@ class SessionEngine(Restorable):
             if seed is not None:
                 self._seeds = np.random.default_rng(seed)
             session_seed = seed if seed is not None else int(self._seeds.integers(2**31))
-            scenario = draw_scenario(self.town, self.template, session_seed)
-        self._session = LiveSession(self.town, self._network, scenario, self.config, self.limits)
+            town = self.town_of(session_seed)
+            scenario = draw_scenario(town, self.template, session_seed)
+        else:
+            town = self.town_of(scenario.seed)
+        self._session = LiveSession(town, network_of(town), scenario, self.config, self.limits)
         self._observations = None
         return self.observations
+
+    def town_of(self, seed: int) -> Town:
+        """Returns the town of the session of a seed: the engine's, unless each seed has another one."""
+        return self._town if self._series is None else maps.town_at(self._series, seed)
 
     def step(self, actions: Mapping[str, ActionMapping]) -> StepOutcome:
         """Runs one decision: the actions of all roles, then the physics until the next decision.
@@ -204,6 +211,11 @@ class SessionEngine(Restorable):
     def over(self) -> bool:
         """Whether the session is over; raises `RuntimeError` before the first reset."""
         return self.session.over
+
+    @property
+    def town(self) -> Town:
+        """The map: that of the session where each seed has another one."""
+        return self._town if self._series is None or self._session is None else self._session.world.town
 
     @property
     def has_begun(self) -> bool:

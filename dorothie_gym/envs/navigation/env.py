@@ -16,8 +16,8 @@ from dorothie_gym.envs.navigation.episode import Ending
 from dorothie_gym.envs.navigation.render import DrivingView
 from dorothie_gym.envs.navigation.rows import INFRACTIONS
 from dorothie_gym.envs.session_view import SessionView, metadata_at
-from dorothie_gym.maps.catalogue import load_town
-from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.catalogue import town_at
+from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option, template_option
@@ -26,6 +26,7 @@ from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
 
 if TYPE_CHECKING:
     from dorothie_gym.envs.navigation.config import NavigationConfig
+    from dorothie_gym.maps.town import Town
     from dorothie_gym.session.live_session import LiveSession
     from dorothie_gym.session.spaces.actions import StepInfo
     from dorothie_gym.tasks.storyboard import StoryboardTemplate
@@ -43,7 +44,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         batch: the session, as a batch of one.
     """
 
-    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_ending", "_np_random", "_np_random_seed")
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_ending", "_np_random", "_np_random_seed", "_town_seed")
 
     def __init__(
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
@@ -54,10 +55,21 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         self.render_mode = render_mode
         drawn = SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency, render_view)
         self._view = DrivingView(drawn)
-        self.town = town if isinstance(town, Town) else load_town(town)
         self.template = template_option(storyboard)
-        self.batch = DrivingBatch(self.town, self.template, config, 1, 1, pedals=pedals)
+        self._series, self._town_seed, self._pedals = parse_series(town), 0, pedals
+        self.town = town_at(self._series or town, 0)
+        self.batch = self._new_batch()
         self._ending = Ending.NONE
+
+    def _new_batch(self) -> DrivingBatch:
+        return DrivingBatch(self.town, self.template, self.config, 1, 1, pedals=self._pedals)
+
+    def _enter(self, seed: int) -> None:
+        """Begins a batch in the town of a seed, if each seed has a town of its own."""
+        self._town_seed = seed
+        if self._series is not None and self._series.name(seed) != self.town.name:
+            self.town = town_at(self._series, seed)
+            self.batch = self._new_batch()
 
     # --- States -------------------------------------------------------------------------------------------------------
 
@@ -69,13 +81,14 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         """Applies the values of the environment and the notes for its pictures."""
         notes, batch = taken(values, "view", tuple), taken(values, "batch", dict)
         super().apply_values(values)
+        self._enter(self._town_seed)
         self.batch.apply_values(batch)
         if self.batch.has_begun:
             self._view.apply_values(notes, self.batch.catch_up(0))
 
     def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, the town and the settings."""
-        return {**super().compatibility(), "the town": self.town.identity, "the settings": self.config}
+        return {**super().compatibility(), "the town": self._series or self.town.identity, "the settings": self.config}
 
     # --- Episodes -----------------------------------------------------------------------------------------------------
 
@@ -102,7 +115,9 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         super().reset(seed=seed)
         check_options(options, "scenario")
         session = seed if seed is not None else int(self.np_random.integers(2**31))
-        self.batch.begin({0: session}, scenario_option(options))
+        scenario = scenario_option(options)
+        self._enter(session if scenario is None else scenario.seed)
+        self.batch.begin({0: session}, scenario)
         self._ending = Ending.NONE
         self._show()
         return self.batch.observations[0].copy(), self._info()

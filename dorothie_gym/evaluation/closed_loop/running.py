@@ -15,6 +15,7 @@ from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, me
 from dorothie_gym.evaluation.closed_loop.usage import SessionUsage, read_usage
 from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
 from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, load_town
+from dorothie_gym.maps.generated.specification import parse_series, split_names
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
@@ -153,13 +154,15 @@ def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str
 def parse_towns(text: str) -> tuple[str, ...]:
     """Parses a list of towns: "seen", "unseen", "all", names or files, separated by commas.
 
+    "generated" is another town for each session.
+
     Raises:
         TownError: there is no such town.
         ValueError: the list is empty.
     """
     found: list[str] = []
-    for name in filter(None, (part.strip() for part in text.split(","))):
-        if name not in _GROUPS:
+    for name in split_names(text):
+        if name not in _GROUPS and parse_series(name) is None:
             load_town(name)
         found += [town for town in _GROUPS.get(name, (name,)) if town not in found]
     if not found:

@@ -180,7 +180,7 @@ class SessionChecker:
 
     def _check_header(self, plan: RolloutPlan, session: Session) -> None:
         engine, header = self._engine(plan.town), session.header
-        if (header.town, header.seed) != (engine.town.name, plan.seed):
+        if (header.town, header.seed) != (engine.town_of(plan.seed).name, plan.seed):
             raise SessionError(f"the session is of {header.town}, seed {header.seed}")
         if not same_json(header.config, self._config.record()):
             raise SessionError("the session has other settings than the rollout")
@@ -224,7 +224,7 @@ class SessionChecker:
     ) -> Iterator[str]:
         """Yields differences between the row and the measures of the session."""
         try:
-            wanted = measure(session, self._engine(plan.town).town).to_json()
+            wanted = measure(session, self._engine(plan.town).town_of(plan.seed)).to_json()
         except Exception as error:  # a session that was not simulated again may contain anything
             raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
         given: Mapping[str, object] = record.to_json()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,7 +14,7 @@ from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, ru
 from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.recording.files import SessionState
+from dorothie_gym.session.recording.files import SessionState, safe_name
 from dorothie_gym.session.recording.session import session_state
 
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())
@@ -42,32 +42,35 @@ class SessionPlan:
     @property
     def path(self) -> str:
         """Folder of the session within the corpus."""
-        return f"{self.fold}/{self.number:04d}-{self.town}"
+        return f"{self.fold}/{self.number:04d}-{safe_name(self.town)}"
 
     def __str__(self) -> str:
         return f"session {self.number} ({self.town}, seed {self.seed})"
 
 
-def plan_corpus(sessions: int, seed: int) -> tuple[SessionPlan, ...]:
+def plan_corpus(sessions: int, seed: int, towns: Sequence[str] = SEEN_TOWNS) -> tuple[SessionPlan, ...]:
     """Returns the plans of the sessions of a corpus; the towns of a fold take turns.
 
     Args:
         sessions: number of sessions, divided among the folds in the proportions of the paper's 183.
         seed: seed of the corpus; with the number of a session it gives the seed of the session.
+        towns: names of the towns of the seen folds; "generated" is another town for each session.
 
     Raises:
-        ValueError: `sessions` is below 1, or `seed` is negative.
+        ValueError: `sessions` is below 1, `seed` is negative, or there is no town.
     """
+    if not towns:
+        raise ValueError("towns is empty; give at least one")
     if sessions < 1:
         raise ValueError(f"sessions is {sessions}; it must be at least 1")
     if seed < 0:
         raise ValueError(f"seed is {seed}; it must be at least 0")
     plans: list[SessionPlan] = []
     for fold, count in fold_sizes(sessions).items():
-        towns = UNSEEN_TOWNS if fold in _UNSEEN else SEEN_TOWNS
+        there = UNSEEN_TOWNS if fold in _UNSEEN else towns
         for k in range(count):
             number = len(plans)
-            plans.append(SessionPlan(number=number, fold=fold, town=towns[k % len(towns)], seed=_seed(seed, number)))
+            plans.append(SessionPlan(number=number, fold=fold, town=there[k % len(there)], seed=_seed(seed, number)))
     return tuple(plans)
 
 
@@ -113,6 +116,7 @@ def generate_corpus(
     *,
     sessions: int,
     seed: int,
+    towns: Sequence[str] = SEEN_TOWNS,
     workers: int = 1,
     config: EnvConfig | None = None,
     ray: str | None = None,
@@ -127,6 +131,7 @@ def generate_corpus(
         root: folder of the corpus, created if missing.
         sessions: number of sessions, divided among the folds in the proportions of the paper's 183.
         seed: seed of the corpus.
+        towns: see `plan_corpus`.
         workers: number of processes; more than one needs an importable main module of the caller.
         config: settings of the engine.
         ray: address of a Ray cluster that replaces the workers; see `on_ray`.
@@ -139,10 +144,10 @@ def generate_corpus(
         OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.
     """
-    plans, root, config = plan_corpus(sessions, seed), Path(root), config or EnvConfig()
+    plans, root, config = plan_corpus(sessions, seed, towns), Path(root), config or EnvConfig()
     job = SessionJob(
         settings_file=GENERATION_FILE,
-        settings={"sessions": sessions, "seed": seed, "config": config.record()},
+        settings={"sessions": sessions, "seed": seed, "config": config.record()} | _named(towns),
         config=config,
         cast=ALL_SCRIPTED,
         evaluate=_manifest_row,
@@ -161,6 +166,12 @@ def _manifest_row(played: PlayedSession) -> ManifestRow:
     return manifest_row(played.session, played.folder, played.root)
 
 
-def finished_sessions(root: Path | str, *, sessions: int, seed: int) -> int:
+def _named(towns: Sequence[str]) -> dict[str, object]:
+    """Returns the towns as a setting; nothing for the seen towns, as corpora had none before there was a choice."""
+    return {} if tuple(towns) == SEEN_TOWNS else {"towns": list(towns)}
+
+
+def finished_sessions(root: Path | str, *, sessions: int, seed: int, towns: Sequence[str] = SEEN_TOWNS) -> int:
     """Returns the number of finished sessions of a corpus."""
-    return sum(session_state(Path(root) / plan.path) is SessionState.FINISHED for plan in plan_corpus(sessions, seed))
+    plans = plan_corpus(sessions, seed, towns)
+    return sum(session_state(Path(root) / plan.path) is SessionState.FINISHED for plan in plans)

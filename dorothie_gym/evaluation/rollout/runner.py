@@ -68,7 +68,7 @@ class SessionMaker:
         if session_state(folder) is SessionState.FINISHED:
             session = Session.load(folder)
             there = session.header.town
-            same_town = there == plan.town or there == self.engine(plan.town).town.name
+            same_town = there == plan.town or there == self.engine(plan.town).town_of(plan.seed).name
             if session.header.seed != plan.seed or not same_town:
                 raise SessionError(f"{folder}: is another session than belongs here; remove it")
             return session, folder, False
@@ -101,19 +101,19 @@ class PlayedSession:
         folder: folder of the session.
         root: folder of the series.
         maker: maker of the session, which keeps towns.
-        town_name: name or file of the town.
+        plan: its plan.
     """
 
     session: Session
     folder: Path
     root: Path
     maker: SessionMaker
-    town_name: str
+    plan: PlannedSession
 
     @property
     def town(self) -> Town:
         """Town of the session."""
-        return self.maker.engine(self.town_name).town
+        return self.maker.engine(self.plan.town).town_of(self.plan.seed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,7 +241,7 @@ class _SessionTask(Generic[Result]):
                 raise
             text = f"{type(error).__name__}: {error}"
             return SessionOutcome(plan=plan, error=text, played=True, cpu_seconds=time.process_time() - begun)
-        found = PlayedSession(session=session, folder=folder, root=self._root, maker=self._maker, town_name=plan.town)
+        found = PlayedSession(session=session, folder=folder, root=self._root, maker=self._maker, plan=plan)
         result = self._job.evaluate(found)
         return SessionOutcome(plan=plan, result=result, played=played, cpu_seconds=time.process_time() - begun)
 

@@ -31,6 +31,7 @@ from dorothie_gym.lab.console.talk_log import TalkLog
 from dorothie_gym.lab.console.windscreen import Windscreen
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.recording.events import EndReason
+from dorothie_gym.session.recording.files import safe_name
 from dorothie_gym.session.recording.seat_log import SeatEvent, SeatEventKind
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class Room:
         self.engine, self.config = engine, config
         self._plans, self._seed, self._folder, self._name = dict(plans), seed, folder, name
         self._extra = {**(extra or {}), SEATS: plan_labels(self._plans)}
-        self._places = lane_lookup(engine.town)
+        self._places = lane_lookup(engine.town_of(seed))
         self.seats = {seat.name: seat for seat in self._make_seats()}
         self.state = RoomState.WAITING
         self.windscreen = Windscreen(config) if config.pictures else None
@@ -218,7 +219,7 @@ class Room:
         if self._folder is None or self.record is not None:
             return
         engine = self.engine
-        name = self._name or f"{engine.town.name}_{secrets.token_hex(4)}"
+        name = self._name or f"{safe_name(engine.town.name)}_{secrets.token_hex(4)}"
         header = self._players.sign(engine.session_header())
         header = replace(header, extra={**header.extra, **self._extra})
         self.record = RoomRecord(engine, header, free_folder(self._folder, name))

@@ -43,11 +43,22 @@ def read_yaml_town(path: str | FilePath) -> Town:
 
 def import_yaml_town(path: str | FilePath) -> tuple[Town, ImportNotes]:
     """Compiles a town file like `read_yaml_town`; also returns what was repaired: lanes that were too long."""
-    notes = ImportNotes(str(path))
     plan = read_plan(FilePath(path))
     left = plan.traffic is DrivingSide.LEFT
-    town = compile_town(lay_out(plan.mirrored() if left else plan))
-    return cut_long_lanes(mirrored(town) if left else town, notes), notes
+    return town_of_layout(lay_out(plan.mirrored() if left else plan), str(path), mirror=left)
+
+
+def town_of_layout(layout: Layout, source: str, *, mirror: bool = False) -> tuple[Town, ImportNotes]:
+    """Compiles a layout like `import_yaml_town`.
+
+    Args:
+        layout: the layout, for traffic on the right.
+        source: its name in messages.
+        mirror: whether the town is the mirror image of the layout, with traffic on the left.
+    """
+    notes = ImportNotes(source)
+    town = compile_town(layout)
+    return cut_long_lanes(mirrored(town) if mirror else town, notes), notes
 
 
 def compile_town(layout: Layout) -> Town:

@@ -208,7 +208,15 @@ def read_nodes(path: Path) -> YamlEntry:
         TownError: the file cannot be read, is not text, is empty or is not YAML.
     """
     source = str(path)
-    text = _text(path, source)
+    return parse_nodes(_text(path, source), source)
+
+
+def parse_nodes(text: str, source: str) -> YamlEntry:
+    """Returns the root of a YAML text; `source` is its name in messages.
+
+    Raises:
+        TownError: the text is empty or is not YAML.
+    """
     found = _UNPRINTABLE.search(text)
     if found:
         _fail(source, text.count("\n", 0, found.start()), f"is not YAML: character {found[0]!r} is in it; remove it")

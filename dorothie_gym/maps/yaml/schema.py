@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from dorothie_gym.maps.driving_side import DrivingSide
-from dorothie_gym.maps.yaml.entries import YamlEntry, listed, read_nodes
+from dorothie_gym.maps.yaml.entries import YamlEntry, listed, parse_nodes, read_nodes
 from dorothie_gym.maps.yaml.plan import Bend, GreenPlan, JunctionPlan, LightsPlan, RoundaboutPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.street_schema import (
     StreetDefaults,
@@ -220,7 +220,19 @@ def read_plan(path: Path) -> TownPlan:
     Raises:
         TownError: with the file, the line, the element, and the remedy.
     """
-    top = read_nodes(path)
+    return _plan(read_nodes(path), path.stem)
+
+
+def parse_plan(text: str, source: str) -> TownPlan:
+    """Reads a town from a text; `source` is its name in messages, and the name of a town that states none.
+
+    Raises:
+        TownError: with the line, the element, and the remedy.
+    """
+    return _plan(parse_nodes(text, source), source)
+
+
+def _plan(top: YamlEntry, name: str) -> TownPlan:
     fields = {key: value.named(key) for key, value in top.fields(TOWN_KEYS, required=("junctions", "streets")).items()}
     traffic = DrivingSide(fields["traffic"].choice(TRAFFIC, "side", "right or left")) if "traffic" in fields else None
     defaults = StreetDefaults(traffic=traffic or DrivingSide.RIGHT)
@@ -237,7 +249,7 @@ def read_plan(path: Path) -> TownPlan:
     lights = read_lights(fields["lights"], junctions, streets) if "lights" in fields else ()
     stops, yields = read_signs(fields.get("stops"), fields.get("yields"), junctions, streets, lights)
     return TownPlan(
-        name=fields["name"].text("a name") if "name" in fields else path.stem,
+        name=fields["name"].text("a name") if "name" in fields else name,
         junctions=junctions,
         streets=streets,
         lights=lights,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _ROWS = 4
 _HIGH = 1.9  # [units] height of a swatch
 _WIDEST_SHEET = 3.2
+_TITLE_SHARE = 0.42  # of the width of the sheet, for the name of the town
 _METRES = 8.0  # width of a swatch for shapes in metres
 
 
@@ -297,6 +298,10 @@ def _draw_sheet(surface: pygame.Surface, painter: MapPainter, fold: str | None) 
 def _draw_title(surface: pygame.Surface, town: Town, unit: float, left: float, top: float, fold: str | None) -> float:
     """Draws name and figures; returns their right end [px]."""
     name = _spaced(town.name.upper(), round(3.6 * unit), 0.5 * unit)
+    room = _TITLE_SHARE * surface.get_width()
+    if name.get_width() > room:
+        smaller = room / name.get_width()
+        name = _spaced(town.name.upper(), round(3.6 * unit * smaller), 0.5 * unit * smaller)
     surface.blit(name, (round(left), round(top - 0.3 * unit)))
     facts = [
         f"{town.kilometres:.1f} km of lanes  ·  {len(town.lanes)} lanes",

@@ -36,6 +36,7 @@ def test_towns_are_named_one_by_one_or_by_fold() -> None:
     assert parse_towns("seen") == SEEN_TOWNS and parse_towns("unseen") == UNSEEN_TOWNS
     assert parse_towns("all") == (*SEEN_TOWNS, *UNSEEN_TOWNS)
     assert parse_towns("brookside, midtown,brookside") == ("brookside", "midtown")
+    assert parse_towns("generated:1,size=small,generated") == ("generated:1,size=small", "generated")
     with pytest.raises(TownError, match="atlantis"):
         parse_towns("midtown,atlantis")
     with pytest.raises(ValueError, match="give seen, unseen"):

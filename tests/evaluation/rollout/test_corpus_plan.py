@@ -40,3 +40,13 @@ def test_seed_of_a_session_follows_from_the_corpus_seed_and_its_number_alone() -
 def test_impossible_corpora_are_refused(sessions: int, seed: int, named: str) -> None:
     with pytest.raises(ValueError, match=named):
         plan_corpus(sessions, seed)
+
+
+def test_seen_folds_mix_given_towns_and_unseen_ones_keep_theirs() -> None:
+    plans = plan_corpus(183, 0, ("midtown", "generated,size=small"))
+    for plan in plans:
+        assert plan.town in (UNSEEN_TOWNS if "unseen" in plan.fold else ("midtown", "generated,size=small"))
+        assert not set(plan.path.split("/")[1]) & set(":,=")
+    assert [plan.seed for plan in plans] == [plan.seed for plan in plan_corpus(183, 0)]
+    with pytest.raises(ValueError, match="towns is empty"):
+        plan_corpus(5, 0, ())

@@ -1,0 +1,149 @@
+"""Names of generated towns: `generated:SEED`, optionally with the size and the style of the town."""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NoReturn, TypedDict
+
+from dorothie_gym.errors import TownError, did_you_mean
+
+SERIES = "generated"
+"""Name of the series of all generated towns."""
+PREFIX = f"{SERIES}:"
+"""Start of the name of each generated town."""
+MOST_SEED = 1_000_000_000_000
+"""Seeds are smaller than this number."""
+
+_SEED = re.compile("[0-9]{1,12}")
+_NEXT_NAME = re.compile(r",(?!\s*(?:size|style|traffic)\s*=)")
+
+
+class TownSize(enum.StrEnum):
+    """Size of a generated town: about 8, 16 or 28 junctions."""
+
+    SMALL = "small"
+    MEDIUM = "medium"
+    LARGE = "large"
+
+
+class TownStyle(enum.StrEnum):
+    """Plan of the streets of a generated town."""
+
+    GRID = "grid"
+    ORGANIC = "organic"
+    RADIAL = "radial"
+    MIXED = "mixed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TownSpecification:
+    """What determines a generated town.
+
+    Attributes:
+        seed: seed, from 0 to `MOST_SEED` - 1.
+        size: size; None lets the seed choose.
+        style: plan of the streets; None lets the seed choose.
+    """
+
+    seed: int
+    size: TownSize | None = None
+    style: TownStyle | None = None
+
+    def __post_init__(self) -> None:
+        """Checks the seed."""
+        if not 0 <= self.seed < MOST_SEED:
+            raise ValueError(f"seed is {self.seed}; it must be from 0 to {MOST_SEED - 1}")
+
+    def __str__(self) -> str:
+        """Returns the name of the town, always spelt in the same way."""
+        options = (("size", self.size), ("style", self.style))
+        return f"{PREFIX}{self.seed}" + "".join(f",{key}={value}" for key, value in options if value is not None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TownSeries:
+    """Generated towns of one size and style, one for each seed.
+
+    Attributes:
+        size: size; None lets the seed choose.
+        style: plan of the streets; None lets the seed choose.
+    """
+
+    size: TownSize | None = None
+    style: TownStyle | None = None
+
+    def name(self, seed: int) -> str:
+        """Returns the name of the town of a seed; seeds from `MOST_SEED` on begin with 0 again."""
+        return str(TownSpecification(seed=seed % MOST_SEED, size=self.size, style=self.style))
+
+    def pool(self, count: int) -> tuple[str, ...]:
+        """Returns the names of the first towns."""
+        return tuple(self.name(seed) for seed in range(count))
+
+
+def parse_series(name: object) -> TownSeries | None:
+    """Returns the series that a name states, such as `generated` or `generated,size=small`; None for another name.
+
+    Raises:
+        TownError: with the remedy.
+    """
+    first, *options = name.split(",") if isinstance(name, str) else [""]
+    return TownSeries(**_read_options(str(name), options)) if first == SERIES else None
+
+
+def split_names(text: str) -> list[str]:
+    """Returns the names in a list with commas; the options of a generated town belong to its name."""
+    parts = [part.strip() for part in _NEXT_NAME.split(text)]
+    return [part for part in parts if part]
+
+
+def is_generated(name: str) -> bool:
+    """Returns whether a name is that of a generated town, correct or not."""
+    return name.startswith(PREFIX)
+
+
+def parse_specification(name: str) -> TownSpecification:
+    """Returns the specification that a name states, such as `generated:7,size=small,style=grid`.
+
+    Raises:
+        TownError: with the remedy.
+    """
+    seed, *options = name.removeprefix(PREFIX).split(",")
+    if not is_generated(name) or not _SEED.fullmatch(seed):
+        _fail(name, f"its seed is {seed!r}; write a whole number from 0 to {MOST_SEED - 1}, such as 'generated:7'")
+    return TownSpecification(seed=int(seed), **_read_options(name, options))
+
+
+class _Options(TypedDict):
+    size: TownSize | None
+    style: TownStyle | None
+
+
+def _read_options(name: str, options: Sequence[str]) -> _Options:
+    values: dict[str, str] = {}
+    for option in options:
+        key, equals, value = option.partition("=")
+        if key == "traffic":
+            _fail(name, "generated towns have right-hand traffic only; remove 'traffic'")
+        if not equals or key not in _OPTIONS:
+            _fail(name, f"unknown option {option!r}; {did_you_mean(key, _OPTIONS)}known are size=... and style=...")
+        if key in values:
+            _fail(name, f"{key!r} is there twice; remove one")
+        known = [str(member) for member in _OPTIONS[key]]
+        if value not in known:
+            _fail(name, f"{key} is {value!r}; {did_you_mean(value, known)}known are {', '.join(known)}")
+        values[key] = value
+    return {
+        "size": TownSize(values["size"]) if "size" in values else None,
+        "style": TownStyle(values["style"]) if "style" in values else None,
+    }
+
+
+_OPTIONS: dict[str, type[TownSize] | type[TownStyle]] = {"size": TownSize, "style": TownStyle}
+
+
+def _fail(name: str, reason: str) -> NoReturn:
+    raise TownError(name, "town", reason)
