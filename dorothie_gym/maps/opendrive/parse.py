@@ -16,7 +16,10 @@ from dorothie_gym.maps.opendrive.elements import Element, ElementReader, describ
 from dorothie_gym.maps.opendrive.geometry import Arc, Polynomial, Primitive, ReferenceLine, Spiral, poly3
 from dorothie_gym.maps.opendrive.lane_sections import read_sections
 from dorothie_gym.maps.opendrive.objects import read_crosswalks, read_signals
+from dorothie_gym.maps.opendrive.own_data import VENDOR
+from dorothie_gym.maps.opendrive.programmes import read_programmes
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadLink, RoadRecord
+from dorothie_gym.maps.opendrive.street_names import street_name
 from dorothie_gym.support import portable_arrays as pn
 
 if TYPE_CHECKING:
@@ -48,6 +51,7 @@ class _Parser(ElementReader):
     def parse(self) -> OpenDriveRecords:
         root = self.root()
         self.number_ids(root)
+        self._own = root.find("header") is not None and root.find("header").get("vendor") == VENDOR
         roads: dict[int, RoadRecord] = {}
         elements: dict[int, Element] = {}
         for element in root.iterfind("road"):
@@ -77,7 +81,13 @@ class _Parser(ElementReader):
                 junctions[number] = (*junctions.get(number, ()), *found)
             else:
                 self.notes.dropped(NoteKind.JUNCTION, describe(element), "has no id")
-        return OpenDriveRecords(source=self.source, notes=self.notes, roads=roads, junctions=junctions)
+        return OpenDriveRecords(
+            source=self.source,
+            notes=self.notes,
+            roads=roads,
+            junctions=junctions,
+            programmes=read_programmes(self, root),
+        )
 
     def _junction(self, element: Element) -> int | None:
         """Returns the number of a junction, or None if it has no id."""
@@ -91,6 +101,7 @@ class _Parser(ElementReader):
         return RoadRecord(
             id=self.reference(road, "id", "road", self.roads),
             name=self.text(road, "id"),
+            street=street_name(road.get("name", ""), own=self._own),
             length=length,
             junction=self._crossed(road),
             right_hand=right_hand,
