@@ -18,7 +18,7 @@ from dorothie_gym import tasks
 from dorothie_gym._registration import environments
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
-from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.output import Facts, check_file, check_picture, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology.roles import AGENT_ROLES
 
 FAULTY = 1
@@ -45,12 +45,17 @@ def towns(
         Path | None,
         typer.Option(help="Draw the map into this PNG file; default: named after the town."),
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the town into this OpenDRIVE 1.8 file (.xodr), for other programs.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """List the shipped towns, or describe, check or draw one."""
+    """List the shipped towns, or describe, check, draw or write one."""
     if town is None:
-        _list_towns(check, picture, as_json)
+        _list_towns(check, picture, out, as_json)
         return
+    if out is not None:
+        _check_map(out)
     if picture == Path(OWN_NAME):
         picture = Path(f"{Path(town).stem}.png")
     if picture is not None:
@@ -63,6 +68,9 @@ def towns(
         if picture is not None:
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 drawing.town_picture(loaded, picture, fold=town_maps.fold_of(loaded.name))
+        if out is not None:
+            with stderr().status(f"writing {loaded.name}, a few seconds"):
+                town_maps.write_opendrive(loaded, out)
     if as_json:
         print_json(_check_report(loaded.name, faults, notes) if check else facts)
     else:
@@ -73,16 +81,27 @@ def towns(
             _show_town(facts, _places(loaded))
         if picture is not None:
             stdout().print(f"Map: {picture}", markup=False, soft_wrap=True)
+        if out is not None:
+            stdout().print(f"OpenDRIVE: {out}", markup=False, soft_wrap=True)
     if faults:
         raise typer.Exit(FAULTY)
 
 
-def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
+def _check_map(path: Path) -> None:
+    """Fails if no OpenDRIVE file can be written at `path`."""
+    if path.suffix.lower() != ".xodr":
+        fail(f"{path}: a town is written as OpenDRIVE; give a name that ends in .xodr")
+    check_file(path)
+
+
+def _list_towns(check: bool, picture: Path | None, out: Path | None, as_json: bool) -> None:
     """Lists the shipped towns with their folds."""
     if check:
         fail("--check looks at one town; name it: dorothie-gym towns --check NAME (or a file, .xodr or .yaml)")
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
+    if out is not None:
+        fail("--out writes one town; name it: dorothie-gym towns NAME --out town.xodr")
     with reporting_errors():
         rows = [
             {**town_maps.describe(town_maps.load_town(name)), "fold": town_maps.fold_of(name)}

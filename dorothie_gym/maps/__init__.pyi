@@ -26,6 +26,7 @@ from .model import Signal as Signal
 from .model import SignalKind as SignalKind
 from .model import Site as Site
 from .model import Street as Street
+from .opendrive.write import write_opendrive as write_opendrive
 from .site_inference import connected_sites as connected_sites
 from .town import LightColour as LightColour
 from .town import LightPhase as LightPhase

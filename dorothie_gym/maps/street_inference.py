@@ -190,9 +190,7 @@ def _gather(streets: list[list[int]], joints: list[_Joint], length: dict[int, fl
     return streets
 
 
-def common_streets(
-    lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: Mapping[int, int]
-) -> list[int]:
+def common_streets(lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: Mapping[int, int]) -> list[int]:
     """Returns the street of each lane; that of a connector is the common street of all paths through it.
 
     Args:

@@ -185,3 +185,24 @@ def test_a_map_with_few_places_says_how_many_storyboards_need() -> None:
     assert "of which cars can drive between 0; 0 of 54 storyboards fit" in words
     assert re.search(r"need 2 to \d+ places", words)
     assert "storyboards" not in call("brookside").stdout
+
+
+class TestWriting:
+    def test_town_is_written_as_opendrive(self) -> None:
+        result = call("brookside", "--out", "town.xodr")
+        assert result.exit_code == 0
+        assert "OpenDRIVE: town.xodr" in result.stdout
+        assert "no faults" in call("town.xodr", "--check").stdout
+
+    @pytest.mark.parametrize(
+        ("line", "message"),
+        [
+            (["brookside", "--out", "town.net"], "ends in .xodr"),
+            (["brookside", "--out", "nowhere/town.xodr"], "does not exist"),
+            (["--out", "town.xodr"], "name it"),
+        ],
+    )
+    def test_what_cannot_be_written_is_refused(self, line: list[str], message: str) -> None:
+        result = call(*line)
+        assert result.exit_code == 2
+        assert message in " ".join(result.stderr.split())

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 CENTIMETRE = 0.01
 
+PAVEMENT = 0.02  # the reader draws the sharp bends of sidewalks as coarse as this
+
 
 def differences(one: Town, other: Town) -> list[str]:
     """Returns the differences of two towns; lanes, streets, crosswalks and sidewalks may have other numbers."""
@@ -33,7 +35,9 @@ def differences(one: Town, other: Town) -> list[str]:
         width = np.interp(lane.stations / lane.length, twin.stations / twin.length, twin.widths)
         if np.max(np.abs(width - lane.widths)) > 0.1:
             found.append(f"lane {lane.id}: width {lane.widths} not {width}")
-        names = [t.streets[t_lane.street].name if t_lane.street >= 0 else "" for t, t_lane in ((one, lane), (other, twin))]
+        names = [
+            t.streets[t_lane.street].name if t_lane.street >= 0 else "" for t, t_lane in ((one, lane), (other, twin))
+        ]
         if names[0] != names[1]:
             found.append(f"lane {lane.id}: street {names[0]}, not {names[1]}")
     links = {(number[link.source], number[link.target], link.type) for link in one.links}
@@ -67,7 +71,7 @@ def _beside(one: Town, other: Town) -> list[str]:
     outlines = [Counter(tuple(np.round(c.outline, 3).ravel() + 0.0) for c in town.crosswalks) for town in (one, other)]
     if outlines[0] != outlines[1]:
         found.append(f"crosswalks {outlines[0] - outlines[1]} not {outlines[1] - outlines[0]}")
-    of = same_lines([s.points for s in one.sidewalks], [s.points for s in other.sidewalks], turned=True)
+    of = same_lines([s.points for s in one.sidewalks], [s.points for s in other.sidewalks], PAVEMENT, turned=True)
     if len(one.sidewalks) != len(other.sidewalks):
         found.append(f"{len(one.sidewalks)} sidewalks, not {len(other.sidewalks)}")
     for sidewalk, k in zip(one.sidewalks, of, strict=True):
@@ -82,9 +86,13 @@ def _beside(one: Town, other: Town) -> list[str]:
 
 
 def same_lines(
-    ones: Sequence[NDArray[np.float64]], others: Sequence[NDArray[np.float64]], *, turned: bool = False
+    ones: Sequence[NDArray[np.float64]],
+    others: Sequence[NDArray[np.float64]],
+    within: float = CENTIMETRE,
+    *,
+    turned: bool = False,
 ) -> list[int | None]:
-    """Returns for each line (n, 3) the one within a centimetre of it; `turned` ones may run the other way."""
+    """Returns for each line (n, 3) the one within a distance of it; `turned` ones may run the other way."""
     if not others:
         return [None] * len(ones)
     ends = np.array([np.concatenate((line[0], line[-1])) for line in others])
@@ -94,9 +102,11 @@ def same_lines(
     found: list[int | None] = []
     for line in ones:
         near = tree.query_ball_point(np.concatenate((line[0], line[-1])), 2.0 * CENTIMETRE)
-        rows = [(max(farthest(line, others[k % len(others)]), farthest(others[k % len(others)], line)), k) for k in near]
+        rows = [
+            (max(farthest(line, others[k % len(others)]), farthest(others[k % len(others)], line)), k) for k in near
+        ]
         best = min(rows, default=(np.inf, 0))
-        found.append(best[1] % len(others) if best[0] <= CENTIMETRE else None)
+        found.append(best[1] % len(others) if best[0] <= within else None)
     return found
 
 

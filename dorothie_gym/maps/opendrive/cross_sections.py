@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.opendrive.strands import Strand
+
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Array
     from dorothie_gym.maps.opendrive.road_layout import RoadLayout
-    from dorothie_gym.maps.opendrive.strands import Strand
 
 # Largest error of the edges of lanes, and of the height of a level road [m].
 _EDGE_ERROR, _HEIGHT_ERROR = 0.001, 0.001
@@ -20,7 +21,7 @@ _EDGE_ERROR, _HEIGHT_ERROR = 0.001, 0.001
 # Largest distance of a height profile from the chords between its points [m].
 _HEIGHT_BEND = 0.004
 
-# Largest distance of the lanes of an axis from it [m].
+# Largest distance of the lanes of an axis from it, more than that of the nearest [m].
 _ON_AXIS = 0.01
 
 # Gaps between lanes up to this width belong to the lanes [m].
@@ -80,7 +81,8 @@ def cross_sections(
 
 def height_rows(road: RoadLayout) -> Array:
     """Returns rows of distance along a road, height [m] and three coefficients (n, 5): cubics through its points."""
-    lanes = [strand for strand in road.strands if np.max(np.abs(strand.aside)) < _ON_AXIS]
+    away = [float(np.max(np.abs(strand.aside))) for strand in road.strands]
+    lanes = [strand for strand, most in zip(road.strands, away, strict=True) if most <= min(away) + _ON_AXIS]
     points = np.concatenate([np.column_stack((s.stations, s.heights))[s.given] for s in lanes])
     points = points[np.argsort(points[:, 0], kind="stable")]
     points = points[np.concatenate(([True], np.diff(points[:, 0]) > _STEP))]

@@ -51,7 +51,8 @@ class _Parser(ElementReader):
     def parse(self) -> OpenDriveRecords:
         root = self.root()
         self.number_ids(root)
-        self._own = root.find("header") is not None and root.find("header").get("vendor") == VENDOR
+        header = root.find("header")
+        self._own = header is not None and header.get("vendor") == VENDOR
         roads: dict[int, RoadRecord] = {}
         elements: dict[int, Element] = {}
         for element in root.iterfind("road"):
@@ -87,6 +88,7 @@ class _Parser(ElementReader):
             roads=roads,
             junctions=junctions,
             programmes=read_programmes(self, root),
+            own=self._own,
         )
 
     def _junction(self, element: Element) -> int | None:

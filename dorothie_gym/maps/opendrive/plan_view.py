@@ -20,18 +20,20 @@ if TYPE_CHECKING:
 # town lie on a curve, and the middles of their chords up to 10 mm inside of it.
 _POINT_ERROR, _MIDDLE_ERROR = 0.001, 0.0115
 
-# A line whose chords are farther inside of its curve than this is moved inwards by a share of the rest, up to a limit [m]: the
-# reader draws chords of its own, those of sharp bends as short as these.
+# A line whose chords are farther inside of its curve than this is moved inwards by a share of the rest, up to a limit
+# [m]: the reader draws chords of its own, those of sharp bends as short as these.
 _INSIDE, _MOVED, _FARTHEST, _SHORT = 0.004, 0.4, 0.0025, 0.5
 
 # Largest change of direction of an arc, and of a parametric cubic [rad].
 _WIDEST_ARC, _WIDEST_CUBIC = 2.5, 1.2
 
-# Largest difference between the angles at both ends of a chord for which an arc is drawn [rad].
-_ARC_SKEW = 0.002
+# Largest difference between the angles at both ends of a chord for which an arc is drawn, within a line and at its
+# ends, where lanes far aside must end at one place [rad].
+_ARC_SKEW, _END_SKEW = 0.002, 1e-5
 
-# Change of direction below which an element is straight [rad].
-_STRAIGHT = 1e-6
+# Angles between chord and line [rad], and distances between them [m], below which an element is straight; and the
+# smallest change of direction of an arc [rad]. Others compute the centres of arcs in single precision.
+_STRAIGHT, _STRAIGHT_ERROR, _FLATTEST = 1e-4, 0.0005, 1e-4
 
 # Most points of one element, and distance between the samples of an axis [m].
 _LONGEST, _STEP = 256, 0.5
@@ -172,9 +174,12 @@ def _element(points: Array, headings: Array, first: int, last: int) -> _Element 
     u, v = rel[:, 0] * c + rel[:, 1] * n, rel[:, 1] * c - rel[:, 0] * n
     if np.any(np.diff(u) <= 0.0):
         return None
-    if abs(begin + end) < _ARC_SKEW and abs(turn) < _WIDEST_ARC:
-        if abs(turn) < _STRAIGHT:
-            return (way, chord, Arc()) if _fits(u, v, u, np.zeros(len(u))) else None
+    if max(abs(begin), abs(end)) < _STRAIGHT and float(np.max(np.abs(v))) < _STRAIGHT_ERROR:
+        return way, chord, Arc()
+    skew = _END_SKEW if first == 0 or last == len(points) - 1 else _ARC_SKEW
+    if abs(begin + end) < skew and abs(turn) < _WIDEST_ARC:
+        if abs(turn) < _FLATTEST:
+            return None
         radius = 0.5 * chord / pm.sin(0.5 * turn)  # signed, positive for a turn to the left
         on_arc = _arc_aside(u, chord, radius, turn)
         middles = 0.5 * (u[1:] + u[:-1])
@@ -192,7 +197,8 @@ def _cubic(u: Array, v: Array, shape: tuple[float, float, float, float]) -> _Ele
     """Returns the parametric cubic with given directions at its ends.
 
     Args:
-        u, v: points along and across the chord (n,) [m].
+        u: points along the chord (n,) [m].
+        v: the same points across it (n,) [m].
         shape: length [m] and direction of the chord, and, relative to it, the direction at the start, and the turn.
     """
     chord, way, begin, turn = shape

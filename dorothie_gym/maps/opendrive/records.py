@@ -198,6 +198,7 @@ class OpenDriveRecords:
         roads: roads in the order of the file, by number.
         junctions: connections by junction number.
         programmes: light programmes by junction number, where the file has them.
+        own: whether the file is one of ours, which name the streets of all roads that have one.
     """
 
     source: str
@@ -205,3 +206,4 @@ class OpenDriveRecords:
     roads: dict[int, RoadRecord]
     junctions: dict[int, tuple[ConnectionRecord, ...]] = field(default_factory=dict)
     programmes: dict[int, LightProgramme] = field(default_factory=dict)
+    own: bool = False

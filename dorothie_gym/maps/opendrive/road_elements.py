@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,11 +14,9 @@ from dorothie_gym.maps.opendrive.furniture import SIGNAL_TYPES
 from dorothie_gym.maps.opendrive.geometry import Arc, Cubics, Polynomial
 from dorothie_gym.maps.opendrive.own_data import LANE_BEGINS
 from dorothie_gym.maps.opendrive.road_links import LaneAt, RoadTip, begun_inside
-from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.portable_math import wrap_radians
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Array
     from dorothie_gym.maps.opendrive.cross_sections import CrossSection, SectionLane
     from dorothie_gym.maps.opendrive.elements import Element
     from dorothie_gym.maps.opendrive.geometry import Primitive
@@ -27,7 +25,9 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.opendrive.roadside import CrosswalkPlace, SignalPlace
     from dorothie_gym.maps.town import Town
 
-_TYPE_OF = {kind: number for number, kind in reversed(SIGNAL_TYPES.items()) if kind is not SignalKind.OTHER}
+_TYPE_OF: dict[SignalKind, str] = {
+    kind: number for number, kind in reversed(SIGNAL_TYPES.items()) if kind is not SignalKind.OTHER
+}
 
 # Numbers of signals on which other readers rely: CARLA's lights are three-coloured, its signs have a subtype.
 _ANY = "-1"
@@ -165,8 +165,8 @@ class RoadElements:
                 _add(element, "userData", code=LANE_BEGINS, value="begins")
 
 
-def _add(parent: Element, tag: str, attributes: Mapping[str, str] | None = None, **more: str) -> Element:
-    return etree.SubElement(parent, tag, {**(attributes or {}), **more})
+def _add(parent: Element, tag: str, **attributes: str) -> Element:
+    return etree.SubElement(parent, tag, attributes)
 
 
 def _add_mark(lane: Element, kind: str, change: str | None) -> None:
@@ -198,7 +198,7 @@ def _write_shape(element: Element, primitive: Primitive) -> None:
     if isinstance(primitive, Polynomial):
         names = [f"{name}{axis}" for axis in "UV" for name in "abcd"]
         values = dict(zip(names, map(number, (*primitive.u, *primitive.v)), strict=True))
-        _add(element, "paramPoly3", values, pRange="normalized")
+        _add(element, "paramPoly3", pRange="normalized", **values)
     elif isinstance(primitive, Arc) and primitive.curvature != 0.0:
         _add(element, "arc", curvature=number(primitive.curvature))
     else:
@@ -229,9 +229,10 @@ def _write_crosswalks(element: Element, places: Iterable[CrosswalkPlace]) -> Non
             width=rounded(size[1]),
             height="0",
         )
-        outline = _add(_add(found, "outlines"), "outline", id="0", closed="true", outer="true")
-        for u, v in place.corners:
-            _add(outline, "cornerLocal", u=number(u), v=number(v), z="0", height="0")
+        for parent in (found, _add(found, "outlines")):  # CARLA looks for the former, which older versions have
+            outline = _add(parent, "outline", id="0", closed="true", outer="true")
+            for u, v in place.corners:
+                _add(outline, "cornerLocal", u=number(u), v=number(v), z="0", height="0")
 
 
 def _write_signals(element: Element, road: RoadLayout, places: Iterable[SignalPlace]) -> None:
@@ -244,9 +245,9 @@ def _write_signals(element: Element, road: RoadLayout, places: Iterable[SignalPl
             "orientation": "+" if place.forward else "-",
         }
         found = (
-            _add(signals, "signalReference", where)
+            _add(signals, "signalReference", **where)
             if place.reference
-            else _add(signals, "signal", where, **_signal(road, place))
+            else _add(signals, "signal", **where, **_signal(road, place))
         )
         for first, last in _runs(place.lanes):
             _add(found, "validity", fromLane=str(first), toLane=str(last))

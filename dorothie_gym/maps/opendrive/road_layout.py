@@ -266,8 +266,8 @@ class _Layout:
         for sidewalk in sidewalks:
             samples = sample_line(sidewalk.points, np.full(len(sidewalk.points), sidewalk.width))
             middle = samples.places[len(samples.places) // 2]
-            rows = [] if tree is None else np.atleast_1d(tree.query(middle, k=min(_NEAREST, tree.n))[1])
-            near = dict.fromkeys(int(row) // _PLACES for row in rows)
+            found = () if tree is None else np.atleast_1d(tree.query(middle, k=min(_NEAREST, tree.n))[1])
+            near = dict.fromkeys(int(row) // _PLACES for row in found)
             if not any(self._add_beside(k, sidewalk, samples) for k in near):
                 axis = Axis(sidewalk.points[:, :2] * (1.0, -1.0))
                 strand = strand_beside(axis, samples, (0.0, axis.length), sidewalk=sidewalk.id)
@@ -296,7 +296,7 @@ def _directions(points: Array, group: Iterable[Lane]) -> tuple[float | None, flo
         Directions in the frame of OpenDRIVE [rad]; None where no lane ends beside the line.
     """
     ends = np.concatenate([lane.points[[0, -1], :2] for lane in group]) * (1.0, -1.0)
-    found = []
+    found: list[float | None] = []
     for place, ahead in ((points[0], points[1] - points[0]), (points[-1], points[-1] - points[-2])):
         across = ends - place
         length = pn.hypot(*across.T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -97,7 +98,7 @@ class _Linker:
         """Links the parts of a lane in successive sections."""
         sections = self._sections[road]
         held = [k for k, s in enumerate(sections) if strand.begin <= s.start and s.end <= strand.end]
-        for k, after in zip(held, held[1:], strict=False):
+        for k, after in itertools.pairwise(held):
             one, other = sections[k].number(strand), sections[after].number(strand)
             self.found.successors[LaneAt(road, k, one)][other] = None
             self.found.predecessors[LaneAt(road, after, other)][one] = None
@@ -127,7 +128,7 @@ class _Linker:
                 self.found.successors[first][second.lane] = None
                 self.found.predecessors[second][first.lane] = None
             else:
-                self.found.missing |= {source, target}
+                self.found.missing.update((source, target))
         return dict(pairs)
 
     def _crosses(self, tip: RoadTip) -> bool:

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps.model import NO_JUNCTION
+from dorothie_gym.maps.model import NO_JUNCTION, Array, Crosswalk, Signal
 from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Array, Crosswalk, Signal
     from dorothie_gym.maps.opendrive.cross_sections import CrossSection
     from dorothie_gym.maps.opendrive.road_layout import RoadLayout
     from dorothie_gym.maps.opendrive.strands import Strand
@@ -122,17 +121,13 @@ class Roadside:
         road, s, t, heading = place
         numbers = tuple(sorted(lanes))
         self.signals[road].append(
-            SignalPlace(
-                signal=signal, reference=reference, s=s, t=t, heading=heading, lanes=numbers, forward=forward
-            )
+            SignalPlace(signal=signal, reference=reference, s=s, t=t, heading=heading, lanes=numbers, forward=forward)
         )
 
     def _section(self, road: int, strand: Strand) -> CrossSection:
         """Returns the section with the end of a lane."""
         return next(
-            s
-            for s in self._sections[road]
-            if (s.end == strand.end if strand.forward else s.start == strand.begin)
+            s for s in self._sections[road] if (s.end == strand.end if strand.forward else s.start == strand.begin)
         )
 
     def _holds(self, road: int, end: float, s: float) -> bool:
@@ -159,7 +154,7 @@ class Roadside:
     # --- Places ------------------------------------------------------------------------------------------------------
 
     def _nearest(self, place: Array) -> tuple[int, float, float, float]:
-        """Returns the nearest road that a place (2,) lies beside, outside junctions if possible, and the place there."""
+        """Returns the nearest road beside a place (2,), outside junctions if possible, and the place along it."""
         rows = np.atleast_1d(self._tree.query(place, k=min(400, self._tree.n))[1])
         near = dict.fromkeys(int(self._owners[k]) for k in rows)
         for crosses in (False, True):

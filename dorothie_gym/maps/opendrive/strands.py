@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.plan_view import Axis
 from dorothie_gym.support import portable_arrays as pn
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Array
+    pass
 
 # Distance between the samples of a strand [m].
 _STEP = 0.5
@@ -26,8 +27,8 @@ _SAME_PLACE, _PROJECTED = 0.008, 0.05
 # Smallest distance between the samples of a strand along its road [m].
 _ADVANCE = 1e-4
 
-# Largest ratio of the lengths of a sidewalk and of its road, and its largest error along the road [m]; others get roads of
-# their own.
+# Largest ratio of the lengths of a sidewalk and of its road, and its largest error along the road [m]; others get roads
+# of their own.
 _DISTORTION, _OFF = 3.0, 0.002
 
 # Largest distance of a lane from the axis of its road [m].
@@ -109,7 +110,8 @@ def strand_beside(
         axis: the axis.
         samples: samples of the line.
         edges: distances along the axis where other strands begin and end [m].
-        lane, sidewalk: id of the lane or sidewalk.
+        lane: id of the lane.
+        sidewalk: id of the sidewalk.
     """
     stations, aside, ahead = axis.project(samples.places)
     if np.max(np.abs(aside)) > _FARTHEST or np.max(np.abs(ahead[[0, -1]])) > _SAME_PLACE:
@@ -119,7 +121,9 @@ def strand_beside(
     if sidewalk is not None and _is_distorted(samples, stations, ahead):
         return None
     forward = bool(stations[-1] > stations[0])
-    rows = np.column_stack((stations, aside, samples.heights, samples.widths, samples.given))[:: 1 if forward else -1]
+    rows: Array = np.column_stack((stations, aside, samples.heights, samples.widths, samples.given))[
+        :: 1 if forward else -1
+    ]
     reached = np.maximum.accumulate(rows[:, 0])
     if np.max(reached - rows[:, 0]) > _PROJECTED:
         return None

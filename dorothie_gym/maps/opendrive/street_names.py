@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.opendrive.records import OpenDriveRecords
 
 # Words with which exporters number roads ("Road 12").
-_PLACEHOLDERS = frozenset(("road", "lane", "street", "connection", "connector", "junction", "unnamed", "default", "new"))
+_PLACEHOLDERS = frozenset(
+    ("road", "lane", "street", "connection", "connector", "junction", "unnamed", "default", "new")
+)
 
 _WORD = re.compile(r"[^\W\d_]{2,}")
 
@@ -47,7 +49,8 @@ def find_streets(
     """Returns the lanes with their streets, and the streets.
 
     Roads outside junctions with one name are one street, in the order of the file. Lanes of roads without a name belong
-    to streets that are inferred from them alone. A connector belongs to the street of all lanes at both of its ends.
+    to streets that are inferred from them alone. A connector belongs to the street of all lanes at both of its ends; in
+    our files to that of its name.
 
     Args:
         records: the file.
@@ -69,11 +72,14 @@ def find_streets(
         street_of |= dict.fromkeys(members, number)
         titles.append(_title(titles))
     numbers = common_streets(lanes, links, street_of)
-    named = tuple(replace(lane, street=number) for lane, number in zip(lanes, numbers, strict=True))
+    if records.own:
+        named = [index.get(records.roads[lane.road_id].street, NO_STREET) for lane in lanes]
+        numbers = [name if lane.in_junction else k for lane, k, name in zip(lanes, numbers, named, strict=True)]
+    found = tuple(replace(lane, street=number) for lane, number in zip(lanes, numbers, strict=True))
     of: defaultdict[int, list[int]] = defaultdict(list)
-    for lane in named:
+    for lane in found:
         of[lane.street].append(lane.id)
-    return named, tuple(Street(id=k, name=title, lanes=tuple(of[k])) for k, title in enumerate(titles))
+    return found, tuple(Street(id=k, name=title, lanes=tuple(of[k])) for k, title in enumerate(titles))
 
 
 def _name(records: OpenDriveRecords, lane: Lane) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from dorothie_gym.maps.opendrive.road_elements import RoadElements, number, roun
 from dorothie_gym.maps.opendrive.road_layout import RoadLayout, lay_roads
 from dorothie_gym.maps.opendrive.road_links import RoadLinks, link_roads
 from dorothie_gym.maps.opendrive.roadside import Roadside
+from dorothie_gym.support.files import write_atomically
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.model import Lane
@@ -24,6 +26,16 @@ if TYPE_CHECKING:
 
 # Number of roads' layouts that are tried: after the first, lanes whose links cannot be stated get roads of their own.
 _TRIES = 3
+
+
+def write_opendrive(town: Town, path: str | Path) -> None:
+    """Writes a town to an OpenDRIVE file (see `opendrive_text`), whole or not at all.
+
+    Raises:
+        TownError: as in `opendrive_text`.
+        OSError: the file cannot be written.
+    """
+    write_atomically(Path(path), opendrive_text(town))
 
 
 def opendrive_text(town: Town) -> bytes:
@@ -57,9 +69,7 @@ def opendrive_text(town: Town) -> bytes:
     return text
 
 
-def _laid_out(
-    town: Town, keeps_left: bool
-) -> tuple[list[RoadLayout], list[tuple[CrossSection, ...]], RoadLinks]:
+def _laid_out(town: Town, keeps_left: bool) -> tuple[list[RoadLayout], list[tuple[CrossSection, ...]], RoadLinks]:
     apart: set[int] = set()
     changes = frozenset((link.source, link.target) for link in town.links if link.type.is_lane_change)
     for _ in range(_TRIES):
@@ -133,9 +143,7 @@ def _write_junctions(root: Element, town: Town, links: RoadLinks, controllers: d
             for source, target in connection.lanes:
                 etree.SubElement(found, "laneLink", {"from": str(source), "to": str(target)})
         for sequence, controller in enumerate(controllers.get(junction.id, ())):
-            etree.SubElement(
-                element, "controller", {"id": str(controller), "type": "0", "sequence": str(sequence)}
-            )
+            etree.SubElement(element, "controller", {"id": str(controller), "type": "0", "sequence": str(sequence)})
         if junction.id in programmes:
             _write_programme(element, programmes[junction.id])
 
