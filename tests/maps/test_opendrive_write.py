@@ -12,8 +12,7 @@ from lxml import etree
 from dorothie_gym.maps import LinkType, Signal, SignalKind, Town, load_town, town_names, write_opendrive
 from dorothie_gym.maps.opendrive import import_opendrive
 from tests.maps.equal_towns import differences
-
-SHARED_MAPS = Path(__file__).parents[3] / "shared" / "maps"
+from tests.maps.opendrive_text import shared_map
 
 
 def read_back(town: Town, folder: Path) -> Town:
@@ -59,10 +58,7 @@ def test_every_shipped_town_is_read_back_as_written(name: str, tmp_path: Path) -
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["Town01", "Town02", "Town05"])
 def test_imported_maps_are_read_back_as_written(name: str, tmp_path: Path) -> None:
-    path = SHARED_MAPS / f"{name}.xodr"
-    if not path.is_file():
-        pytest.skip("the maps are not there")
-    town = load_town(path)
+    town = load_town(shared_map(name))
     assert differences(town, read_back(town, tmp_path)) == []
 
 

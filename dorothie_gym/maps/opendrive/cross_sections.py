@@ -111,7 +111,7 @@ def _section(
     present.sort(key=lambda strand: -float(strand.place(at)[0].mean()))
     split = _first_on_the_right(present, at, keeps_left)
     left, right = present[:split][::-1], present[split:]
-    middle = _middle(left, right, at)
+    middle = _middle(road, (left, right), at, keeps_left)
     sides = [_edges(strands, middle, at, sign, changes) for strands, sign in ((left, 1.0), (right, -1.0))]
     columns = [middle, *(edge for side in sides for _, edge in side)]
     stations, values = _simplified(at, np.column_stack(columns), _EDGE_ERROR)
@@ -145,14 +145,31 @@ def _first_on_the_right(present: Sequence[Strand], at: Array, keeps_left: bool) 
     return right[0] if right else drives[-1] + 1
 
 
-def _middle(left: Sequence[Strand], right: Sequence[Strand], at: Array) -> Array:
-    """Returns the place of lane 0: the inner edge of the lanes along the axis, or of those on its other side."""
-    drives = [(strands[0], sign) for strands, sign in ((right, 0.5), (left, -0.5)) if strands]
-    drives.sort(key=lambda row: row[0].lane is None)
-    if not drives:
-        return np.zeros(len(at))
-    aside, width = drives[0][0].place(at)
-    return aside + drives[0][1] * width
+def _middle(road: RoadLayout, sides: tuple[Sequence[Strand], Sequence[Strand]], at: Array, keeps_left: bool) -> Array:
+    """Returns the place of lane 0 (n,) [m].
+
+    It keeps to the inner edge of the lanes on the right, also where the innermost of them has not begun: it does not
+    jump where a turn lane opens.
+    """
+    left, right = ([strand for strand in side if strand.lane is not None] for side in sides)
+    all_right = [strand for strand in road.strands if strand.lane is not None and strand.forward != keeps_left]
+    bounds = [_inner_edge(side[0], at, sign) for side, sign in ((left, 1.0), (right, -1.0)) if side]
+    if not all_right or not bounds:
+        strands = [(side[0], sign) for side, sign in zip(sides, (1.0, -1.0), strict=True) if side]
+        return (
+            bounds[0] if bounds else _inner_edge(strands[-1][0], at, strands[-1][1]) if strands else np.zeros(len(at))
+        )
+    middle: Array = np.max([_inner_edge(strand, at, -1.0) for strand in all_right], axis=0)
+    if left:
+        middle = np.minimum(middle, bounds[0])
+    return np.maximum(middle, bounds[-1]) if right else middle
+
+
+def _inner_edge(strand: Strand, at: Array, sign: float) -> Array:
+    """Returns the edge (n,) of a strand towards the middle of the road; the sign is 1 on the left, -1 on the right."""
+    aside, width = strand.place(at)
+    edge: Array = aside - 0.5 * sign * width
+    return edge
 
 
 def _edges(

@@ -121,9 +121,8 @@ def strand_beside(
     if sidewalk is not None and _is_distorted(samples, stations, ahead):
         return None
     forward = bool(stations[-1] > stations[0])
-    rows: Array = np.column_stack((stations, aside, samples.heights, samples.widths, samples.given))[
-        :: 1 if forward else -1
-    ]
+    rows = np.column_stack((stations, aside, samples.heights, samples.widths, samples.given.astype(np.float64)))
+    rows = rows if forward else rows[::-1]
     reached = np.maximum.accumulate(rows[:, 0])
     if np.max(reached - rows[:, 0]) > _PROJECTED:
         return None

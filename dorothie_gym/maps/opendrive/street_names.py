@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from collections import defaultdict
 from collections.abc import Sequence
@@ -19,7 +20,8 @@ _PLACEHOLDERS = frozenset(
     ("road", "lane", "street", "connection", "connector", "junction", "unnamed", "default", "new")
 )
 
-_WORD = re.compile(r"[^\W\d_]{2,}")
+# A word, and a number that is one ("5th").
+_WORD = re.compile(r"[^\W\d_]{2,}|\d+[^\W\d_]{1,3}")
 
 # Longest name that is kept.
 _LONGEST = 60
@@ -28,13 +30,14 @@ _LONGEST = 60
 def street_name(text: str, *, own: bool) -> str:
     """Returns the name of a street that a road has; empty if it is that of the road alone ("Road 12", "A1B1", "-37#2").
 
-    A name has a word: a part between spaces that has letters only.
+    A name has a word: a part between spaces that has letters only, or is an ordinal number. SUMO writes the marks of
+    XML in names twice ("l&apos;Eglise").
 
     Args:
         text: attribute `name` of the road.
         own: whether all names of the file are those of streets.
     """
-    name = " ".join(text.split())[:_LONGEST]
+    name = " ".join(html.unescape(text).split())[:_LONGEST]
     if own:
         return name
     words = [part.strip(".,'()") for part in re.split(r"[\s-]+", name)]
