@@ -35,7 +35,8 @@ def towns(
     town: Annotated[
         str | None,
         typer.Argument(
-            help="Name of a town, or a file (.xodr, .yaml); default: list all.", autocompletion=complete_town
+            help="Name of a town, or a file (.xodr, .yaml; .osm with --out); default: list all.",
+            autocompletion=complete_town,
         ),
     ] = None,
     check: Annotated[
@@ -46,7 +47,8 @@ def towns(
         typer.Option(help="Draw the map into this PNG file; default: named after the town."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Write the town into this OpenDRIVE 1.8 file (.xodr), for other programs.")
+        Path | None,
+        typer.Option(help="Write the town as OpenDRIVE into this file (.xodr); makes a town of an OpenStreetMap file."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
@@ -55,12 +57,13 @@ def towns(
         _list_towns(check, picture, out, as_json)
         return
     if out is not None:
-        _check_map(out)
+        _check_map(town, out)
     if picture == Path(OWN_NAME):
         picture = Path(f"{Path(town).stem}.png")
     if picture is not None:
         check_picture(picture)
     with reporting_errors():
+        town = _converted(town, out)
         loaded = town_maps.load_town(town)
         facts = town_maps.describe(loaded)
         faults = town_maps.check_town(loaded) if check else ()
@@ -68,9 +71,8 @@ def towns(
         if picture is not None:
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 drawing.town_picture(loaded, picture, fold=town_maps.fold_of(loaded.name))
-        if out is not None:
-            with stderr().status(f"writing {loaded.name}, a few seconds"):
-                town_maps.write_opendrive(loaded, out)
+        if out is not None and town != str(out):
+            _write(loaded, out)
     if as_json:
         print_json(_check_report(loaded.name, faults, notes) if check else facts)
     else:
@@ -87,11 +89,27 @@ def towns(
         raise typer.Exit(FAULTY)
 
 
-def _check_map(path: Path) -> None:
-    """Fails if no OpenDRIVE file can be written at `path`."""
+def _check_map(town: str, path: Path) -> None:
+    """Fails if no OpenDRIVE file of a town can be written at `path`, or if it is the town's own."""
     if path.suffix.lower() != ".xodr":
         fail(f"{path}: a town is written as OpenDRIVE; give a name that ends in .xodr")
     check_file(path)
+    if path.exists() and Path(town).exists() and path.samefile(town):
+        fail(f"{path}: is the file of the town itself; give another name")
+
+
+def _converted(town: str, out: Path | None) -> str:
+    """Makes a town of an OpenStreetMap file; returns the file of the town, or other names as they are."""
+    if out is None or not town_maps.is_street_map(town):
+        return town
+    with stderr().status(f"converting {town}, a few seconds"):
+        town_maps.convert_street_map(town, out)
+    return str(out)
+
+
+def _write(town: town_maps.Town, out: Path) -> None:
+    with stderr().status(f"writing {town.name}, a few seconds"):
+        town_maps.write_opendrive(town, out)
 
 
 def _list_towns(check: bool, picture: Path | None, out: Path | None, as_json: bool) -> None:

@@ -200,9 +200,17 @@ class TestWriting:
             (["brookside", "--out", "town.net"], "ends in .xodr"),
             (["brookside", "--out", "nowhere/town.xodr"], "does not exist"),
             (["--out", "town.xodr"], "name it"),
+            (["ring.xodr", "--out", "ring.xodr"], "another name"),
         ],
     )
     def test_what_cannot_be_written_is_refused(self, line: list[str], message: str) -> None:
+        ring()
         result = call(*line)
         assert result.exit_code == 2
         assert message in " ".join(result.stderr.split())
+
+    def test_street_map_is_no_town(self) -> None:
+        Path("district.osm").write_text("<osm/>", encoding="utf-8")
+        result = call("district.osm")
+        assert result.exit_code == 2
+        assert "dorothie-gym towns district.osm --out district.xodr" in " ".join(result.stderr.split())

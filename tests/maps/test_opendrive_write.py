@@ -13,6 +13,7 @@ from dorothie_gym.maps import LinkType, Signal, SignalKind, Town, load_town, tow
 from dorothie_gym.maps.opendrive import import_opendrive
 from tests.maps.equal_towns import differences
 from tests.maps.opendrive_text import shared_map
+from tests.maps.yaml_text import MIDTOWN
 
 
 def read_back(town: Town, folder: Path) -> Town:
@@ -22,6 +23,13 @@ def read_back(town: Town, folder: Path) -> Town:
     found, notes = import_opendrive(path)
     assert [note for note in notes.sorted() if "sidewalk" not in note.message] == []
     return found
+
+
+def all_features(folder: Path) -> Town:
+    """Returns a small town with turn lanes, a one-way street, a roundabout, lights with phases, and a hill."""
+    path = folder / "features.yaml"
+    path.write_text(MIDTOWN.replace("hill: [200, -150]", "hill: [200, -150, 6]"), encoding="utf-8")
+    return load_town(path)
 
 
 def with_parts(town: Town, **parts: object) -> Town:
@@ -62,8 +70,14 @@ def test_imported_maps_are_read_back_as_written(name: str, tmp_path: Path) -> No
     assert differences(town, read_back(town, tmp_path)) == []
 
 
+def test_turn_lanes_slopes_and_rings_are_read_back_as_written(tmp_path: Path) -> None:
+    town = all_features(tmp_path)
+    assert max(lane.points[:, 2].max() for lane in town.lanes) > 5.0
+    assert differences(town, read_back(town, tmp_path)) == []
+
+
 def test_lanes_side_by_side_are_lanes_of_one_road(tmp_path: Path) -> None:
-    town = load_town("midtown")
+    town = all_features(tmp_path)
     path = tmp_path / "town.xodr"
     write_opendrive(town, path)
     root = etree.parse(path).getroot()
@@ -77,7 +91,7 @@ def test_lanes_side_by_side_are_lanes_of_one_road(tmp_path: Path) -> None:
 
 
 def test_one_way_lane_changes_and_values_of_signs_are_kept(tmp_path: Path) -> None:
-    town = load_town("midtown")
+    town = all_features(tmp_path)
     first = next(link for link in town.links if link.type is LinkType.LANE_CHANGE_RIGHT)
     lane = town.lanes[first.source]
     x, y = lane.position(0.5 * lane.length, 4.0)
