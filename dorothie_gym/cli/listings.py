@@ -18,7 +18,7 @@ from dorothie_gym import tasks
 from dorothie_gym._registration import environments
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
-from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.output import Facts, check_file, check_picture, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.session.recording.files import safe_name
 
@@ -36,7 +36,8 @@ def towns(
     town: Annotated[
         str | None,
         typer.Argument(
-            help="Name of a town, or a file (.xodr, .yaml); default: list all.", autocompletion=complete_town
+            help="Name of a town, or a file (.xodr, .yaml; .osm with --out); default: list all.",
+            autocompletion=complete_town,
         ),
     ] = None,
     check: Annotated[
@@ -46,17 +47,24 @@ def towns(
         Path | None,
         typer.Option(help="Draw the map into this PNG file; default: named after the town."),
     ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write the town as OpenDRIVE into this file (.xodr); makes a town of an OpenStreetMap file."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """List the shipped towns, or describe, check or draw one."""
+    """List the shipped towns, or describe, check, draw or write one."""
     if town is None:
-        _list_towns(check, picture, as_json)
+        _list_towns(check, picture, out, as_json)
         return
+    if out is not None:
+        _check_map(town, out)
     if picture == Path(OWN_NAME):
         picture = Path(f"{safe_name(Path(town).stem)}.png")
     if picture is not None:
         check_picture(picture)
     with reporting_errors():
+        town = _converted(town, out)
         loaded = town_maps.load_town(town)
         facts = town_maps.describe(loaded)
         faults = town_maps.check_town(loaded) if check else ()
@@ -64,28 +72,54 @@ def towns(
         if picture is not None:
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 drawing.town_picture(loaded, picture, fold=town_maps.fold_of(loaded.name))
+        if out is not None and town != str(out):
+            _write(loaded, out)
     if as_json:
         print_json(_check_report(loaded, faults, notes) if check else facts)
     else:
         if check:
-            if loaded.traffic is town_maps.DrivingSide.LEFT:
-                stdout().print("left-hand traffic")
-            _show_notes(notes)
-            _show_faults(facts, faults)
+            _show_check(loaded, facts, faults, notes)
         else:
             _show_town(facts, _places(loaded))
         if picture is not None:
             stdout().print(f"Map: {picture}", markup=False, soft_wrap=True)
+        if out is not None:
+            stdout().print(f"OpenDRIVE: {out}", markup=False, soft_wrap=True)
     if faults:
         raise typer.Exit(FAULTY)
 
 
-def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
+def _check_map(town: str, path: Path) -> None:
+    """Fails if no OpenDRIVE file of a town can be written at `path`, or if it is the town's own."""
+    if path.suffix.lower() != ".xodr":
+        fail(f"{path}: a town is written as OpenDRIVE; give a name that ends in .xodr")
+    check_file(path)
+    if path.exists() and Path(town).exists() and path.samefile(town):
+        fail(f"{path}: is the file of the town itself; give another name")
+
+
+def _converted(town: str, out: Path | None) -> str:
+    """Makes a town of an OpenStreetMap file; returns the file of the town, or other names as they are."""
+    if out is None or not town_maps.is_street_map(town):
+        return town
+    with stderr().status(f"converting {town}, a few seconds"):
+        town_maps.convert_street_map(town, out)
+    return str(out)
+
+
+def _write(town: town_maps.Town, out: Path) -> None:
+    with stderr().status(f"writing {town.name}, a few seconds"):
+        town_maps.write_opendrive(town, out)
+
+
+def _list_towns(check: bool, picture: Path | None, out: Path | None, as_json: bool) -> None:
     """Lists the shipped towns with their folds."""
     if check:
         fail("--check looks at one town; name it: dorothie-gym towns --check NAME (or a file, .xodr or .yaml)")
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
+    if out is not None:
+        fail("--out writes one town; name it: dorothie-gym towns NAME --out town.xodr")
     with reporting_errors():
         rows = [
             {**town_maps.describe(town_maps.load_town(name)), "fold": town_maps.fold_of(name)}
@@ -270,6 +304,19 @@ def _show_faults(facts: Facts, faults: Sequence[town_maps.Fault]) -> None:
         numbers = f"{_count(facts['lanes'], 'lane')}, {_count(facts['links'], 'link')}"
         more = f"{_count(facts['junctions'], 'junction')}, {facts['kilometres']:.1f} km"
         console.print(f"{facts['name']}: no faults: {numbers}, {more}", markup=False)
+
+
+def _show_check(
+    town: town_maps.Town,
+    facts: Facts,
+    faults: Sequence[town_maps.Fault],
+    notes: Sequence[town_maps.ImportNote],
+) -> None:
+    """Prints the side of the traffic, if it is the left, the notes of the import, and the faults."""
+    if town.traffic is town_maps.DrivingSide.LEFT:
+        stdout().print("left-hand traffic")
+    _show_notes(notes)
+    _show_faults(facts, faults)
 
 
 def _show_notes(notes: Sequence[town_maps.ImportNote]) -> None:

@@ -31,6 +31,9 @@ from .model import Signal as Signal
 from .model import SignalKind as SignalKind
 from .model import Site as Site
 from .model import Street as Street
+from .open_street_map import convert_street_map as convert_street_map
+from .open_street_map import is_street_map as is_street_map
+from .opendrive.write import write_opendrive as write_opendrive
 from .site_inference import connected_sites as connected_sites
 from .town import LightColour as LightColour
 from .town import LightPhase as LightPhase

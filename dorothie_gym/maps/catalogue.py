@@ -19,6 +19,7 @@ from dorothie_gym.maps import generated, opendrive, yaml  # lazy: their parsers 
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.generated.specification import TownSeries, TownSpecification, is_generated, parse_specification
 from dorothie_gym.maps.model import LaneLink, SignalKind
+from dorothie_gym.maps.open_street_map import is_street_map
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 
@@ -102,6 +103,11 @@ def _located(name_or_path: str | Path) -> Iterator[Path]:
         return
     path = Path(name_or_path)
     if path.suffix.lower() not in _SUFFIXES:
+        if is_street_map(path):
+            reason = (
+                f"is a street map, not a town; make one: dorothie-gym towns {path} --out {path.name.split('.')[0]}.xodr"
+            )
+            raise TownError(str(name_or_path), "town", reason)
         raise TownError(
             str(name_or_path),
             "town",

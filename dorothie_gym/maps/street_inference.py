@@ -58,7 +58,8 @@ def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tupl
     streets = _gather(streets, joints, length)
     number_of = {road: k for k, roads in enumerate(streets) for road in roads}
     street_of = {road: number_of[way.road] for road, way in ways.items() if way.road in number_of}
-    numbers = _lane_streets(lanes, links, street_of)
+    of_lane = {lane.id: street_of[lane.road_id] for lane in lanes if not lane.in_junction}
+    numbers = common_streets(lanes, links, of_lane)
     total = [0.0] * len(streets)
     for lane, number in zip(lanes, numbers, strict=True):
         if number != NO_STREET:
@@ -189,8 +190,14 @@ def _gather(streets: list[list[int]], joints: list[_Joint], length: dict[int, fl
     return streets
 
 
-def _lane_streets(lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: dict[int, int]) -> list[int]:
-    """Returns the street of each lane; that of a connector is the common street of all paths through it."""
+def common_streets(lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: Mapping[int, int]) -> list[int]:
+    """Returns the street of each lane; that of a connector is the common street of all paths through it.
+
+    Args:
+        lanes: lanes of the town.
+        links: links between them.
+        street_of: street of each lane outside junctions, by its id.
+    """
     touched: list[dict[int, None]] = [{} for _ in lanes]
     after = _followers(lanes, links)
     before: list[list[int]] = [[] for _ in lanes]
@@ -201,17 +208,17 @@ def _lane_streets(lanes: Sequence[Lane], links: Sequence[LaneLink], street_of: d
         for lane in lanes:
             if lane.in_junction:
                 for end in _plain_ends(lanes, table, lane.id):
-                    touched[lane.id][street_of[lanes[end].road_id]] = None
+                    touched[lane.id][street_of[end]] = None
     return [
         (next(iter(touched[lane.id])) if len(touched[lane.id]) == 1 else NO_STREET)
         if lane.in_junction
-        else street_of[lane.road_id]
+        else street_of[lane.id]
         for lane in lanes
     ]
 
 
 def _plain_ends(lanes: Sequence[Lane], table: list[list[int]], start: int) -> Iterator[int]:
-    """Yields the first lanes outside junctions on all paths along `table` from a connector."""
+    """Yields the ids of the first lanes outside junctions on all paths along `table` from a connector."""
     seen, todo = {start: None}, [start]
     while todo:
         for lane in table[todo.pop()]:

@@ -202,3 +202,32 @@ def test_a_check_says_that_traffic_keeps_to_the_left() -> None:
     assert call("--check", path).stdout.splitlines()[0] == "left-hand traffic"
     assert json.loads(call("--check", path, "--json").stdout)["traffic"] == "left"
     assert json.loads(call(path, "--json").stdout)["traffic"] == "left"
+
+
+class TestWriting:
+    def test_town_is_written_as_opendrive(self) -> None:
+        result = call("brookside", "--out", "town.xodr")
+        assert result.exit_code == 0
+        assert "OpenDRIVE: town.xodr" in result.stdout
+        assert "no faults" in call("town.xodr", "--check").stdout
+
+    @pytest.mark.parametrize(
+        ("line", "message"),
+        [
+            (["brookside", "--out", "town.net"], "ends in .xodr"),
+            (["brookside", "--out", "nowhere/town.xodr"], "does not exist"),
+            (["--out", "town.xodr"], "name it"),
+            (["ring.xodr", "--out", "ring.xodr"], "another name"),
+        ],
+    )
+    def test_what_cannot_be_written_is_refused(self, line: list[str], message: str) -> None:
+        ring()
+        result = call(*line)
+        assert result.exit_code == 2
+        assert message in " ".join(result.stderr.split())
+
+    def test_street_map_is_no_town(self) -> None:
+        Path("district.osm").write_text("<osm/>", encoding="utf-8")
+        result = call("district.osm")
+        assert result.exit_code == 2
+        assert "dorothie-gym towns district.osm --out district.xodr" in " ".join(result.stderr.split())

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from dorothie_gym.maps.generated.named_streets import Chain
 from dorothie_gym.maps.generated.street_graph import GridPoint, StreetGraph
+from dorothie_gym.maps.town import SLOW_CRUISE
 
 
 @dataclass

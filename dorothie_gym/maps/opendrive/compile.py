@@ -12,22 +12,26 @@ import numpy as np
 from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.long_lanes import cut_long_lanes
-from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink
+from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import sample_centrelines, sample_road
 from dorothie_gym.maps.opendrive.furniture import lay_sidewalks, place_crosswalks, place_signals
 from dorothie_gym.maps.opendrive.lane_changes import lane_change_links
 from dorothie_gym.maps.opendrive.parse import parse_opendrive
+from dorothie_gym.maps.opendrive.street_names import find_streets
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
 from dorothie_gym.maps.opendrive.traffic_rule import driving_side
 from dorothie_gym.maps.site_inference import lay_sites
-from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 from dorothie_gym.maps.trapped_lanes import trapped_lanes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from dorothie_gym.maps.import_notes import ImportNotes
+    from dorothie_gym.maps.model import Signal
     from dorothie_gym.maps.opendrive.records import OpenDriveRecords, RoadRecord
+    from dorothie_gym.maps.town import LightProgramme
 
 # Speed limit of roads without one, as in built-up areas [m/s] (50 km/h).
 DEFAULT_SPEED_LIMIT = 50.0 / 3.6
@@ -66,7 +70,7 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
     links = successor_links(lanes, topology) + lane_change_links(records, topology, lanes)
     if trapped := trapped_lanes(lanes, links):
         topology, lanes, links = _without(trapped, topology, lanes, links, records)
-    lanes, streets = name_streets(lanes, links)
+    lanes, streets = find_streets(records, lanes, links)
     junctions, signals = _junctions(lanes), place_signals(records, topology, lanes)
     town = Town(
         name=Path(path).stem,
@@ -78,7 +82,7 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
         signals=signals,
         crosswalks=place_crosswalks(records),
         sidewalks=lay_sidewalks(records, samples, lanes),
-        programmes=derive_programmes(lanes, links, junctions, signals, traffic),
+        programmes=_programmes(records, derive_programmes(lanes, links, junctions, signals, traffic), signals),
         traffic=traffic,
         cruise=None,
     )
@@ -154,6 +158,21 @@ def _own_limit(road: RoadRecord, chain: tuple[LanePiece, ...]) -> float | None:
         until = [*(s for s, _ in road.speeds[1:]), np.inf]
         limits = [v for (s, v), e in zip(road.speeds, until, strict=False) if s < end and e > start]
     return min(limits, default=None)
+
+
+def _programmes(
+    records: OpenDriveRecords, derived: Sequence[LightProgramme], signals: Sequence[Signal]
+) -> tuple[LightProgramme, ...]:
+    """Returns the programmes of the file, and those derived for other junctions."""
+    lights = {signal.id for signal in signals if signal.kind is SignalKind.TRAFFIC_LIGHT}
+    found = {programme.junction_id: programme for programme in derived}
+    for junction, programme in records.programmes.items():
+        if set(programme.signals) <= lights:
+            found[junction] = programme
+        else:
+            reason = "refers to signals that are no lights of the file; its lights have a programme of the usual kind"
+            records.notes.dropped(NoteKind.SIGNAL, f"junction {junction} / userData", reason)
+    return tuple(found[junction] for junction in sorted(found))
 
 
 def _junctions(lanes: tuple[Lane, ...]) -> tuple[Junction, ...]:

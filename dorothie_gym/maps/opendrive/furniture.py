@@ -205,15 +205,18 @@ def lay_sidewalks(
     Args:
         records: the file.
         samples: its roads, by their ids.
-        lanes: lanes of the town with streets; a sidewalk belongs to the street on its side of its road.
+        lanes: lanes of the town with streets; a sidewalk belongs to the street on its side of its road, and on a
+            road without lanes to that of its name.
     """
     street: dict[tuple[int, bool], int] = {}
     for lane in lanes:
         for left in (lane.lane_id > 0, lane.lane_id < 0):  # the other side's lanes are used where a side has none
             if lane.street != NO_STREET:
                 street.setdefault((lane.road_id, left), lane.street)
+    named = {records.roads[lane.road_id].street: lane.street for lane in lanes if not lane.in_junction}
+    named[""] = NO_STREET
     found = [
-        (line, street.get((road.id, left), NO_STREET))
+        (line, street.get((road.id, left), named.get(road.street, NO_STREET)))
         for road in records.roads.values()
         for left in (True, False)
         for line in _stretches(road, samples[road.id], left)

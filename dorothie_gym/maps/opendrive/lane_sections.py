@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.opendrive.elements import Element, ElementReader, describe
+from dorothie_gym.maps.opendrive.own_data import LANE_BEGINS
 from dorothie_gym.maps.opendrive.records import DRIVING_TYPES, LaneRecord, SectionRecord
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def _joined(section: SectionRecord, lanes: dict[int, LaneRecord]) -> SectionReco
 
 def _onward(lanes: dict[int, LaneRecord], shift: float) -> dict[int, LaneRecord]:
     """Returns lanes as they continue in a section that starts later [m]."""
-    return {n: replace(lane, predecessors=(n,), shift=lane.shift + shift) for n, lane in lanes.items()}
+    return {n: replace(lane, predecessors=(n,), shift=lane.shift + shift, begins=False) for n, lane in lanes.items()}
 
 
 def _divided(section: SectionRecord) -> Iterator[SectionRecord]:
@@ -148,7 +149,8 @@ def _lane(reader: ElementReader, lane: Element, right_hand: bool) -> LaneRecord:
     if len(width.rows) == 0 and record.border is None:
         reader.fail(lane, "is a driving lane without a width or border element")
     backward = _runs_against(reader, lane, (number < 0) == right_hand)
-    return replace(record, reversed=backward, access=_access(reader, lane))
+    begins = any(data.get("code") == LANE_BEGINS for data in lane.iterfind("userData"))
+    return replace(record, reversed=backward, access=_access(reader, lane), begins=begins)
 
 
 def _border(reader: ElementReader, lane: Element) -> Cubics | None:

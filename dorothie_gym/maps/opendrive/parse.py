@@ -16,7 +16,10 @@ from dorothie_gym.maps.opendrive.elements import Element, ElementReader, describ
 from dorothie_gym.maps.opendrive.geometry import Arc, Polynomial, Primitive, ReferenceLine, Spiral, poly3
 from dorothie_gym.maps.opendrive.lane_sections import read_sections
 from dorothie_gym.maps.opendrive.objects import read_crosswalks, read_signals
+from dorothie_gym.maps.opendrive.own_data import VENDOR
+from dorothie_gym.maps.opendrive.programmes import read_programmes
 from dorothie_gym.maps.opendrive.records import ConnectionRecord, OpenDriveRecords, RoadLink, RoadRecord
+from dorothie_gym.maps.opendrive.street_names import street_name
 from dorothie_gym.maps.opendrive.traffic_rule import refuse_mixed_rules
 from dorothie_gym.support import portable_arrays as pn
 
@@ -53,6 +56,8 @@ class _Parser(ElementReader):
         root = self.root()
         self.number_ids(root)
         self._rule = _common_rule(root)
+        header = root.find("header")
+        self._own = header is not None and header.get("vendor") == VENDOR
         roads: dict[int, RoadRecord] = {}
         elements: dict[int, Element] = {}
         for element in root.iterfind("road"):
@@ -83,7 +88,14 @@ class _Parser(ElementReader):
                 junctions[number] = (*junctions.get(number, ()), *found)
             else:
                 self.notes.dropped(NoteKind.JUNCTION, describe(element), "has no id")
-        return OpenDriveRecords(source=self.source, notes=self.notes, roads=roads, junctions=junctions)
+        return OpenDriveRecords(
+            source=self.source,
+            notes=self.notes,
+            roads=roads,
+            junctions=junctions,
+            programmes=read_programmes(self, root),
+            own=self._own,
+        )
 
     def _junction(self, element: Element) -> int | None:
         """Returns the number of a junction, or None if it has no id."""
@@ -97,6 +109,7 @@ class _Parser(ElementReader):
         return RoadRecord(
             id=self.reference(road, "id", "road", self.roads),
             name=self.text(road, "id"),
+            street=street_name(road.get("name", ""), own=self._own),
             length=length,
             junction=self._crossed(road),
             right_hand=right_hand,

@@ -9,6 +9,7 @@ import numpy as np
 from dorothie_gym.maps.import_notes import ImportNotes
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import Cubics, ReferenceLine
+from dorothie_gym.maps.town import LightProgramme
 
 DRIVING_TYPES = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit")
@@ -41,6 +42,7 @@ class LaneRecord:
         access: (offset from the start of its profiles [m], whether cars have access from there); cars have access
             where nothing is said.
         closed: whether cars have no access.
+        begins: whether it is no part of the lane before it in driving direction, although that leads nowhere else.
         shift: distance from the start of its profiles to the start of its section [m]; not 0 where a section was
             divided, or continues the lanes of the one before.
     """
@@ -57,6 +59,7 @@ class LaneRecord:
     level: bool = False
     access: tuple[tuple[float, bool], ...] = ()
     closed: bool = False
+    begins: bool = False
     shift: float = 0.0
 
     @property
@@ -136,6 +139,7 @@ class RoadRecord:
     Attributes:
         id: number of its id.
         name: its id in the file.
+        street: name of its street; empty if the file has none.
         length: [m].
         junction: junction that the road crosses, or -1.
         right_hand: traffic keeps to the right.
@@ -149,6 +153,7 @@ class RoadRecord:
 
     id: int
     name: str
+    street: str = ""
     length: float
     junction: int
     right_hand: bool
@@ -185,9 +190,20 @@ class ConnectionRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class OpenDriveRecords:
-    """Contents of a file: roads in its order, connections by junction number, and notes, to which later steps add."""
+    """Contents of a file.
+
+    Attributes:
+        source: the file, as named by the user.
+        notes: notes, to which later steps add.
+        roads: roads in the order of the file, by number.
+        junctions: connections by junction number.
+        programmes: light programmes by junction number, where the file has them.
+        own: whether the file is one of ours, which name the streets of all roads that have one.
+    """
 
     source: str
     notes: ImportNotes
     roads: dict[int, RoadRecord]
     junctions: dict[int, tuple[ConnectionRecord, ...]] = field(default_factory=dict)
+    programmes: dict[int, LightProgramme] = field(default_factory=dict)
+    own: bool = False

@@ -81,12 +81,13 @@ def build_topology(records: OpenDriveRecords) -> Topology:
         graph.contract(piece)
     for piece in [p for p in graph.length if records.roads[p.road].sections[p.section].lanes[p.lane].is_closed]:
         graph.remove(piece)
-    chains = graph.chains()
+    begun = {p for p in graph.length if records.roads[p.road].sections[p.section].lanes[p.lane].begins}
+    chains = graph.chains(begun)
     short = [chain for chain in chains if sum(graph.length[p] for p in chain) < SHORTEST_LANE]
     if short:
         for piece in (p for chain in short for p in chain):
             graph.contract(piece)
-        chains = graph.chains()
+        chains = graph.chains(begun)
     if not chains:
         refuse_empty(records.source, records.notes, "has no driving lanes; a town needs at least one")
     chains.sort(key=lambda chain: min(chain))
@@ -130,13 +131,18 @@ class _Graph:
         del self.length[piece]
         return tuple(before), tuple(after)
 
-    def chains(self) -> list[tuple[LanePiece, ...]]:
-        """Returns the chains of one-to-one linked pieces within a road."""
+    def chains(self, begun: Collection[LanePiece] = ()) -> list[tuple[LanePiece, ...]]:
+        """Returns the chains of one-to-one linked pieces within a road; `begun` are the first of theirs."""
         follower = {}
         for piece, after in self.after.items():
             if len(after) == 1:
                 target = next(iter(after))
-                if target.road == piece.road and target != piece and len(self.before[target]) == 1:
+                if (
+                    target.road == piece.road
+                    and target != piece
+                    and target not in begun
+                    and len(self.before[target]) == 1
+                ):
                     follower[piece] = target
         followed = set(follower.values())
         chains = []
