@@ -450,7 +450,8 @@ def add_u_turn(
         The number of edges.
     """
     row = graph.lanes[lane]
-    if row.left != NONE and row.length - leave >= SHORT_CHANGE:
+    inner = row.left if graph.sign > 0.0 else row.right
+    if inner != NONE and row.length - leave >= SHORT_CHANGE:
         return count  # from such a lane only at its end
     other, station, _ = oncoming_at(graph, lane, leave)
     if other < 0 or not graph.lanes[other].length - station > CELL:
