@@ -27,7 +27,7 @@ def settings(**changes: Any) -> CrossPlaySettings:
         "participants": guides,
         "towns": ("brookside",),
         "sessions": 2,
-        "config": EnvConfig(max_seconds=5.0),
+        "config": EnvConfig(max_seconds=12.0),
     }
     return CrossPlaySettings(**{**usual, **changes})
 
