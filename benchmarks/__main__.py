@@ -1,4 +1,4 @@
-"""`python -m benchmarks NAME`, at the root of a checkout."""
+"""The command `python -m benchmarks`, at the root of a checkout."""
 
 from benchmarks.commands import main
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym.errors import InputFileError, TownError
-from dorothie_gym.maps.opendrive import import_opendrive
+from dorothie_gym.maps.opendrive.compile import import_opendrive
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 

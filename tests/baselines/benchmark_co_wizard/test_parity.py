@@ -32,7 +32,7 @@ GUESSED = {"move_text"}
 """Words of each act of an utterance with several acts: only the whole utterance is observed."""
 
 
-@pytest.fixture(scope="module", params=[("brookside", 4, 156.0), ("midtown", 11, 148.0)], ids=lambda case: case[0])
+@pytest.fixture(scope="module", params=[("brookside", 5, 156.0), ("midtown", 11, 148.0)], ids=lambda case: case[0])
 def played(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Played:
     town, seed, seconds = request.param
     return play(tmp_path_factory.mktemp("parity") / "session", town=town, seed=seed, seconds=seconds)
