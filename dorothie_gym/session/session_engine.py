@@ -150,8 +150,7 @@ class SessionEngine(Restorable):
             ValueError: an action is missing or malformed; the message names the agent and the field.
             RuntimeError: no session has begun, or it has ended.
         """
-        begun = self.begin_step(self.decode(actions))
-        return self.end_step(begun, self.session.world.step(self.config.frames))
+        return self.end_step(self.begin_step(self.decode(actions)), self.session.world.step(self.config.frames))
 
     def decode(self, actions: Mapping[str, ActionMapping]) -> dict[Role, RoleAction]:
         """Returns the actions of a decision, decoded; errors as in `step`."""
