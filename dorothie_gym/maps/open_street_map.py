@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym.errors import InputFileError, TownError
-from dorothie_gym.maps.opendrive.compile import import_opendrive
+from dorothie_gym.maps import opendrive  # lazy: its parser is slow to import
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 
@@ -73,7 +73,7 @@ def convert_street_map(path: str | Path, out: str | Path) -> None:
         if not found.is_file():
             raise TownError(str(path), "file", "has no streets for cars")
         try:
-            import_opendrive(found)
+            opendrive.import_opendrive(found)
         except TownError as error:
             raise TownError(str(path), "streets", f"make no town: {error.reason}") from error
         write_atomically(Path(out), found.read_bytes())
