@@ -55,7 +55,9 @@ def test_town_is_read_back_as_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", town_names())
+@pytest.mark.parametrize(
+    "name", ["brookside", *(pytest.param(n, marks=pytest.mark.slow) for n in town_names() if n != "brookside")]
+)
 def test_every_shipped_town_is_read_back_as_written(name: str, tmp_path: Path) -> None:
     town = load_town(name)
     again = read_back(town, tmp_path)
@@ -64,6 +66,7 @@ def test_every_shipped_town_is_read_back_as_written(name: str, tmp_path: Path) -
 
 
 @pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Town01", "Town02", "Town05"])
 def test_imported_maps_are_read_back_as_written(name: str, tmp_path: Path) -> None:
     town = load_town(shared_map(name))

@@ -31,7 +31,9 @@ def test_the_talk_of_a_mirrored_session_names_the_other_side() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", town_names())
+@pytest.mark.parametrize(
+    "name", ["brookside", *(pytest.param(n, marks=pytest.mark.slow) for n in town_names() if n != "brookside")]
+)
 def test_sessions_in_a_mirrored_town_succeed(name: str) -> None:
     env = DuoWizardEnv(town=mirrored(load_town(name)))
     *_, last = play_scripted(env, seed=1, decisions=5000)

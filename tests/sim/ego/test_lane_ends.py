@@ -140,7 +140,14 @@ def test_two_lanes_that_end_together_are_left_one_after_the_other(tmp_path: Path
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["brookside", "midtown", "millbrook", "northgate", "Town01", "Town02", "Town05"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "brookside",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("midtown", "millbrook", "northgate")),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("Town01", "Town02", "Town05")),
+    ],
+)
 def test_some_action_leads_on_from_the_end_of_each_lane_of_whole_maps(name: str) -> None:
     path = MAPS / f"{name}.xodr"
     if name.startswith("Town") and not path.is_file():
