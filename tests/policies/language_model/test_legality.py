@@ -65,8 +65,8 @@ def test_drawn_answers_are_allowed_and_carried_out(role: Role, town: str) -> Non
     policies = {each: make_policy("scripted", each, engine.limits) for each in AGENT_ROLES}
     model = DiceModel(7)
     policies[role] = LanguageModelPolicy(role, NOWHERE, engine.limits, model)
-    engine.reset(seed=11)
-    states = {each: policies[each].initial_state(policy_seed(11, each), engine.town) for each in AGENT_ROLES}
+    engine.reset(seed=12)
+    states = {each: policies[each].initial_state(policy_seed(12, each), engine.town) for each in AGENT_ROLES}
     space, made, refused = action_space(role, engine.limits), 0, list[str]()
     while not engine.over:
         inputs, actions = policy_inputs(engine, policies), {}

@@ -102,7 +102,7 @@ def several_steps_of(manner, seeds):
 @pytest.mark.long
 @pytest.mark.parametrize("manner", ["turns", "streets"])
 def test_personas_who_plan_describe_several_steps(manner):
-    assert several_steps_of(manner, seeds=(2, 3, 4, 10, 11)) >= 3
+    assert several_steps_of(manner, seeds=(2, 3, 4, 10, 11, 12, 13)) >= 3
 
 
 def test_personas_who_plan_lead_more_often_than_vague_ones():
