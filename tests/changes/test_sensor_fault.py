@@ -71,7 +71,7 @@ assert vocabulary()["sensors"][-1] == "glare"
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_sensor_fault(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 

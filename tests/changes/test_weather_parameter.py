@@ -76,7 +76,7 @@ assert engine.session.world.sight < 0.9 * clear, "dust dims nothing"
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_weather_parameter(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 

@@ -37,7 +37,7 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     return root
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_cloning_generalises_to_held_out_sessions(corpus: Path) -> None:
     training, held_out = read_demonstrations(corpus, "train"), read_demonstrations(corpus, "val")
     assert training.observations.shape == (len(training), 161) and training.masks.shape == (len(training), 18)

@@ -14,7 +14,7 @@ from tests.lab.studies.killing import kill_again_and_again
 SLOW = pytest.mark.slow, pytest.mark.timeout(3000)
 
 
-@pytest.mark.parametrize("times", [pytest.param(4, marks=pytest.mark.long), pytest.param(60, marks=SLOW)])
+@pytest.mark.parametrize("times", [pytest.param(2, marks=pytest.mark.long), pytest.param(60, marks=SLOW)])
 def test_a_server_that_is_killed_at_random_moments_keeps_its_word(
     tmp_path: Path, request: pytest.FixtureRequest, times: int
 ) -> None:
