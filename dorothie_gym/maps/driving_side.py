@@ -27,24 +27,29 @@ class DrivingSide(enum.StrEnum):
         return 1 if self is DrivingSide.RIGHT else -1
 
     @property
+    def opposite(self) -> DrivingSide:
+        """The other side."""
+        return DrivingSide.LEFT if self is DrivingSide.RIGHT else DrivingSide.RIGHT
+
+    @property
     def to_kerb(self) -> LinkType:
         """Lane change towards the kerb."""
-        return LinkType.LANE_CHANGE_RIGHT if self is DrivingSide.RIGHT else LinkType.LANE_CHANGE_LEFT
+        return self.as_right_hand(LinkType.LANE_CHANGE_RIGHT)
 
     @property
     def to_middle(self) -> LinkType:
         """Lane change towards the middle of the road."""
-        return LinkType.LANE_CHANGE_LEFT if self is DrivingSide.RIGHT else LinkType.LANE_CHANGE_RIGHT
+        return self.as_right_hand(LinkType.LANE_CHANGE_LEFT)
 
     @property
     def near_turn(self) -> LinkType:
         """Turn round the corner at the kerb, which crosses no oncoming traffic."""
-        return LinkType.RIGHT if self is DrivingSide.RIGHT else LinkType.LEFT
+        return self.as_right_hand(LinkType.RIGHT)
 
     @property
     def far_turn(self) -> LinkType:
         """Turn across oncoming traffic."""
-        return LinkType.LEFT if self is DrivingSide.RIGHT else LinkType.RIGHT
+        return self.as_right_hand(LinkType.LEFT)
 
     def crosses_oncoming(self, turn: LinkType | None) -> bool:
         """Returns whether a turn crosses oncoming traffic, to which it yields."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dorothie_gym.maps.driving_side import OPPOSITES, DrivingSide
+from dorothie_gym.maps.driving_side import OPPOSITES
 from dorothie_gym.maps.town import Town
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ def mirrored(town: Town) -> Town:
         crosswalks=[replace(crossing, outline=_line(crossing.outline)) for crossing in town.crosswalks],
         sidewalks=[replace(walk, points=_line(walk.points)) for walk in town.sidewalks],
         programmes=town.programmes,
-        traffic=DrivingSide.LEFT if town.traffic is DrivingSide.RIGHT else DrivingSide.RIGHT,
+        traffic=town.traffic.opposite,
+        cruise=town.cruise,
     )
 
 

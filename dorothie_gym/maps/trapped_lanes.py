@@ -10,13 +10,14 @@ from dorothie_gym.maps.lane_neighbours import OncomingLanes
 from dorothie_gym.maps.town import Town
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.driving_side import DrivingSide
     from dorothie_gym.maps.model import Lane, LaneLink
 
 NOSE = 3.5
 """Distance of the centre of a waiting car from the end of its lane [m]."""
 
 
-def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset[int]:
+def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink], traffic: DrivingSide) -> frozenset[int]:
     """Returns the ids of the lanes that lead only to ends at which a car can neither change lanes nor turn round.
 
     Without them, a car that follows the other lanes can always drive on. Where all lanes are such, as on a single
@@ -25,6 +26,7 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
     Args:
         lanes: lanes of the town; `lanes[i].id` is `i`.
         links: links between them, lane changes included.
+        traffic: side of the road on which vehicles drive.
     """
     followers: dict[int, list[int]] = defaultdict(list)
     beside: dict[int, list[int]] = defaultdict(list)
@@ -37,7 +39,7 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
         if turning is None:
             if len(leading) == len(left):
                 return frozenset()
-            turning = _turning(lanes, links)
+            turning = _turning(lanes, links, traffic)
         leading |= {lane for lane, onto in turning.items() if lane in left and onto in left}
         leading = _with_changes(leading, left, beside)
         if len(leading) == len(left):
@@ -46,9 +48,9 @@ def trapped_lanes(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> frozenset
     return frozenset(lane.id for lane in lanes if lane.id not in left) if left else frozenset()
 
 
-def _turning(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> dict[int, int]:
+def _turning(lanes: Sequence[Lane], links: Sequence[LaneLink], traffic: DrivingSide) -> dict[int, int]:
     """Returns the lanes onto which a car can turn round at the ends of lanes, by the ids of these."""
-    oncoming = OncomingLanes(Town(name="", lanes=lanes, links=links, junctions=()))
+    oncoming = OncomingLanes(Town(name="", lanes=lanes, links=links, junctions=(), traffic=traffic))
     ends = ((lane.id, max(lane.length - NOSE, 0.0)) for lane in lanes if not lane.in_junction)
     found = ((lane, oncoming.at(lane, station)) for lane, station in ends)
     return {lane: opposite.lane for lane, opposite in found if opposite is not None}

@@ -250,3 +250,12 @@ def test_the_mirror_image_of_a_file_is_the_mirror_image_of_its_town(tmp_path: Pa
     }
     ruled = {(signal.kind, frozenset(same[lane] for lane in signal.lanes)) for signal in image.signals}
     assert ruled == {(signal.kind, frozenset(signal.lanes)) for signal in town.signals}
+
+
+def test_a_mirror_image_keeps_the_cruise_speed(tmp_path: Path) -> None:
+    path = tmp_path / "fast.yaml"
+    path.write_text(LEFT_HAND)
+    assert load_town(path).cruise is None
+    path.write_text(f"cruise: 25\n{LEFT_HAND}")
+    town = load_town(path)
+    assert town.cruise == mirrored(town).cruise == 25.0

@@ -6,6 +6,7 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.maps.import_notes import NoteAction, NoteKind
 from dorothie_gym.maps.opendrive.compile import import_opendrive
 from tests.maps.ending_lanes import dead_end, ring, stub
+from tests.maps.mirrored_opendrive import mirror
 from tests.maps.opendrive_text import lane, opendrive, road, section
 
 
@@ -51,3 +52,8 @@ def test_no_site_lies_where_a_lane_tapers_away(tmp_path: Path) -> None:
         assert beside.width_at(site.station) > 3.0
         if town.merge(beside.id) is not None:
             assert site.station < beside.wide_until - 50.0
+
+
+def test_same_lanes_are_trapped_where_traffic_drives_on_the_left(tmp_path: Path) -> None:
+    mirror(dead_end(tmp_path / "map.xodr"), tmp_path / "image.xodr")
+    assert len(load_town(tmp_path / "image.xodr").lanes) == 4
