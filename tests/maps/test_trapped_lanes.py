@@ -7,7 +7,7 @@ from dorothie_gym.maps.import_notes import NoteAction, NoteKind
 from dorothie_gym.maps.opendrive.compile import import_opendrive
 from tests.maps.ending_lanes import dead_end, ring, stub
 from tests.maps.mirrored_opendrive import mirror
-from tests.maps.opendrive_text import lane, opendrive, road, section
+from tests.maps.opendrive_text import geometry, lane, opendrive, road, section
 
 
 def test_one_way_road_that_leads_off_the_map_is_dropped_with_a_note(tmp_path: Path) -> None:
@@ -54,6 +54,9 @@ def test_no_site_lies_where_a_lane_tapers_away(tmp_path: Path) -> None:
             assert site.station < beside.wide_until - 50.0
 
 
-def test_same_lanes_are_trapped_where_traffic_drives_on_the_left(tmp_path: Path) -> None:
-    mirror(dead_end(tmp_path / "map.xodr"), tmp_path / "image.xodr")
-    assert len(load_town(tmp_path / "image.xodr").lanes) == 4
+def test_two_way_road_with_dead_ends_stays_beside_others_on_both_sides(tmp_path: Path) -> None:
+    plan = geometry("<line/>", 150.0, x=400.0, y=400.0)
+    apart = road(7, length=150.0, plan=plan, sections=section(0.0, lane(1), lane(-1)))
+    mirror(ring(tmp_path / "map.xodr", apart), tmp_path / "image.xodr")
+    for name in ("map.xodr", "image.xodr"):
+        assert sum(each.road_id == 7 for each in load_town(tmp_path / name).lanes) == 2
