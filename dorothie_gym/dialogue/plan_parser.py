@@ -386,7 +386,7 @@ class _Builder(TurnReader, PlaceReader):
         return words[item.place] in ("all", "down", "up") and action in (StepAction.STRAIGHT, StepAction.FOLLOW)
 
     def _ends(self, place: int) -> bool:
-        """Returns whether the clause ends at a token, apart from "now" and the like."""
+        """Returns whether the clause ends at a token, apart from "now" and the like, or "it's" begins a new one."""
         words = self.clauses.words
         return place >= len(words) or words[place] in route_grammar().last_words or words[place] == "it's"
 

@@ -15,7 +15,6 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
-    LANE_CHANGES,
     Crosswalk,
     Exit,
     Junction,
@@ -271,12 +270,13 @@ class Town:
     def _merges(self) -> dict[int, LinkType]:
         """Side of the lane change out of each lane without successors, by lane id."""
         found: dict[int, LinkType] = {}
+        sides = self.traffic.to_middle, self.traffic.to_kerb
         ending = [lane.id for lane in self.lanes if not self.successors(lane.id)]
         leading = {lane.id for lane in self.lanes} - set(ending)
         while True:
             new: dict[int, LinkType] = {}
             for lane in ending:
-                side = next((side for side in LANE_CHANGES if self.neighbour(lane, side) in leading), None)
+                side = next((side for side in sides if self.neighbour(lane, side) in leading), None)
                 if side is not None and lane not in leading:
                     new[lane] = side
             if not new:
@@ -287,7 +287,7 @@ class Town:
     def merge(self, lane: int) -> LinkType | None:
         """Returns the lane change by which a lane that ends is left; None where lanes follow, or none is beside.
 
-        Of two sides the one with fewer changes to a lane that leads on, of equal ones the left.
+        Of two sides the one with fewer changes to a lane that leads on, of equal ones that towards the middle.
 
         Raises:
             IndexError: no lane has this id.

@@ -19,6 +19,7 @@ from dorothie_gym.maps import (
     town_names,
 )
 from dorothie_gym.maps.cache import pack, unpack
+from dorothie_gym.maps.driving_side import OPPOSITES
 from dorothie_gym.maps.lane_neighbours import innermost, oncoming_lanes, outermost
 from dorothie_gym.maps.opendrive import import_opendrive
 from dorothie_gym.maps.right_of_way import right_of_way
@@ -27,6 +28,7 @@ from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 from dorothie_gym.maps.yaml import read_yaml_town
 
+from .ending_lanes import ring
 from .mirrored_opendrive import mirror
 from .opendrive_text import geometry, lane, opendrive, road, section, shared_map
 from .yaml_text import MIDTOWN, written
@@ -259,3 +261,10 @@ def test_a_mirror_image_keeps_the_cruise_speed(tmp_path: Path) -> None:
     path.write_text(f"cruise: 25\n{LEFT_HAND}")
     town = load_town(path)
     assert town.cruise == mirrored(town).cruise == 25.0
+
+
+def test_ending_lanes_are_left_to_the_other_side_in_a_mirror_image(tmp_path: Path) -> None:
+    town = load_town(ring(tmp_path / "ring.xodr"))
+    image = mirrored(town)
+    sides = [town.merge(lane.id) for lane in town.lanes]
+    assert any(sides) and [image.merge(lane.id) for lane in town.lanes] == [side and OPPOSITES[side] for side in sides]

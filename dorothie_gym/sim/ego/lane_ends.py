@@ -24,8 +24,8 @@ def may_merge(town: TownArrays, number: int, station: float) -> bool:
         return False
     if town.lanes[number].length - station >= MIN_SWITCH + LEAD:
         return True
-    left = town.lanes[beside].length - opposite_end(town, number, beside)
-    return bool(left >= MIN_SWITCH + LEAD or town.ways[beside].onward >= 0 or town.ways[beside].merge >= 0)
+    rest = town.lanes[beside].length - opposite_end(town, number, beside)
+    return bool(rest >= MIN_SWITCH + LEAD or town.ways[beside].onward >= 0 or town.ways[beside].merge >= 0)
 
 
 @compiled

@@ -57,12 +57,15 @@ class Passenger:
 class Chauffeur:
     """Co-Wizard who drives towards the pin that was told last, and stops when the sign says so."""
 
+    RESPONSE = 0.7
+    """Time in which a key for the speed shows its effect; a person who presses on overshoots [s]."""
+
     def __init__(self, page: Any) -> None:
         self.page = page
         self.target, self.heading = "", None
         self.last: dict[str, tuple[float, float]] = {}
         self.tried: dict[tuple[str, str], int] = {}
-        self.chosen = self.turned = self.held = 0.0
+        self.chosen = self.turned = self.held = self.pressed = 0.0
 
     def look(self) -> None:
         seen = self.page.evaluate(LOOK)
@@ -115,7 +118,8 @@ class Chauffeur:
 
     def _cruise(self, seen: dict[str, Any], wanted: int) -> None:
         cruise = re.search(r"Cruise\s+(\d+) km/h", seen["status"])
-        if cruise is not None and int(cruise[1]) != wanted:
+        if cruise is not None and int(cruise[1]) != wanted and time.monotonic() - self.pressed > self.RESPONSE:
+            self.pressed = time.monotonic()
             self.page.keyboard.press("ArrowDown" if int(cruise[1]) > wanted else "ArrowUp")
 
     def _choose(self, seen: dict[str, Any], pin: tuple[float, float]) -> None:

@@ -91,6 +91,7 @@ def test_errands_and_pins_show_one_another_by_hover_click_and_focus(browser: Any
         assert not errors
 
 
+@pytest.mark.timeout(2 * LIMIT + 60.0)  # it is played in real time
 @pytest.mark.parametrize(("story", "seed"), [("winter_coats", 2), ("first_concert", 1), ("chess_by_post", 1)])
 def test_two_people_do_all_errands_by_what_the_screen_shows(browser: Any, story: str, seed: int) -> None:
     table = Table("participant=human,co_wizard=human,ad_wizard=silent", max_seconds=LIMIT, storyboard=story, seed=seed)
