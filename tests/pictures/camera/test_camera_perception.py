@@ -281,9 +281,9 @@ def test_environments_take_it_by_name() -> None:
 @pytest.mark.long
 def test_the_co_wizard_drives_by_itself_to_a_goal_that_it_recognises() -> None:
     engine, taken = SessionEngine(TOWN, config=EnvConfig(perception=PerceptionModel.CAMERA)), 0
-    engine.reset(4)
+    engine.reset(5)
     policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
-    states: dict[Role, Any] = {role: policy.initial_state(4, engine.town) for role, policy in policies.items()}
+    states: dict[Role, Any] = {role: policy.initial_state(5, engine.town) for role, policy in policies.items()}
     while not engine.over:
         hidden = {mark.position for mark in engine.scenario.storyboard.landmarks if mark.hidden}
         actions, observation = {}, dict(engine.observations)
