@@ -154,6 +154,7 @@ def test_a_person_withdraws_in_a_session_and_the_partner_goes_on(laboratory: Lab
     data = [path.read_bytes() for path in laboratory.served.data.rglob("*") if path.is_file()]
     assert not any(b"armalade" in content or b"platform-one" in content for content in data)
     two.wait_for_selector("text=The session is over")
+    two.wait_for_selector("text=Continue")  # on the page that follows by itself
     assert not two.query_selector("text=armalade")
     two.click("text=Continue")
     at(two, "after")
