@@ -151,3 +151,12 @@ def test_a_reload_restores_the_talk_and_a_second_window_takes_over(desk: Desk) -
     other.wait_for_selector("text=Hello, car.")
     co_wizard.click("text=Use it here")
     other.wait_for_selector("text=This seat was opened in another window")
+
+
+def test_refused_commands_are_waited_for_no_longer(desk: Desk) -> None:
+    page = desk.open("co_wizard")
+    desk.open("participant")
+    desk.until(lambda: desk.served.room.state is RoomState.RUNNING)
+    page.evaluate("consoleLink.command('mark', { landmark: 'house', x: 90000, y: 90000 })")
+    page.wait_for_selector("text=too far from any road")
+    assert page.evaluate("consoleLink.waiting.size") == 0

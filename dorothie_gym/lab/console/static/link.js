@@ -42,7 +42,10 @@ export class Link extends EventTarget {
       Object.assign(this.state, fields);
       if (done) for (const [n, sent] of this.waiting) if (n <= done) { this.delays.push(now - sent); this.waiting.delete(n); }
       this.emit('frame', { fields, talk, events, refused });
-    } else this.emit(message.k, message);
+    } else {
+      if (message.k === 'refused') this.waiting.delete(message.n);
+      this.emit(message.k, message);
+    }
   }
 
   emit(type, detail) { this.dispatchEvent(new CustomEvent(type, { detail })); }
