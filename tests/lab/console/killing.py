@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import websockets.sync.client as sockets
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidMessage
 
 from dorothie_gym.lab.console.resuming import interrupted_sessions
 from dorothie_gym.session.recording import SeatEventKind, Session, read_seat_log
@@ -60,7 +60,7 @@ class Talker:
                     word = f"Number {self._said:05d}"
                     socket.send(json.dumps({"k": "say", "n": n, "text": f"{word}."}))
                     self._listen(socket, word)
-        except (OSError, EOFError, ConnectionClosed, TimeoutError):
+        except (OSError, EOFError, ConnectionClosed, InvalidMessage, TimeoutError):
             return
 
     def _listen(self, socket: sockets.ClientConnection, word: str) -> None:

@@ -18,7 +18,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidMessage
 
 from dorothie_gym.lab.studies.export import export_study
 from dorothie_gym.lab.studies.stages import Stage
@@ -36,7 +36,7 @@ CONTENT = {
     "questionnaires": {"before": [{"id": "word", "kind": "text", "text": "A word?"}]},
 }
 
-LOST = OSError, http.client.HTTPException, EOFError, ConnectionClosed, AssertionError
+LOST = OSError, http.client.HTTPException, EOFError, ConnectionClosed, InvalidMessage, AssertionError
 """Errors of people whose server has died; a refusal is an `AssertionError`, and is looked at by `check`."""
 
 STEPS = (
