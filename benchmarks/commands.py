@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
 
-SIMULATING: Final = ("world", "env", "vector", "camera", "rl", "speech")
+SIMULATING: Final = ("world", "env", "vector", "camera", "rl", "speech", "sessions")
 """Measurements of the simulation, which is compiled first."""
 
 BATCHES: Final = ("vector", "rl")
@@ -233,6 +233,38 @@ def rl(
 
 
 @app.command(cls=PictureCommand)
+def sessions(
+    town: Annotated[
+        list[str] | None, typer.Option(metavar="NAME|FILE", help="Repeatable; default: midtown and brookside.")
+    ] = None,
+    co_wizard: Annotated[
+        list[str] | None,
+        typer.Option(metavar="POLICY", help="Repeatable; default: scripted and pretrained:co-wizard."),
+    ] = None,
+    count: Annotated[int, typer.Option("--sessions", min=1, max=1000, help="Number of sessions in each town.")] = 4,
+    against: Annotated[
+        str | None, typer.Option(metavar="REV", help="Revision of the checkout to measure alternately.")
+    ] = None,
+    record: Annotated[bool, typer.Option("--record", help="Record the sessions.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first session.")] = 5000,
+    repeats: Annotated[int, typer.Option(min=1, max=99, help="Processes of each build; the median counts.")] = 3,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Decisions per second of whole sessions with talk, by part, compared with the build of another revision."""
+
+    def measured(progress: Progress) -> Figures:
+        from benchmarks.sessions import CO_WIZARDS, TOWNS, measure
+
+        return measure(
+            town or TOWNS, co_wizards=co_wizard or CO_WIZARDS, sessions=count, seed=seed, record=record,
+            against=against, repeats=repeats, progress=progress,
+        )  # fmt: skip
+
+    _run("sessions", measured, picture, as_json)
+
+
+@app.command(cls=PictureCommand)
 def speech(
     sessions: Annotated[int, typer.Option(min=1, max=1000, help="Number of sessions whose talk is spoken.")] = 6,
     spans: Annotated[int, typer.Option(min=1, max=100_000, help="Number of spans that are drawn from them.")] = 150,
@@ -366,7 +398,7 @@ def _run(name: str, measure: Measure, picture: Path | None, as_json: bool, *, pi
     if not as_json:
         _show(report)
     if picture is not None:
-        from benchmarks.report import draw
+        from benchmarks.report_chart import draw
 
         draw(report, picture)
         if not as_json:

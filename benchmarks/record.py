@@ -19,6 +19,7 @@ BENCHMARKS = {
     "rl": ("rl",),
     "rl_medium_traffic": ("rl", "--town", "midtown", "--traffic", "medium", "--exceptions", "2"),
     "rl_camera": ("rl", "--algorithm", "maskable_ppo", "--observation", "camera"),
+    "sessions": ("sessions",),
     "camera": ("camera", "--cold"),
     "import": ("import",),
 }

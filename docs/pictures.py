@@ -52,7 +52,8 @@ from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
 
 sys.path.append(str(Path(__file__).parents[1]))  # the benchmarks are a folder of the checkout and not installed
-from benchmarks.report import Report, draw, world_report
+from benchmarks.report import Report, world_report
+from benchmarks.report_chart import draw
 
 DOCS = Path(__file__).parent
 BENCHMARK = DOCS.parent / "benchmarks" / "results" / "world.json"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,12 +42,36 @@ class _Phrase(NamedTuple):
     group: str
     kind: str
     elements: tuple[_Element, ...]
-    most: int
-    """Number of words of its longest form."""
+
+
+class _Position(NamedTuple):
+    """Place within a phrase that has been reached: an element, and the words read of one of its sequences."""
+
+    phrase: int
+    element: int
+    sequence: int = -1
+    read: int = 0
+
+
+class _Node:
+    """State of the matcher: the positions that the words so far can have reached.
+
+    Attributes:
+        positions: the positions.
+        ended: group and kind of the first phrase that may end here; None without any.
+        after: states behind words of the vocabulary, as far as they have been met; None where no phrase goes on.
+    """
+
+    __slots__ = ("after", "ended", "positions")
+
+    def __init__(self, positions: frozenset[_Position], ended: tuple[str, str] | None) -> None:
+        self.positions = positions
+        self.ended = ended
+        self.after: dict[str, _Node | None] = {}
 
 
 class PhraseIndex:
-    """Phrases by their first word."""
+    """Matcher of phrases: a finite automaton whose states are built when they are first reached."""
 
     def __init__(self, phrases: Sequence[tuple[str, str, str]], *, adverbs: bool = True) -> None:
         """Compiles phrases.
@@ -55,40 +80,78 @@ class PhraseIndex:
             phrases: (group, kind, text) of each phrase; of phrases of equal length the earlier one is preferred.
             adverbs: whether "left" and "right" in the phrases are no directions.
         """
-        found: dict[str, list[_Phrase]] = defaultdict(list)
-        for group, kind, text in phrases:
-            elements = tuple(_element(word, adverbs) for word in _ELEMENT.findall(text))
-            for first in _first_words(text, elements):
-                found[first].append(_Phrase(group, kind, elements, _most_words(elements)))
-        self._phrases: Mapping[str, Sequence[_Phrase]] = found
+        self._phrases = [
+            _Phrase(group, kind, tuple(_element(word, adverbs) for word in _ELEMENT.findall(text)))
+            for group, kind, text in phrases
+        ]
+        self._beginning: Mapping[str, set[int]] = defaultdict(set)
+        for number, (phrase, (_, _, text)) in enumerate(zip(self._phrases, phrases, strict=True)):
+            for first in _first_words(text, phrase.elements):
+                self._beginning[first].add(number)
+        self._words = frozenset(word for phrase in self._phrases for word in _words(phrase.elements))
+        self._nodes: dict[frozenset[_Position], _Node] = {}
+        self._start = _Node(frozenset(), None)
 
     def longest(self, words: Sequence[str], place: int, stop: int | None = None) -> Match | None:
         """Returns the longest phrase that begins at a place of `words` and ends before `stop`; None without any."""
-        best: Match | None = None
-        end = len(words) if stop is None else stop
-        for phrase in self._phrases.get(words[place], ()):
-            if best is not None and phrase.most <= best.length:
-                continue
-            length = _longest(phrase.elements, words, place, 0, end) - place
-            if length > 0 and (best is None or length > best.length):
-                best = Match(phrase.group, phrase.kind, length)
-        return best
+        node, ended, length, known = self._start, None, 0, self._words
+        for number in range(place, len(words) if stop is None else stop):
+            word = words[number]
+            if word not in known:
+                break
+            behind = node.after[word] if word in node.after else self._advance(node, word)
+            if behind is None:
+                break
+            node = behind
+            if node.ended is not None:
+                ended, length = node.ended, number + 1 - place
+        return None if ended is None else Match(*ended, length)
+
+    def _advance(self, node: _Node, word: str) -> _Node | None:
+        """Returns the state behind a word of the vocabulary, and keeps it."""
+        if node is self._start:
+            before = frozenset(_Position(number, 0) for number in self._beginning.get(word, ()))
+        else:
+            before = node.positions
+        positions = frozenset(behind for position in before for behind in self._behind(position, word))
+        node.after[word] = found = self._node(positions) if positions else None
+        return found
+
+    def _node(self, positions: frozenset[_Position]) -> _Node:
+        if positions not in self._nodes:
+            ends = [position.phrase for position in positions if self._may_end(position)]
+            phrase = self._phrases[min(ends)] if ends else None
+            self._nodes[positions] = _Node(positions, None if phrase is None else (phrase.group, phrase.kind))
+        return self._nodes[positions]
+
+    def _behind(self, position: _Position, word: str) -> Iterator[_Position]:
+        """Yields the positions behind a word."""
+        elements = self._phrases[position.phrase].elements
+        if position.sequence >= 0:
+            sequence = elements[position.element][1][position.sequence]
+            if sequence[position.read] == word:
+                yield _stepped(position, len(sequence))
+            return
+        for number in range(position.element, len(elements)):
+            single, sequences, optional = elements[number]
+            if word in single:
+                yield _Position(position.phrase, number + 1)
+            for which, sequence in enumerate(sequences):
+                if sequence[0] == word:
+                    yield _stepped(_Position(position.phrase, number, which), len(sequence))
+            if not optional:
+                return
+
+    def _may_end(self, position: _Position) -> bool:
+        rest = self._phrases[position.phrase].elements[position.element :]
+        return position.sequence < 0 and all(optional for _, _, optional in rest)
 
 
-def _longest(elements: Sequence[_Element], words: Sequence[str], place: int, number: int, end: int) -> int:
-    """Returns the place behind the longest match of the elements from `number` on; -1 without a match."""
-    if number == len(elements):
-        return place
-    options, sequences, optional = elements[number]
-    found = -1
-    if place < end and words[place] in options:
-        found = _longest(elements, words, place + 1, number + 1, end)
-    for sequence in sequences:
-        if place + len(sequence) <= end and tuple(words[place : place + len(sequence)]) == sequence:
-            found = max(found, _longest(elements, words, place + len(sequence), number + 1, end))
-    if optional:
-        found = max(found, _longest(elements, words, place, number + 1, end))
-    return found
+def _stepped(position: _Position, length: int) -> _Position:
+    """Returns the position behind the next word of a sequence."""
+    if position.read + 1 == length:
+        return _Position(position.phrase, position.element + 1)
+    return position._replace(read=position.read + 1)
 
 
 def _element(text: str, adverbs: bool) -> _Element:
@@ -105,8 +168,11 @@ def _element(text: str, adverbs: bool) -> _Element:
     return single, tuple(option for option in options if len(option) > 1), optional
 
 
-def _most_words(elements: Sequence[_Element]) -> int:
-    return sum(max([1, *(len(sequence) for sequence in sequences)]) for _, sequences, _ in elements)
+def _words(elements: Sequence[_Element]) -> Iterator[str]:
+    """Yields the words of a phrase."""
+    for single, sequences, _ in elements:
+        yield from single
+        yield from itertools.chain.from_iterable(sequences)
 
 
 def _first_words(text: str, elements: Sequence[_Element]) -> Iterator[str]:

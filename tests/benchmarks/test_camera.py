@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 from benchmarks.camera import EVERYTHING, RGB, measure
 from benchmarks.commands import app
 from benchmarks.opengl_reference import opengl_reference
-from benchmarks.report import camera_report, draw
+from benchmarks.report import camera_report
+from benchmarks.report_chart import draw
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.pictures.camera.pose import pose_on_car

@@ -5,17 +5,8 @@ from typing import Any
 
 import pytest
 
-from benchmarks.report import (
-    CHART_DPI,
-    CHART_WIDTH,
-    Report,
-    draw,
-    env_report,
-    import_report,
-    number,
-    vector_report,
-    world_report,
-)
+from benchmarks.report import Report, env_report, import_report, number, vector_report, world_report
+from benchmarks.report_chart import CHART_DPI, CHART_WIDTH, draw
 from benchmarks.timing import machine
 
 WORLD = {

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 
-from benchmarks.report import draw, world_report
+from benchmarks.report import world_report
+from benchmarks.report_chart import draw
 from dorothie_gym.archive import Corpus
 from dorothie_gym.evaluation.analysis import corpus_stats_of
 from dorothie_gym.evaluation.analysis.profile_charts import draw_profiles

@@ -10,6 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import filterpy.kalman  # noqa: F401  # takes a second, for which nobody at a seat should wait: see `beliefs.refined`
+
 from dorothie_gym.evaluation.rollout.replay import recorded_actions
 from dorothie_gym.lab.console import messages as m
 from dorothie_gym.lab.console.attendance import is_missing, is_ready, overdue, pause_reason

@@ -1,0 +1,180 @@
+"""Plays sessions of one build of the package in this process, and prints what they cost as JSON.
+
+`sessions.py` runs this file, alternately with builds of different revisions: `python -P session_costs.py SETTINGS`,
+with the folder of the build on PYTHONPATH. It imports nothing else of the benchmarks, and only what builds of other
+revisions have as well.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import inspect
+import json
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import FunctionType
+from typing import Any, Final
+
+import filterpy.kalman  # noqa: F401  # sessions import it when it is first needed, which takes a second
+
+from dorothie_gym.evaluation.rollout.play import play_session
+from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.policies import make_policy
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+
+PARTS: Final[Mapping[str, tuple[str, ...]]] = {
+    "physics": ("sim.world:World.step",),
+    "observations": ("session.observations:SessionObserver.look", "session.observations:SessionObserver.observations"),
+    "decoding": ("session.session_engine:SessionEngine.decode",),
+    "hearing": ("session.live_session:LiveSession._deliver",),
+    "recording": ("session.recorder:SessionRecorder.record",),
+}
+"""Methods of the session by part, as module:class.method."""
+
+STAGES: Final[Mapping[Role, str]] = {
+    Role.PARTICIPANT: "policies.participant.policy",
+    Role.CO_WIZARD: "policies.co_wizard.policy",
+}
+"""Modules whose functions are the stages of a scripted role."""
+
+OTHER: Final = "other"
+"""Name of what belongs to no part."""
+
+WARM_UP: Final = 100_000
+"""Distance of the seed of a session that is not counted from the first one that is."""
+
+
+class PartTimes:
+    """Processor time by part; the time of a part that runs within another one counts for itself alone.
+
+    Attributes:
+        seconds: processor time by part [s].
+        counting: whether time is counted now.
+
+    Args:
+        by_role: whether the steps of the policies are parts.
+    """
+
+    def __init__(self, *, by_role: bool) -> None:
+        self.by_role = by_role
+        self.seconds: dict[str, float] = defaultdict(float)
+        self.counting = False
+        self._running: list[str] = []
+        self._since = 0.0
+
+    def timed(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Returns a function whose time counts for a part."""
+
+        @functools.wraps(function)
+        def call(*arguments: Any, **named: Any) -> Any:
+            with self.within(part):
+                return function(*arguments, **named)
+
+        return call
+
+    @contextmanager
+    def within(self, part: str) -> Iterator[None]:
+        """Counts the time of a block for a part."""
+        self._switch()
+        self._running.append(part)
+        try:
+            yield
+        finally:
+            self._switch()
+            self._running.pop()
+
+    def _switch(self) -> None:
+        now = time.process_time()
+        if self._running and self.counting:
+            self.seconds[self._running[-1]] += now - self._since
+        self._since = now
+
+
+def instrument(times: PartTimes) -> list[str]:
+    """Replaces the functions of all parts by timed ones; returns the parts that this build does not have."""
+    missing = []
+    for part, places in PARTS.items():
+        for place in places:
+            module, _, path = place.partition(":")
+            owner, _, name = path.partition(".")
+            holder = getattr(_module(module), owner, None)
+            if holder is None or not hasattr(holder, name):
+                missing.append(f"{part} ({place})")
+            else:
+                setattr(holder, name, times.timed(part, getattr(holder, name)))
+    for role, module in STAGES.items():
+        holder = _module(module)
+        for name, function in vars(holder).copy().items() if holder is not None else ():
+            if isinstance(function, FunctionType) and _is_stage(function, holder.__name__):
+                setattr(holder, name, times.timed(f"{role}: {name.lstrip('_')}", function))
+    return missing
+
+
+def _is_stage(function: FunctionType, module: str) -> bool:
+    """Returns whether a function of a policy's module takes its state and the view of a decision."""
+    package = module.rpartition(".")[0]
+    return function.__module__.startswith(package) and list(inspect.signature(function).parameters)[1:2] == ["view"]
+
+
+def _module(name: str) -> Any:
+    try:
+        return importlib.import_module(f"dorothie_gym.{name}")
+    except ModuleNotFoundError:
+        return None
+
+
+def costs(
+    towns: list[str], seeds: list[int], co_wizard: str, *, record: bool, parts: bool, max_seconds: float
+) -> dict[str, Any]:
+    """Plays a session of each seed in each town, after one in each town that is not counted.
+
+    Args:
+        towns: names or files.
+        seeds: seeds of the sessions.
+        co_wizard: name of the Co-Wizard's policy; the other roles are scripted.
+        record: whether the sessions are recorded.
+        parts: whether the time is measured by part, which takes time of its own.
+        max_seconds: time limit of a session [s].
+
+    Returns:
+        Number of `decisions`, `simulated_seconds`, processor time in `seconds`; `parts` with the seconds by part, and
+        `missing` with the parts that this build does not have.
+    """
+    times = PartTimes(by_role=parts)
+    missing = instrument(times) if parts else []
+    total: dict[str, Any] = {"decisions": 0, "simulated_seconds": 0.0, "seconds": 0.0}
+    with tempfile.TemporaryDirectory() as folder:
+        for number, town in enumerate(towns):
+            engine = SessionEngine(town, config=EnvConfig(max_seconds=max_seconds))
+            for seed in (seeds[0] + WARM_UP, *seeds):
+                times.counting = seed in seeds
+                start = time.process_time()
+                decisions = _play(engine, co_wizard, seed, Path(folder, f"{number}-{seed}") if record else None, times)
+                if times.counting:
+                    total["decisions"] += decisions
+                    total["simulated_seconds"] += engine.session.world.time
+                    total["seconds"] += time.process_time() - start
+    return {**total, "parts": dict(times.seconds) if parts else {}, "missing": missing}
+
+
+def _play(engine: SessionEngine, co_wizard: str, seed: int, folder: Path | None, times: PartTimes) -> int:
+    """Plays a session; returns the number of its decisions."""
+    policies: dict[Role, Any] = {}
+    for role in AGENT_ROLES:
+        policies[role] = make_policy(co_wizard if role is Role.CO_WIZARD else "scripted", role, engine.limits)
+        if times.by_role:
+            policies[role].step = times.timed(str(role), policies[role].step)
+    with times.within(OTHER):
+        play_session(engine, policies, seed=seed, folder=folder)
+    return engine.session.decisions
+
+
+if __name__ == "__main__":
+    print(json.dumps(costs(**json.loads(sys.argv[1]))))
