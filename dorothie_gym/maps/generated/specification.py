@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn, TypedDict
 
 from dorothie_gym.errors import TownError, did_you_mean
@@ -17,6 +17,10 @@ PREFIX = f"{SERIES}:"
 """Start of the name of each generated town."""
 MOST_SEED = 1_000_000_000_000
 """Seeds are smaller than this number."""
+FIRST_VALIDATION_SEED = 800_000_000_000
+"""Towns of this and higher seeds are not in series: they are for the choice of models."""
+FIRST_TEST_SEED = 900_000_000_000
+"""Towns of this and higher seeds are for tests only."""
 
 _SEED = re.compile("[0-9]{1,12}")
 _NEXT_NAME = re.compile(r",(?!\s*(?:size|style|traffic)\s*=)")
@@ -70,7 +74,7 @@ class TownSpecification:
 
 @dataclass(frozen=True, kw_only=True)
 class TownSeries:
-    """Generated towns of one size, style and side of the traffic, one for each seed.
+    """Generated towns of one size, style and side of the traffic, one for each seed, without those for tests.
 
     Attributes:
         size: size; None lets the seed choose.
@@ -83,8 +87,12 @@ class TownSeries:
     traffic: DrivingSide = DrivingSide.RIGHT
 
     def name(self, seed: int) -> str:
-        """Returns the name of the town of a seed; seeds from `MOST_SEED` on begin with 0 again."""
-        return str(TownSpecification(seed=seed % MOST_SEED, size=self.size, style=self.style))
+        """Returns the name of the town of a seed; seeds from `FIRST_VALIDATION_SEED` on begin with 0 again."""
+        return str(replace(self._first, seed=seed % FIRST_VALIDATION_SEED))
+
+    @property
+    def _first(self) -> TownSpecification:
+        return TownSpecification(seed=0, size=self.size, style=self.style, traffic=self.traffic)
 
     def pool(self, count: int) -> tuple[str, ...]:
         """Returns the names of the first towns."""
