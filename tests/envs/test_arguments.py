@@ -39,7 +39,7 @@ def test_duo_wizard_names_a_wrong_config() -> None:
 
 def test_town_is_an_argument_of_the_plain_environment() -> None:
     by_argument = gym.make("dorothie_gym/Town-v0", town="midtown")
-    by_setting = gym.make("dorothie_gym/Town-v0", config={"town": "midtown"}, town="brookside")
+    by_setting = gym.make("dorothie_gym/Town-v0", config={"town": "midtown"})
     (first, _), (second, _) = by_argument.reset(seed=3), by_setting.reset(seed=3)
     assert (first == second).all()
     assert by_argument.unwrapped.config["town"] == "midtown"  # type: ignore[attr-defined]  # of highway-env
