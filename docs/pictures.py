@@ -76,11 +76,11 @@ COLOURS: Final = 256
 """Number of colours of the pictures, which keeps their files small."""
 
 SESSION_TOWN, SESSION_SEED = "brookside", 8
-"""Session on the first picture of README.md: that of `dorothie-gym run --seed 8`."""
+"""Session on the first picture of README.md: that of `dorothie-gym run --town brookside --seed 8`."""
 
 
 def draw_first_session(path: Path) -> None:
-    """Draws the picture that `dorothie-gym run --seed 8` draws."""
+    """Draws the picture that `dorothie-gym run --town brookside --seed 8` draws."""
     engine = SessionEngine(SESSION_TOWN)
     policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
     play_session(engine, policies, seed=SESSION_SEED)

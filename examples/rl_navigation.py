@@ -44,7 +44,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=5, help="episodes per evaluation")
     parser.add_argument("--rollout", type=int, default=1024, help="steps per update")
     parser.add_argument("--max-seconds", type=float, default=300.0, help="simulated length of an episode")
-    parser.add_argument("--town", default="brookside", help="name or file of a town")
+    parser.add_argument("--town", default="millbrook", help="name or file of a town")
     parser.add_argument("--save", help="file for the trained model")
     options = parser.parse_args()
 

@@ -26,7 +26,7 @@ from dorothie_gym.lab.studies.export import COLUMNS
 from dorothie_gym.lab.studies.items import Item
 from dorothie_gym.lab.studies.study import Study
 from dorothie_gym.lab.studies.study_file import read_study
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, town_names
+from dorothie_gym.maps import FOLD_TOWNS, SEEN_TOWNS, UNSEEN_TOWNS, VALIDATION_TOWNS, describe, load_town
 from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
@@ -268,10 +268,17 @@ def test_the_counts_of_the_data_sheet_are_those_of_the_shipped_storyboards_and_t
         EnvConfig().decision_frequency,
     )
     assert f"by default in {100 * EnvConfig().word_error_rate:.1f} % of the words" in text
-    assert stated(r"and (\w+) small towns") == (len(town_names()),)
     assert stated(r"(\w+) towns are in `train` and in the seen folds") == (len(SEEN_TOWNS),)
-    assert "the fourth only in the unseen folds" in text and len(UNSEEN_TOWNS) == 1
+    assert stated(r"`val/unseen` in (\d+), `test/unseen` in (\d+)") == (len(VALIDATION_TOWNS), len(UNSEEN_TOWNS))
     assert f"Styles vary ({', '.join(register.name.lower() for register in Register)};" in text
+
+
+def test_the_page_of_towns_lists_each_fold() -> None:
+    page = (DOCS / "towns.md").read_text(encoding="utf-8")
+    for fold, towns in FOLD_TOWNS.items():
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{fold}` |")]
+        ends = towns if len(towns) < 5 else (f"`{towns[0]}` to `{towns[-1]}`",)
+        assert all(name in row for name in ends)
 
 
 def test_the_page_of_storyboards_counts_the_templates() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym import EnvConfig
-from dorothie_gym.maps import SEEN_TOWNS, load_town, town_names
+from dorothie_gym.maps import fold_of, load_town, town_names
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.pretrained import names_for
 
@@ -83,7 +83,7 @@ def test_readme_measures_towns_and_counts_shipped_models_as_they_are() -> None:
     text = " ".join(README.read_text(encoding="utf-8").split())
     for name in town_names():
         town = load_town(name)
-        fold = "seen" if name in SEEN_TOWNS else "unseen"
+        fold = fold_of(name)
         kilometres = sum(lane.length for lane in town.lanes) / 1000.0
         assert f"| `{name}` | {fold} | {len(town.lanes)} | {kilometres:.1f} |" in text
     files = (importlib.resources.files("dorothie_gym.maps").joinpath("data", f"{name}.yaml") for name in town_names())

@@ -10,6 +10,7 @@ from dorothie_gym import maps as town_maps
 from dorothie_gym import policies as players
 from dorothie_gym import tasks
 from dorothie_gym._registration import environment_ids
+from dorothie_gym.maps.folds import TownFold
 from dorothie_gym.maps.generated.specification import PREFIX as GENERATED_TOWNS
 from dorothie_gym.ontology.roles import Role
 
@@ -34,8 +35,7 @@ def complete_towns(incomplete: str) -> list[str]:
     """Returns the completions of the last name in a list of towns, with the names before it."""
     before, comma, last = incomplete.rpartition(",")
     return [
-        before + comma + name
-        for name in _names(last, ("seen", "unseen", "all", *town_maps.town_names(), GENERATED_TOWNS))
+        before + comma + name for name in _names(last, (*TownFold, "all", *town_maps.town_names(), GENERATED_TOWNS))
     ]
 
 

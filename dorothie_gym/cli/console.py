@@ -16,9 +16,7 @@ from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_lib
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.lab import console as seats
-
-TOWN = "brookside"
-"""Town if none is given: the smallest one."""
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 
 
 def console(
@@ -26,7 +24,7 @@ def console(
         str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help=f"A town's name, or a file (.xodr, .yaml); {TOWN} if none is given.",
+            help=f"A town's name, or a file (.xodr, .yaml); {DEFAULT_TOWN} if none is given.",
             autocompletion=complete_town,
         ),
     ] = None,
@@ -80,7 +78,7 @@ def console(
     with reporting_errors():
         config = replace(_config(max_seconds, word_errors, absence, after_absence, while_away, pictures), speech=speech)
         if resume is None:
-            room = _room(town or TOWN, storyboard, seed, roles, out, config)
+            room = _room(town or DEFAULT_TOWN, storyboard, seed, roles, out, config)
         else:
             out = out or resume.resolve().parent
             room = _resumed_room(resume, town, storyboard, roles, out, config)

@@ -39,7 +39,7 @@ def generate(
         str | None,
         typer.Option(
             metavar="LIST",
-            help="Towns of the seen folds, which take turns: seen|unseen|all|NAME,...; generated is another town for"
+            help="Towns of the seen folds, which take turns: seen|development|NAME,...; generated is another town for"
             " each session.",
             autocompletion=complete_towns,
         ),

@@ -64,7 +64,8 @@ def leaderboard(
         ),
     ] = None,
     parts: Annotated[
-        str, typer.Option(metavar="seen,unseen", help="Parts to play.", rich_help_panel=_PANEL)
+        str,
+        typer.Option(metavar="PART,...", help="Parts to play: seen, development, unseen.", rich_help_panel=_PANEL),
     ] = "seen,unseen",
     imported: Annotated[
         list[str] | None,

@@ -49,6 +49,7 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import closed_loop
+from dorothie_gym.maps.folds import TownFold
 from dorothie_gym.session.config import PerceptionModel
 from dorothie_gym.support.processors import available_processors
 
@@ -61,9 +62,11 @@ def rollout(
     towns: Annotated[
         str,
         typer.Option(
-            metavar="seen|unseen|all|NAME,...", help="Towns, which take turns.", autocompletion=complete_towns
+            metavar="FOLD|all|NAME,...",
+            help="Towns, which take turns: seen, development, validation, unseen, all, or names.",
+            autocompletion=complete_towns,
         ),
-    ] = "unseen",
+    ] = TownFold.VALIDATION,
     workers: Players = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, for any policies.")] = 0,
     out: Annotated[

@@ -51,6 +51,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.session.config import PerceptionModel, RenderView
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def run(
         typer.Option(
             metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).", autocompletion=complete_town
         ),
-    ] = "brookside",
+    ] = DEFAULT_TOWN,
     storyboard: Storyboard = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; equal seeds give equal sessions.")] = 0,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Record the session into this new folder.")] = None,

@@ -23,6 +23,7 @@ from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.envs.turn_based_duo_wizard import TurnBasedDuoWizard
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.session.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
@@ -98,7 +99,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
 
     def __init__(
         self,
-        town: str | Path | Town = "brookside",
+        town: str | Path | Town = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         config: EnvConfig | Mapping[str, object] | None = None,

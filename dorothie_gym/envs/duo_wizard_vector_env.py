@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import ChannelKind, EnvConfig, PerceptionModel, RenderView, checked_view
 from dorothie_gym.session.providers import OBSERVERS, picture_spaces
@@ -80,7 +81,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     def __init__(
         self,
         num_envs: int = 1,
-        town: Towns = "brookside",
+        town: Towns = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         config: EnvConfig | None = None,

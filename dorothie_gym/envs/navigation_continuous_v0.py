@@ -16,6 +16,7 @@ from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELD_SPE
 from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.errors import short_repr
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.session.spaces.fields import FieldSpec, signal
 from dorothie_gym.support.action_values import real_numbers
@@ -123,7 +124,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
     def __init__(
         self,
-        town: str | Path | Town = "brookside",
+        town: str | Path | Town = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         traffic: str = "light",

@@ -13,6 +13,7 @@ from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.session.config import CameraConfig, RenderView
 from dorothie_gym.session.rewards import NavigationWeights, weights_of
 
@@ -46,7 +47,7 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
     def __init__(
         self,
         num_envs: int = 1,
-        town: Towns = "brookside",
+        town: Towns = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         traffic: str = "light",

@@ -13,6 +13,7 @@ from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUENCY, navigation_space
@@ -90,7 +91,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
 
     def __init__(
         self,
-        town: str | Path | Town = "brookside",
+        town: str | Path | Town = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         guidance: Guidance | str = Guidance.TURNS,

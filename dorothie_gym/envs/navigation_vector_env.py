@@ -15,6 +15,7 @@ from dorothie_gym.envs.navigation.cameras import driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.errors import short_repr
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_fields import navigation_space
@@ -62,7 +63,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
     def __init__(
         self,
         num_envs: int = 1,
-        town: Towns = "brookside",
+        town: Towns = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         guidance: Guidance | str = Guidance.TURNS,

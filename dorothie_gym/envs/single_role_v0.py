@@ -12,6 +12,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
@@ -76,7 +77,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     def __init__(
         self,
         role: Role | str,
-        town: str | Path | Town = "brookside",
+        town: str | Path | Town = DEFAULT_TOWN,
         storyboard: str | Path | StoryboardTemplate | None = None,
         config: EnvConfig | Mapping[str, object] | None = None,
         partners: Mapping[str, str | AnyPolicy] | None = None,

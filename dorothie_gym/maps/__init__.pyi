@@ -1,14 +1,20 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
-from .catalogue import SEEN_TOWNS as SEEN_TOWNS
-from .catalogue import UNSEEN_TOWNS as UNSEEN_TOWNS
 from .catalogue import describe as describe
-from .catalogue import fold_of as fold_of
 from .catalogue import import_report as import_report
 from .catalogue import load_town as load_town
 from .catalogue import town_at as town_at
 from .catalogue import town_names as town_names
 from .driving_side import DrivingSide as DrivingSide
+from .folds import DEFAULT_TOWN as DEFAULT_TOWN
+from .folds import DEVELOPMENT_TOWNS as DEVELOPMENT_TOWNS
+from .folds import FOLD_TOWNS as FOLD_TOWNS
+from .folds import SEEN_TOWNS as SEEN_TOWNS
+from .folds import UNSEEN_TOWNS as UNSEEN_TOWNS
+from .folds import VALIDATION_TOWNS as VALIDATION_TOWNS
+from .folds import TownFold as TownFold
+from .folds import check_training_towns as check_training_towns
+from .folds import fold_of as fold_of
 from .generated.specification import TownSeries as TownSeries
 from .generated.specification import parse_series as parse_series
 from .import_notes import ImportNote as ImportNote

@@ -27,12 +27,6 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.import_notes import ImportNote, ImportNotes
     from dorothie_gym.support.files import JsonValue
 
-SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
-"""Training towns (in the paper: CARLA's Town01, Town03 and Town05)."""
-
-UNSEEN_TOWNS: tuple[str, ...] = ("brookside",)
-"""Towns of the unseen fold (in the paper: CARLA's Town02)."""
-
 _SUFFIXES = (".xodr", ".yaml", ".yml")
 _PLAIN_NAME = re.compile(r"\w{1,60}")
 _FOLDER = files("dorothie_gym.maps") / "data"
@@ -45,17 +39,10 @@ def town_names() -> tuple[str, ...]:
     )
 
 
-def fold_of(name: str) -> str | None:
-    """Returns the fold of a town, "seen" or "unseen", or None for a town that is not shipped."""
-    if name in SEEN_TOWNS:
-        return "seen"
-    return "unseen" if name in UNSEEN_TOWNS else None
-
-
 def load_town(name_or_path: str | Path) -> Town:
     """Loads a town by name, or from a file (`.xodr` for OpenDRIVE, `.yaml` or `.yml` for the town language).
 
-    Names are those of shipped towns, and `generated:SEED` with the options `size` and `style`
+    Names are those of shipped towns, and `generated:SEED` with the options `size`, `style` and `traffic`
     (`dorothie_gym.maps.generated.specification`).
 
     Towns are cached: within a process as objects, between processes as archives in the user's cache folder

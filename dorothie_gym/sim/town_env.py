@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.sim.network.network import LARGEST_COORDINATE, TownNetwork
 from dorothie_gym.sim.population import free_places, populate
 from dorothie_gym.sim.road import CompiledRoad
@@ -335,7 +336,7 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
         """Returns the settings that hold where `config` gives no others."""
         config = super().default_config()
         config.update(
-            town="brookside",
+            town=DEFAULT_TOWN,
             vehicles=10,
             pedestrians=0,
             duration=60.0,

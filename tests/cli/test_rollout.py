@@ -52,7 +52,7 @@ def test_tables_name_seeds_and_the_folder_of_sessions(tmp_path: Path) -> None:
         (("--co-wizard", "clever"), "co_wizard: there is no policy 'clever', nor a file of that name"),
         (("--participant", "lane-follow"), "participant: there is no policy 'lane-follow'"),
         (("--towns", "atlantis"), "atlantis"),
-        (("--towns", ","), "give seen, unseen, all"),
+        (("--towns", ","), "give seen, development, validation, unseen, all"),
         (("--co-wizard", "weights.json"), "which cannot be played"),
         (("--co-wizard", "hollow"), "co_wizard: hollow/model."),
         (("--participant", "hollow"), "participant: hollow/model."),

@@ -34,7 +34,7 @@ def test_wrong_argument_is_named(name: str, arguments: dict[str, Any], message: 
 
 def test_duo_wizard_names_a_wrong_config() -> None:
     with pytest.raises(ValueError, match="config, field 'a': is unknown"):
-        dorothie_gym.DuoWizardEnv(config={"a": 1})  # type: ignore[arg-type]  # a user's mistake
+        dorothie_gym.DuoWizardEnv("brookside", config={"a": 1})  # type: ignore[arg-type]  # a user's mistake
 
 
 def test_town_is_an_argument_of_the_plain_environment() -> None:
@@ -79,7 +79,12 @@ def test_specification_has_the_limit_of_the_episodes(name: str, arguments: dict[
 
 
 def test_episode_ends_at_the_limit_of_the_specification() -> None:
-    env = gym.make("dorothie_gym/CoWizard-v0", max_cycles=5, partners={"participant": "silent", "ad_wizard": "silent"})
+    env = gym.make(
+        "dorothie_gym/CoWizard-v0",
+        max_cycles=5,
+        partners={"participant": "silent", "ad_wizard": "silent"},
+        town="brookside",
+    )
     env.reset(seed=0)
     ends = [env.step(env.unwrapped.noop_action)[3] for _ in range(5)]  # type: ignore[attr-defined]  # of SingleRole
     assert ends == [False] * 4 + [True]
@@ -88,7 +93,7 @@ def test_episode_ends_at_the_limit_of_the_specification() -> None:
 @pytest.mark.parametrize(("frequency", "duration"), [(1, 3), (5, 2.0), (15, 0.7)])
 def test_town_is_truncated_at_the_limit_of_its_specification(frequency: int, duration: float) -> None:
     settings = {"policy_frequency": frequency, "duration": duration, "vehicles": 0}
-    env = gym.make("dorothie_gym/Town-v0", config=settings)
+    env = gym.make("dorothie_gym/Town-v0", config=settings, town="brookside")
     assert env.spec is not None and env.spec.max_episode_steps is not None
     env.reset(seed=0)
     ends = [env.step(1)[3] for _ in range(env.spec.max_episode_steps)]
@@ -96,7 +101,7 @@ def test_town_is_truncated_at_the_limit_of_its_specification(frequency: int, dur
 
 
 def test_a_limit_given_to_make_is_kept() -> None:
-    env = gym.make("dorothie_gym/Navigation-v0", max_episode_steps=50)
+    env = gym.make("dorothie_gym/Navigation-v0", max_episode_steps=50, town="brookside")
     assert env.spec is not None and env.spec.max_episode_steps == 50
 
 

@@ -180,7 +180,7 @@ def test_turn_based_environment_is_copied() -> None:
 
 
 def test_utterances_and_faults_in_progress_go_on_in_the_copy() -> None:
-    env = DuoWizardEnv(config=CONFIG)
+    env = DuoWizardEnv("brookside", config=CONFIG)
     env.reset(seed=2)
     quiet = {str(role): noop(role, env.limits) for role in AGENT_ROLES}
     speech = Speech(act=DialogueAct.of(DialogueMove.INSTRUCT), text="please turn left at the next junction " * 4)
@@ -196,7 +196,7 @@ def test_utterances_and_faults_in_progress_go_on_in_the_copy() -> None:
 
 
 def test_environment_in_which_a_picture_was_drawn_is_copied_without_it() -> None:
-    env = gym.make("dorothie_gym/CoWizard-v0", render_mode="rgb_array")
+    env = gym.make("dorothie_gym/CoWizard-v0", render_mode="rgb_array", town="brookside")
     env.reset(seed=1)
     picture = np.asarray(env.render())
     for twin in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
@@ -204,7 +204,7 @@ def test_environment_in_which_a_picture_was_drawn_is_copied_without_it() -> None
 
 
 def test_copies_share_the_town_and_nothing_that_changes() -> None:
-    env = DuoWizardEnv(config=CONFIG)
+    env = DuoWizardEnv("brookside", config=CONFIG)
     env.reset(seed=1)
     twin = copy.deepcopy(env)
     assert twin.town is env.town and twin.session.world.network is env.session.world.network

@@ -49,21 +49,21 @@ def test_two_processes_observe_and_record_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
 def test_used_environment_plays_equal_session(play: Any) -> None:
-    used = DuoWizardEnv()
+    used = DuoWizardEnv("brookside")
     list(play(used, seed=5, decisions=12))
-    fresh = [digest(moment) for moment in play(DuoWizardEnv(), seed=6, decisions=12)]
+    fresh = [digest(moment) for moment in play(DuoWizardEnv("brookside"), seed=6, decisions=12)]
     assert [digest(moment) for moment in play(used, seed=6, decisions=12)] == fresh
 
 
 def test_returned_objects_are_not_changed() -> None:
-    env = DuoWizardEnv()
+    env = DuoWizardEnv("brookside")
     kept = list(play_at_random(env, seed=3, decisions=8))
-    seen = [digest(moment) for moment in play_at_random(DuoWizardEnv(), seed=3, decisions=8)]
+    seen = [digest(moment) for moment in play_at_random(DuoWizardEnv("brookside"), seed=3, decisions=8)]
     assert [digest(moment) for moment in kept] == seen
 
 
 def test_resets_without_seed_continue_the_series() -> None:
-    env, other = DuoWizardEnv(), DuoWizardEnv()
+    env, other = DuoWizardEnv("brookside"), DuoWizardEnv("brookside")
     for each in (env, other):
         each.reset(seed=8)
     first, second = (digest(env.reset()) for _ in range(2))
@@ -72,5 +72,5 @@ def test_resets_without_seed_continue_the_series() -> None:
 
 
 def test_different_seeds_give_different_sessions() -> None:
-    env = DuoWizardEnv()
+    env = DuoWizardEnv("brookside")
     assert not np.array_equal(env.reset(seed=1)[0]["ad_wizard"]["pose"], env.reset(seed=2)[0]["ad_wizard"]["pose"])

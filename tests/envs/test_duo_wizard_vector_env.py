@@ -212,7 +212,9 @@ def test_pictures_are_those_of_single_environments(mode: AutoresetMode) -> None:
 
 
 def test_number_of_threads_changes_no_byte_of_pictures() -> None:
-    one, two = (DuoWizardVectorEnv(5, config=EnvConfig(camera=TINY), threads=threads) for threads in (1, 2))
+    one, two = (
+        DuoWizardVectorEnv(5, "brookside", config=EnvConfig(camera=TINY), threads=threads) for threads in (1, 2)
+    )
     check_equal(one.reset(seed=2), two.reset(seed=2))
     for _ in range(6):
         actions = [{agent: noop(Role(agent), one.limits) for agent in AGENTS} for _ in range(5)]
@@ -225,7 +227,7 @@ def test_number_of_threads_changes_no_byte_of_pictures() -> None:
 
 
 def test_copies_and_states_continue_with_equal_pictures() -> None:
-    batch = DuoWizardVectorEnv(2, config=EnvConfig(camera=TINY))
+    batch = DuoWizardVectorEnv(2, "brookside", config=EnvConfig(camera=TINY))
     batch.reset(seed=1)
     actions = [{agent: noop(Role(agent), batch.limits) for agent in AGENTS} for _ in range(2)]
     batch.step(actions)
@@ -256,7 +258,7 @@ def idle(batch: DuoWizardVectorEnv) -> list[dict[str, Any]]:
 
 
 def test_observations_and_samples_are_of_the_spaces() -> None:
-    batch = DuoWizardVectorEnv(2)
+    batch = DuoWizardVectorEnv(2, "brookside")
     observations, _ = batch.reset(seed=1)
     for agent in AGENTS:
         assert batch.observation_space(agent).contains(observations[agent])
@@ -264,7 +266,7 @@ def test_observations_and_samples_are_of_the_spaces() -> None:
 
 
 def test_results_are_not_overwritten_by_later_steps() -> None:
-    batch = DuoWizardVectorEnv(2)
+    batch = DuoWizardVectorEnv(2, "brookside")
     observations, infos = batch.reset(seed=1)
     kept = copy.deepcopy((observations, infos))
     batch.step(idle(batch))
@@ -281,7 +283,7 @@ def test_copies_and_states_go_on_alike() -> None:
         batch.step(actions)
         for single, own in zip(singles, actions, strict=True):
             single.step(own)
-    state, twin, other = batch.clone_state(), copy.deepcopy(batch), DuoWizardVectorEnv(3, max_cycles=60)
+    state, twin, other = batch.clone_state(), copy.deepcopy(batch), DuoWizardVectorEnv(3, "brookside", max_cycles=60)
     script = []
     for _ in range(20):
         script.append([single.disturbing() for single in singles])
@@ -333,8 +335,8 @@ def test_sessions_are_the_same_bytes_compiled_and_in_plain_python() -> None:
 
 
 def test_sessions_can_be_drawn() -> None:
-    batch = DuoWizardVectorEnv(2, render_mode="rgb_array")
-    single = DuoWizardEnv(render_mode="rgb_array")
+    batch = DuoWizardVectorEnv(2, "brookside", render_mode="rgb_array")
+    single = DuoWizardEnv("brookside", render_mode="rgb_array")
     batch.reset(seed=4)
     single.reset(seed=5)
     batch.step(idle(batch))
@@ -343,7 +345,7 @@ def test_sessions_can_be_drawn() -> None:
 
 
 def test_mistakes_are_named() -> None:
-    batch = DuoWizardVectorEnv(2, max_cycles=1, autoreset_mode="Disabled")
+    batch = DuoWizardVectorEnv(2, "brookside", max_cycles=1, autoreset_mode="Disabled")
     with pytest.raises(ResetNeeded, match=r"environments \[0, 1\] wait for a reset"):
         batch.step(idle(batch))
     batch.reset(seed=0)

@@ -30,7 +30,7 @@ def scribble_over(value: Any) -> None:
 def test_observations_and_infos_do_not_change_after_further_steps() -> None:
     for play in (play_at_random, play_by_script):
         taken, then = [], []
-        for observations, infos, _ in play(DuoWizardEnv(config=CONFIG), seed=5, decisions=25):
+        for observations, infos, _ in play(DuoWizardEnv("brookside", config=CONFIG), seed=5, decisions=25):
             taken.append((observations, infos))
             then.append(digest((observations, infos)))
         assert [digest(each) for each in taken] == then
@@ -40,9 +40,9 @@ def test_observations_and_infos_do_not_change_after_further_steps() -> None:
 def test_changes_of_returned_objects_have_no_effect() -> None:
     clean = [
         digest((observations, infos))
-        for observations, infos, _ in play_at_random(DuoWizardEnv(config=CONFIG), seed=6, decisions=20)
+        for observations, infos, _ in play_at_random(DuoWizardEnv("brookside", config=CONFIG), seed=6, decisions=20)
     ]
-    env = DuoWizardEnv(config=CONFIG)
+    env = DuoWizardEnv("brookside", config=CONFIG)
     for k, agent in enumerate(env.possible_agents):
         env.action_space(agent).seed(6 + k)
     observations, infos = env.reset(seed=6)

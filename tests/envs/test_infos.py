@@ -84,7 +84,7 @@ def test_infos_of_flat_environments(name: str) -> None:
 @pytest.mark.parametrize("task", ["ufn", "rfn", "nfd"])
 def test_infos_of_live_tasks(task: str) -> None:
     config = EnvConfig(max_seconds=60.0)
-    assert_one_form(episodes(TeacherForcing(DuoWizardEnv(config=config), task), 1))
+    assert_one_form(episodes(TeacherForcing(DuoWizardEnv("brookside", config=config), task), 1))
 
 
 def parallel_episodes(env: Any) -> Iterator[dict[str, Info]]:
@@ -179,7 +179,7 @@ def test_infos_of_batches_have_the_form_of_gymnasium(name: str) -> None:
 
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_infos_of_batches_of_three_agents(mode: AutoresetMode) -> None:
-    env = DuoWizardVectorEnv(2, config=EnvConfig(max_seconds=SECONDS), autoreset_mode=mode, threads=1)
+    env = DuoWizardVectorEnv(2, "brookside", config=EnvConfig(max_seconds=SECONDS), autoreset_mode=mode, threads=1)
     for number, agent in enumerate(env.possible_agents):
         env.action_space(agent).seed(number)
     found, ends = [env.reset(seed=3)[1]], []
@@ -202,7 +202,7 @@ def test_infos_of_batches_of_three_agents(mode: AutoresetMode) -> None:
 
 
 def test_refusals_have_a_reason_by_kind_of_action() -> None:
-    env = gym.make("dorothie_gym/CoWizard-v0")
+    env = gym.make("dorothie_gym/CoWizard-v0", town="brookside")
     _, info = env.reset(seed=1)
     assert info["refused"] == {"speech": False, "mental": False, "physical": False} and info["refusal_reason"] == ""
     assert (

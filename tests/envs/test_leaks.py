@@ -21,7 +21,7 @@ from tests.envs.sessions_played import play_at_random, play_by_script
 
 @pytest.fixture(scope="module")
 def env() -> DuoWizardEnv:
-    return DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2)))
+    return DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2)))
 
 
 def check_hidden_places_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
@@ -57,7 +57,7 @@ def test_hidden_places_are_never_visible(env: DuoWizardEnv, play: Any, decisions
 
 @pytest.mark.parametrize("config", [{"word_error_rate": 0.25}, {"word_error_rate": 0.25, "observe_acts": False}])
 def test_hidden_places_are_not_visible_with_word_errors(config: dict[str, Any]) -> None:
-    noisy = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), **config))
+    noisy = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), **config))
     check_hidden_places_are_not_visible(noisy, play_by_script, seed=2, decisions=120)
 
 
@@ -90,7 +90,9 @@ def check_tasks_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisio
 @pytest.mark.parametrize("rate", [0.0, 0.25])
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
 def test_tasks_are_not_visible_to_the_co_wizard(play: Any, rate: float) -> None:
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate))
+    env = DuoWizardEnv(
+        "brookside", config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate)
+    )
     check_tasks_are_not_visible(env, play, seed=3, decisions=60)
 
 
@@ -99,7 +101,9 @@ def test_tasks_are_not_visible_to_the_co_wizard(play: Any, rate: float) -> None:
 @pytest.mark.parametrize("rate", [0.0, 0.2])
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
 def test_tasks_are_never_visible_to_the_co_wizard(play: Any, rate: float, seed: int) -> None:
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate))
+    env = DuoWizardEnv(
+        "brookside", config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate)
+    )
     check_tasks_are_not_visible(env, play, seed=seed, decisions=400)
 
 
@@ -152,7 +156,7 @@ def test_participant_does_not_observe_permissions(env: DuoWizardEnv) -> None:
 
 @pytest.mark.parametrize("name", ["birthday_tea", "film_night", "local_news"])
 def test_only_the_ad_wizard_observes_what_may_happen_to_the_tasks(name: str) -> None:
-    env = DuoWizardEnv(storyboard=name, config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2)))
+    env = DuoWizardEnv("brookside", storyboard=name, config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2)))
     observations = play_in_silence(env, seed=1, decisions=1)[-1]
     secrets = [
         str(secret)
@@ -172,7 +176,9 @@ def test_only_the_ad_wizard_observes_what_may_happen_to_the_tasks(name: str) -> 
 
 
 def test_participant_reads_a_message_when_it_is_sent() -> None:
-    told = DuoWizardEnv(storyboard="birthday_tea", config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
+    told = DuoWizardEnv(
+        "brookside", storyboard="birthday_tea", config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0))
+    )
     told.reset(seed=1)
     message = told.scenario.storyboard.subgoals[2].messages.trigger
     idle = {agent: noop(Role(agent), told.limits) for agent in told.agents}

@@ -115,9 +115,12 @@ MAKERS: dict[str, Callable[[], Any]] = {
         "UfN-v0", "RfN-v0", "NfD-v0",
     )},
     "Town-v0 continuous": lambda: gym.make(
-        "dorothie_gym/Town-v0", disable_env_checker=True, config={"action": {"type": "ContinuousAction"}}
+        "dorothie_gym/Town-v0",
+        disable_env_checker=True,
+        config={"action": {"type": "ContinuousAction"}},
+        town="brookside",
     ),
-    "CoWizard-v0 flattened": lambda: dorothie_gym.flatten(gym.make("dorothie_gym/CoWizard-v0")),
+    "CoWizard-v0 flattened": lambda: dorothie_gym.flatten(gym.make("dorothie_gym/CoWizard-v0", town="brookside")),
 }  # fmt: skip
 
 
@@ -135,7 +138,7 @@ def try_environment(name: str, count: int) -> None:
 
 
 def try_role(role: str, count: int) -> None:
-    rng, env = random.Random(f"{SEED} {role}"), DuoWizardEnv()
+    rng, env = random.Random(f"{SEED} {role}"), DuoWizardEnv("brookside")
     env.reset(seed=1)
     for agent in env.agents:
         env.action_space(agent).seed(1)

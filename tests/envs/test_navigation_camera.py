@@ -27,7 +27,7 @@ SHORT: dict[str, Any] = {"max_seconds": 30.0, "patience": 15.0, "observation": "
 
 
 def test_observation_is_a_picture_of_the_cars_camera() -> None:
-    env = NavigationEnv(observation="camera")
+    env = NavigationEnv("brookside", observation="camera")
     picture, info = env.reset(seed=0)
     assert env.observation_space == gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
     assert env.observation_space.contains(picture)
@@ -40,12 +40,12 @@ def test_observation_is_a_picture_of_the_cars_camera() -> None:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_driver_who_sees_nothing_but_the_dashboard_arrives(seed: int) -> None:
-    env = NavigationEnv(observation="camera", traffic="none")
+    env = NavigationEnv("brookside", observation="camera", traffic="none")
     assert drive(env, obey_picture, seed)["is_success"]
 
 
 def test_dashboard_follows_the_car() -> None:
-    env = NavigationEnv(observation="camera", traffic="none")
+    env = NavigationEnv("brookside", observation="camera", traffic="none")
     picture, info = env.reset(seed=0)
     speeds, planned = [], []
     for _ in range(60):
@@ -63,7 +63,10 @@ def test_dashboard_follows_the_car() -> None:
 
 
 def test_other_observations_rewards_and_ends_are_those_of_vectors() -> None:
-    one, other = NavigationEnv(exceptions=3.0), NavigationEnv(exceptions=3.0, observation="camera", camera=TINY)
+    one, other = (
+        NavigationEnv("brookside", exceptions=3.0),
+        NavigationEnv("brookside", exceptions=3.0, observation="camera", camera=TINY),
+    )
     one.reset(seed=4)
     other.reset(seed=4)
     rng = np.random.default_rng(0)
@@ -131,14 +134,16 @@ def test_gymnasium_accepts_the_environments(name: str) -> None:
 
 
 def test_pictures_have_the_size_of_the_camera() -> None:
-    env = NavigationContinuousEnv(observation="camera", camera=CameraConfig(width=160, height=120))
+    env = NavigationContinuousEnv("brookside", observation="camera", camera=CameraConfig(width=160, height=120))
     picture, _ = env.reset(seed=0)
     assert picture.shape == (120, 160, 3)
     assert env.observation_space.contains(picture)
 
 
 def test_frames_are_stacked_by_gymnasiums_wrapper() -> None:
-    env = gym.wrappers.FrameStackObservation(gym.make(NAVIGATION, observation="camera", camera=TINY), 4)
+    env = gym.wrappers.FrameStackObservation(
+        gym.make(NAVIGATION, observation="camera", camera=TINY, town="brookside"), 4
+    )
     stacked, _ = env.reset(seed=0)
     assert stacked.shape == (4, 16, 24, 3)
     newer, *_ = env.step(0)
@@ -164,5 +169,5 @@ def test_wrong_settings_are_refused(settings: dict[str, Any], message: str) -> N
 
 
 def test_camera_is_small_unless_another_is_given() -> None:
-    assert NavigationEnv(observation="camera").config.camera == SMALL_CAMERA
-    assert NavigationEnv().config.camera is None
+    assert NavigationEnv("brookside", observation="camera").config.camera == SMALL_CAMERA
+    assert NavigationEnv("brookside").config.camera is None

@@ -17,7 +17,7 @@ FIELD = layout(CONTINUOUS_FIELDS)
 
 @pytest.fixture(scope="module")
 def env() -> NavigationContinuousEnv:
-    return NavigationContinuousEnv(traffic="none")
+    return NavigationContinuousEnv("brookside", traffic="none")
 
 
 @pytest.mark.parametrize("seed", [1, 6])
@@ -78,13 +78,13 @@ def test_leaving_the_road_terminates_episode(env: NavigationContinuousEnv) -> No
 
 
 def test_decision_frequency_is_respected() -> None:
-    env = NavigationContinuousEnv(decision_frequency=5.0, traffic="none")
+    env = NavigationContinuousEnv("brookside", decision_frequency=5.0, traffic="none")
     env.reset(seed=0)
     for _ in range(5):
         env.step(np.zeros(3, dtype=np.float32))
     assert env.session.world.time == pytest.approx(1.0)
     with pytest.raises(ValueError, match="decision_frequency"):
-        NavigationContinuousEnv(decision_frequency=7.0)
+        NavigationContinuousEnv("brookside", decision_frequency=7.0)
 
 
 @pytest.mark.parametrize("action", [np.zeros(2), np.array((0.0, np.nan, 0.0)), 3])
@@ -95,7 +95,7 @@ def test_malformed_actions_raise_error(env: NavigationContinuousEnv, action: obj
 
 
 def test_values_lie_in_the_ranges_of_their_fields() -> None:
-    env = NavigationContinuousEnv(traffic="medium")
+    env = NavigationContinuousEnv("brookside", traffic="medium")
     env.action_space.seed(1)
     observation, _ = env.reset(seed=1)
     least, greatest = observation.copy(), observation.copy()
@@ -109,8 +109,11 @@ def test_values_lie_in_the_ranges_of_their_fields() -> None:
 
 
 def test_acceleration_is_throttle_or_brake() -> None:
-    one, two = (NavigationContinuousEnv(control=control, max_seconds=20.0) for control in ("acceleration", "pedals"))
-    batch = NavigationContinuousVectorEnv(1, control="acceleration", max_seconds=20.0)
+    one, two = (
+        NavigationContinuousEnv("brookside", control=control, max_seconds=20.0)
+        for control in ("acceleration", "pedals")
+    )
+    batch = NavigationContinuousVectorEnv(1, "brookside", control="acceleration", max_seconds=20.0)
     assert one.action_space.shape == (2,) and two.action_space.shape == (3,)
     np.testing.assert_array_equal(one.reset(seed=3)[0], two.reset(seed=3)[0])
     batch.reset(seed=3)
@@ -129,4 +132,4 @@ def test_acceleration_is_throttle_or_brake() -> None:
 
 def test_unknown_control_is_refused() -> None:
     with pytest.raises(ValueError, match="control is 'wheel'; it must be one of pedals, acceleration"):
-        NavigationContinuousEnv(control="wheel")
+        NavigationContinuousEnv("brookside", control="wheel")

@@ -21,7 +21,7 @@ FIELD = layout()
 
 @pytest.fixture(scope="module")
 def env() -> NavigationEnv:
-    return NavigationEnv()
+    return NavigationEnv("brookside")
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -33,7 +33,7 @@ def test_obedient_driver_succeeds(env: NavigationEnv, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [3, 4])
 def test_goals_on_the_map_are_found_without_turn_guidance(seed: int) -> None:
-    assert drive(NavigationEnv(guidance="goals"), obey, seed)["is_success"]
+    assert drive(NavigationEnv("brookside", guidance="goals"), obey, seed)["is_success"]
 
 
 @pytest.mark.slow
@@ -46,12 +46,12 @@ def test_obedient_drivers_succeed_in_all_towns(town: str, guidance: str, excepti
 
 
 def test_participant_gives_up_on_lane_following() -> None:
-    info = drive(NavigationEnv(patience=20.0), follow_lane, 0)
+    info = drive(NavigationEnv("brookside", patience=20.0), follow_lane, 0)
     assert (info["is_success"], info["reason"]) == (False, "gave up")
 
 
 def test_episode_is_truncated_at_time_limit() -> None:
-    env = NavigationEnv(max_seconds=12.0)
+    env = NavigationEnv("brookside", max_seconds=12.0)
     _, info = env.reset(seed=1)
     terminated = truncated = False
     while not (terminated or truncated):
@@ -76,7 +76,7 @@ def play(env: NavigationEnv, seed: int, steps: int) -> list[tuple[Any, float]]:
 
 
 def test_equal_seeds_and_actions_give_equal_episodes(env: NavigationEnv) -> None:
-    first, second = play(env, 5, 60), play(NavigationEnv(), 5, 60)
+    first, second = play(env, 5, 60), play(NavigationEnv("brookside"), 5, 60)
     for (one, reward), (two, other) in zip(first, second, strict=True):
         np.testing.assert_array_equal(one, two)
         assert reward == other
@@ -141,7 +141,7 @@ def test_progress_adds_up_to_decrease_of_cost_to_go(env: NavigationEnv) -> None:
 
 
 def test_sparse_reward_is_given_for_subgoals_only() -> None:
-    env = NavigationEnv(reward="sparse")
+    env = NavigationEnv("brookside", reward="sparse")
     assert drive(env, follow_lane, 2)["return"] == 0.0
     reached = drive(env, obey, 2)
     assert reached["return"] == pytest.approx(reached["subgoals"]["reached"] + 2.0)
@@ -182,7 +182,7 @@ def test_turn_guidance_does_not_reveal_goal(env: NavigationEnv) -> None:
 
 def test_named_places_off_the_map_are_not_revealed() -> None:
     """Guidance to a hidden goal is turn by turn, also where goals are named."""
-    env = NavigationEnv(guidance="goals")
+    env = NavigationEnv("brookside", guidance="goals")
     seen = {True: 0, False: 0}
     for seed in range(6):
         observation, info = env.reset(seed=seed)
@@ -201,7 +201,7 @@ def test_named_places_off_the_map_are_not_revealed() -> None:
 
 
 def test_exceptions_happen_when_enabled() -> None:
-    env = NavigationEnv(exceptions=4.0)
+    env = NavigationEnv("brookside", exceptions=4.0)
     drive(env, obey, 1)
     assert env.session.summary()["exceptions"] > 0
 
@@ -217,12 +217,12 @@ def test_returned_objects_may_be_changed(env: NavigationEnv) -> None:
 
 
 def test_fields_fill_the_observation() -> None:
-    assert sum(FIELDS.values()) == NavigationEnv().observation_space.shape[0]  # type: ignore[index]  # a `Box` always has a shape
+    assert sum(FIELDS.values()) == NavigationEnv("brookside").observation_space.shape[0]  # type: ignore[index]  # a `Box` always has a shape
     assert [where.stop - where.start for where in FIELD.values()] == list(FIELDS.values())
 
 
 def test_values_lie_in_the_ranges_of_their_fields() -> None:
-    env = NavigationEnv(exceptions=4.0, traffic="medium")
+    env = NavigationEnv("brookside", exceptions=4.0, traffic="medium")
     env.action_space.seed(3)
     observation, info = env.reset(seed=3)
     least, greatest = observation.copy(), observation.copy()
@@ -260,7 +260,7 @@ def test_reward_weights_must_be_finite() -> None:
 
 
 def test_step_before_reset_raises_error() -> None:
-    env = NavigationEnv(max_seconds=1.0)
+    env = NavigationEnv("brookside", max_seconds=1.0)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(0)
     env.reset(seed=0)
@@ -273,24 +273,24 @@ def test_step_before_reset_raises_error() -> None:
 
 
 def test_vector_environment_equals_single_ones() -> None:
-    vector = gym.make_vec("dorothie_gym/Navigation-v0", num_envs=3, max_seconds=5.0)
+    vector = gym.make_vec("dorothie_gym/Navigation-v0", num_envs=3, max_seconds=5.0, town="brookside")
     observations, infos = vector.reset(seed=4)
     assert observations.shape == (3, sum(FIELDS.values())) and infos["action_mask"].shape == (3, len(NavigationAction))
     for _ in range(12):
         observations, *_ = vector.step(np.zeros(3, dtype=np.int64))
-    single, _ = NavigationEnv(max_seconds=5.0).reset(seed=5)
+    single, _ = NavigationEnv("brookside", max_seconds=5.0).reset(seed=5)
     np.testing.assert_array_equal(vector.reset(seed=4)[0][1], single)
     vector.close()
 
 
 def test_environments_pass_stable_baselines_checker() -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
-    checker.check_env(NavigationEnv())
-    checker.check_env(NavigationContinuousEnv())
+    checker.check_env(NavigationEnv("brookside"))
+    checker.check_env(NavigationContinuousEnv("brookside"))
 
 
 def test_state_is_restored_where_other_goals_were_driven_to() -> None:
-    one, other = (NavigationEnv(guidance="goals", exceptions=4.0) for _ in range(2))
+    one, other = (NavigationEnv("brookside", guidance="goals", exceptions=4.0) for _ in range(2))
     one.reset(seed=1)
     for seed in (50, 51, 52):
         other.reset(seed=seed)

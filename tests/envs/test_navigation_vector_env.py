@@ -96,7 +96,7 @@ def test_settings_with_pedals_are_those_of_the_single_environment(frequency: flo
 
 
 def test_number_of_threads_changes_nothing_with_pedals() -> None:
-    one, two = (NavigationContinuousVectorEnv(9, max_seconds=10.0, threads=threads) for threads in (1, 2))
+    one, two = (NavigationContinuousVectorEnv(9, "brookside", max_seconds=10.0, threads=threads) for threads in (1, 2))
     check_equal(one.reset(seed=2), two.reset(seed=2))
     rng = np.random.default_rng(5)
     for _ in range(120):
@@ -150,8 +150,8 @@ def test_a_day_of_driving_leaks_no_memory() -> None:
 
 
 def test_environment_does_not_depend_on_its_place_in_the_batch() -> None:
-    alone = NavigationVectorEnv(1, max_seconds=20.0)
-    among = NavigationVectorEnv(7, max_seconds=20.0)
+    alone = NavigationVectorEnv(1, "brookside", max_seconds=20.0)
+    among = NavigationVectorEnv(7, "brookside", max_seconds=20.0)
     one, _ = alone.reset(seed=9)
     all_of_them, _ = among.reset(seed=5)
     rng = np.random.default_rng(0)
@@ -172,7 +172,7 @@ def test_several_towns_are_played_in_turn() -> None:
 
 
 def test_number_of_threads_changes_nothing() -> None:
-    one, two = (NavigationVectorEnv(9, max_seconds=30.0, threads=threads) for threads in (1, 2))
+    one, two = (NavigationVectorEnv(9, "brookside", max_seconds=30.0, threads=threads) for threads in (1, 2))
     check_equal(one.reset(seed=2), two.reset(seed=2))
     rng = np.random.default_rng(5)
     for _ in range(70):
@@ -206,7 +206,7 @@ def test_crowds_and_roadblocks_find_room_in_the_batch() -> None:
 
 
 def test_masks_are_those_of_infos() -> None:
-    env = NavigationVectorEnv(4)
+    env = NavigationVectorEnv(4, "brookside")
     _, infos = env.reset(seed=1)
     for _ in range(20):
         np.testing.assert_array_equal(env.action_masks(), infos["action_mask"].astype(bool))
@@ -216,7 +216,7 @@ def test_masks_are_those_of_infos() -> None:
 
 
 def test_obedient_driver_succeeds_in_a_batch() -> None:
-    env = NavigationVectorEnv(2, autoreset_mode=AutoresetMode.DISABLED)
+    env = NavigationVectorEnv(2, "brookside", autoreset_mode=AutoresetMode.DISABLED)
     observations, infos = env.reset(seed=0)
     outcomes: dict[int, bool] = {}
     while len(outcomes) < 2:
@@ -226,7 +226,7 @@ def test_obedient_driver_succeeds_in_a_batch() -> None:
             outcomes[number] = bool(infos["is_success"][number])
             observations, infos = env.reset(seed=0, options={"reset_mask": terminated | truncated})
             infos["action_mask"] = env.action_masks()
-    assert outcomes == {seed: drive(NavigationEnv(), obey, seed)["is_success"] for seed in (0, 1)}
+    assert outcomes == {seed: drive(NavigationEnv("brookside"), obey, seed)["is_success"] for seed in (0, 1)}
 
 
 @pytest.mark.parametrize("kind", [NavigationVectorEnv, NavigationContinuousVectorEnv])
@@ -245,7 +245,7 @@ def test_states_of_a_batch_are_restored(kind: type[DrivingVectorEnv]) -> None:
 
 
 def test_any_environment_is_drawn() -> None:
-    env = NavigationVectorEnv(2, render_mode="rgb_array", view="session")
+    env = NavigationVectorEnv(2, "brookside", render_mode="rgb_array", view="session")
     env.reset(seed=6)
     (frame,) = env.render() or ()
     other = env.render_one(1)
@@ -255,14 +255,14 @@ def test_any_environment_is_drawn() -> None:
 
 def test_mistakes_are_explained() -> None:
     with pytest.raises(ValueError, match="num_envs is 0"):
-        NavigationVectorEnv(0)
+        NavigationVectorEnv(0, "brookside")
     with pytest.raises(ValueError, match="town is an empty sequence"):
         NavigationVectorEnv(2, [])
     with pytest.raises(ValueError, match="None or 'rgb_array'"):
-        NavigationVectorEnv(2, render_mode="human")
+        NavigationVectorEnv(2, "brookside", render_mode="human")
     with pytest.raises(ValueError, match="threads is 0"):
-        NavigationVectorEnv(2, threads=0)
-    env = NavigationVectorEnv(2, max_seconds=10.0, autoreset_mode="Disabled")
+        NavigationVectorEnv(2, "brookside", threads=0)
+    env = NavigationVectorEnv(2, "brookside", max_seconds=10.0, autoreset_mode="Disabled")
     with pytest.raises(gym.error.ResetNeeded, match=r"environments \[0, 1\] wait for a reset"):
         env.step(np.array([0, 0]))
     env.reset(seed=1)
@@ -281,7 +281,7 @@ def test_mistakes_are_explained() -> None:
 
 
 def test_session_that_is_looked_up_late_is_the_one_that_was_played() -> None:
-    watched, alone = (NavigationVectorEnv(3, guidance="goals", max_seconds=60.0) for _ in range(2))
+    watched, alone = (NavigationVectorEnv(3, "brookside", guidance="goals", max_seconds=60.0) for _ in range(2))
     check_equal(watched.reset(seed=21), alone.reset(seed=21))
     rng = np.random.default_rng(2)
     for _ in range(40):

@@ -32,7 +32,7 @@ def no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def co_wizard(view: str) -> gym.Env[Any, Any]:
     return gym.make(
-        "dorothie_gym/CoWizard-v0", render_mode="rgb_array", config=CONFIG, partners=SILENT, view=view
+        "dorothie_gym/CoWizard-v0", render_mode="rgb_array", config=CONFIG, partners=SILENT, view=view, town="brookside"
     ).unwrapped
 
 
@@ -119,7 +119,9 @@ def test_unknown_view_is_refused(name: str) -> None:
 def test_picture_of_a_navigation_shows_the_instruction(view: str) -> None:
     drawn = []
     for guidance in ("turns", "goals"):
-        env = gym.make("dorothie_gym/Navigation-v0", render_mode="rgb_array", guidance=guidance, view=view)
+        env = gym.make(
+            "dorothie_gym/Navigation-v0", render_mode="rgb_array", guidance=guidance, view=view, town="brookside"
+        )
         env.reset(seed=3)
         drawn.append(np.asarray(env.render())[:, 900:])  # the panel
     assert not np.array_equal(*drawn)
@@ -144,7 +146,9 @@ def test_window_is_paced_at_the_frame_rate(monkeypatch: pytest.MonkeyPatch) -> N
 
     rates = []
     monkeypatch.setattr(frames.HumanWindow, "show", lambda self, frame, rate=0.0: rates.append(rate))
-    env = gym.make("dorothie_gym/Navigation-continuous-v0", render_mode="human", decision_frequency=15.0)
+    env = gym.make(
+        "dorothie_gym/Navigation-continuous-v0", render_mode="human", decision_frequency=15.0, town="brookside"
+    )
     env.reset(seed=0)
     env.step(np.zeros(3, dtype=np.float32))
     env.close()
@@ -241,7 +245,7 @@ def test_an_unknown_view_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ValueError, match="render_view is 'side'; it must be one of map, camera, both"):
         duo("side")
     with pytest.raises(ValueError, match="it must be one of map, camera, both"):
-        gym.make("dorothie_gym/Navigation-v0", render_view="windscreen")
+        gym.make("dorothie_gym/Navigation-v0", render_view="windscreen", town="brookside")
 
 
 @pytest.mark.long

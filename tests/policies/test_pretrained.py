@@ -16,7 +16,7 @@ from dorothie_gym.cli import app
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.evaluation.analysis.intervals import wilson_interval
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, roll_out
-from dorothie_gym.maps.catalogue import SEEN_TOWNS
+from dorothie_gym.maps.folds import SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import (
     ALL_SCRIPTED,

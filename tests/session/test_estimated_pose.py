@@ -19,7 +19,7 @@ KINDS = ObjectColumn.KIND
 
 def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: int = 8) -> DuoWizardEnv:
     """Returns a session whose pose estimate is off by distances ahead and to the right [m] and by an angle [rad]."""
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=vehicles, pedestrians=4)))
+    env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=vehicles, pedestrians=4)))
     env.reset(seed=0)  # begins more than 100 m before a junction
     for _ in range(6):
         env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
@@ -97,7 +97,7 @@ def test_waypoints_are_extended_straight_before_path_start() -> None:
 
 
 def test_pose_drifts_without_gps_and_recovers() -> None:
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
+    env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     env.reset(seed=8)
     world = env.session.world
     world.set_fault(Sensor.GPS, True)
@@ -113,7 +113,7 @@ def test_pose_drifts_without_gps_and_recovers() -> None:
 
 @pytest.mark.parametrize("frames", [1, 7, 15, 100])
 def test_fault_ends_within_thirty_seconds_at_any_decision_frequency(frames: int) -> None:
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
+    env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     env.reset(seed=8)
     world = env.session.world
     world.set_fault(Sensor.GPS, True)

@@ -22,7 +22,7 @@ ALONE = WorldConfig(vehicles=0, pedestrians=0)
 
 
 def noisy(rate: float, **settings: Any) -> DuoWizardEnv:
-    return DuoWizardEnv(config=EnvConfig(world=ALONE, word_error_rate=rate, **settings))
+    return DuoWizardEnv("brookside", config=EnvConfig(world=ALONE, word_error_rate=rate, **settings))
 
 
 def talk(env: DuoWizardEnv, seed: int, decisions: int = 160) -> list[tuple[Any, list[dict[str, Any]]]]:
@@ -96,7 +96,7 @@ def test_sessions_without_word_errors_have_no_transcripts() -> None:
 
 def test_word_errors_use_their_own_random_stream() -> None:
     """With equal actions, only the transcripts differ; generated words and traffic are equal."""
-    clear, unclear = (DuoWizardEnv(config=EnvConfig(word_error_rate=rate)) for rate in (0.0, 0.5))
+    clear, unclear = (DuoWizardEnv("brookside", config=EnvConfig(word_error_rate=rate)) for rate in (0.0, 0.5))
     for env in (clear, unclear):
         env.reset(seed=8)
     for k in range(40):

@@ -13,7 +13,7 @@ from dorothie_gym.sim.state.codes import Motion
 
 @pytest.fixture(scope="module")
 def env() -> DuoWizardEnv:
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=12, pedestrians=6)))
+    env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=12, pedestrians=6)))
     env.reset(seed=8)
     return env
 
@@ -34,7 +34,7 @@ def test_objects_are_sorted_by_distance_and_within_sight(env: DuoWizardEnv) -> N
 
 
 def test_exits_are_observed_before_first_turn() -> None:
-    env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
+    env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     observations, _ = env.reset(seed=8)
     for _ in range(80):
         observations, *_ = env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})

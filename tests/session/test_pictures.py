@@ -38,7 +38,7 @@ def played(env: DuoWizardEnv, decisions: int = 4, seed: int = 3) -> dict[str, An
 
 
 def test_participant_and_co_wizard_observe_rgb_and_the_ad_wizard_does_not() -> None:
-    env = DuoWizardEnv(config=CONFIG)
+    env = DuoWizardEnv("brookside", config=CONFIG)
     observations = played(env)
     for agent in ("participant", "co_wizard"):
         assert env.observation_space(agent)["camera"].shape == (64, 96, 3)
@@ -53,7 +53,7 @@ def test_participant_and_co_wizard_observe_rgb_and_the_ad_wizard_does_not() -> N
 
 
 def test_privileged_outputs_are_observed_where_they_are_asked_for() -> None:
-    env = DuoWizardEnv(config=EnvConfig(camera=ALL))
+    env = DuoWizardEnv("brookside", config=EnvConfig(camera=ALL))
     observation = played(env)["co_wizard"]
     space = env.observation_space("co_wizard")
     assert {"camera", "depth", "semantic", "instance"} <= set(space.spaces)
@@ -65,13 +65,13 @@ def test_privileged_outputs_are_observed_where_they_are_asked_for() -> None:
 
 
 def test_the_environments_pass_the_checks_of_gymnasium_and_pettingzoo() -> None:
-    parallel_api_test(DuoWizardEnv(config=CONFIG), num_cycles=6)
-    env = gym.make("dorothie_gym/CoWizard-v0", config=CONFIG)
+    parallel_api_test(DuoWizardEnv("brookside", config=CONFIG), num_cycles=6)
+    env = gym.make("dorothie_gym/CoWizard-v0", config=CONFIG, town="brookside")
     check_env(env.unwrapped, skip_render_check=True)
 
 
 def test_a_camera_changes_nothing_else() -> None:
-    with_camera, without = DuoWizardEnv(config=CONFIG), DuoWizardEnv(config=EnvConfig())
+    with_camera, without = DuoWizardEnv("brookside", config=CONFIG), DuoWizardEnv("brookside", config=EnvConfig())
     seen, expected = played(with_camera), played(without)
     assert without.session.picture is None
     for agent, observation in expected.items():
@@ -82,9 +82,9 @@ def test_a_camera_changes_nothing_else() -> None:
 
 
 def test_equal_seeds_give_equal_pictures_and_copies_draw_their_own() -> None:
-    env = DuoWizardEnv(config=CONFIG)
+    env = DuoWizardEnv("brookside", config=CONFIG)
     observations = played(env)
-    again = played(DuoWizardEnv(config=CONFIG))
+    again = played(DuoWizardEnv("brookside", config=CONFIG))
     np.testing.assert_array_equal(again["co_wizard"]["camera"], observations["co_wizard"]["camera"])
     state, copy = env.clone_state(), deepcopy(env)
     actions = {agent: env.action_space(agent).sample() for agent in env.agents}
@@ -96,7 +96,7 @@ def test_equal_seeds_give_equal_pictures_and_copies_draw_their_own() -> None:
 
 
 def test_a_faulty_view_blackens_the_picture_of_the_co_wizard() -> None:
-    env = DuoWizardEnv(config=CONFIG)
+    env = DuoWizardEnv("brookside", config=CONFIG)
     played(env)
     world = env.session.world
     world.faults[Sensor.VIEW] = world.frame + 300

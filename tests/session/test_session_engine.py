@@ -27,7 +27,7 @@ ALONE = EnvConfig(words_per_second=2.5, world=WorldConfig(vehicles=0, pedestrian
 
 @pytest.fixture
 def env() -> DuoWizardEnv:
-    env = DuoWizardEnv(config=ALONE)
+    env = DuoWizardEnv("brookside", config=ALONE)
     env.reset(seed=5)
     return env
 
@@ -75,7 +75,7 @@ def test_message_reaches_the_participant_only(env: DuoWizardEnv) -> None:
 
 
 def test_co_wizard_sees_landmarks_that_are_not_hidden_only() -> None:
-    env = DuoWizardEnv(config=ALONE)
+    env = DuoWizardEnv("brookside", config=ALONE)
     hidden = 0
     for seed in range(12):
         observations, _ = env.reset(seed=seed)
@@ -93,7 +93,7 @@ def test_co_wizard_sees_landmarks_that_are_not_hidden_only() -> None:
 
 
 def test_participant_does_not_see_subgoals_before_they_are_triggered() -> None:
-    env = DuoWizardEnv(config=ALONE)
+    env = DuoWizardEnv("brookside", config=ALONE)
     waiting = 0
     for seed in range(20):
         observations, _ = env.reset(seed=seed)

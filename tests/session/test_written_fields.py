@@ -17,7 +17,7 @@ MOST = 6
 
 @pytest.mark.long
 def test_every_field_is_written() -> None:
-    env = DuoWizardEnv(config=EnvConfig(max_seconds=420.0))
+    env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=420.0))
     missing = {(str(role), field) for role in AGENT_ROLES for field in env.observation_space(str(role)).spaces}
     assert len(missing) > 40
     sessions = (

@@ -16,7 +16,7 @@ FEATURES = [
 
 @pytest.fixture(scope="module")
 def env() -> TownEnv:
-    env = TownEnv({"vehicles": 12, "pedestrians": 12, "policy_frequency": 5})
+    env = TownEnv({"vehicles": 12, "pedestrians": 12, "policy_frequency": 5}, town="brookside")
     env.reset(seed=6)
     env.road.objects.append(Obstacle(env.road, env.vehicle.position + 12.0))
     return env
@@ -53,7 +53,7 @@ def test_one_row_is_the_observer_alone(env: TownEnv) -> None:
 
 
 def test_observation_without_a_road_is_zero() -> None:
-    env = TownEnv({"vehicles": 0})
+    env = TownEnv({"vehicles": 0}, town="brookside")
     env.road = None
     assert not env.observation_type.observe().any()
 
@@ -82,7 +82,7 @@ def test_grids_are_highway_envs(town: str, config: dict[str, Any]) -> None:
 
 
 def test_images_of_grids_show_nothing_where_nothing_is() -> None:
-    env = TownEnv({"vehicles": 10})
+    env = TownEnv({"vehicles": 10}, town="brookside")
     image = OccupancyGrid(env, as_image=True, features=["presence", "on_road"]).observe()
     assert image.dtype == np.uint8
     assert set(np.unique(image)) == {0, 255}

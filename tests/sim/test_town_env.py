@@ -33,7 +33,7 @@ def drive(env: TownEnv, seed: int, steps: int) -> list[tuple[float, bool, bool]]
 
 
 def test_town_env_is_an_environment_of_highway_env() -> None:
-    env = gym.make("dorothie_gym/Town-v0", config={"vehicles": 6}).unwrapped
+    env = gym.make("dorothie_gym/Town-v0", config={"vehicles": 6}, town="brookside").unwrapped
     assert isinstance(env, AbstractEnv)
     assert isinstance(env.road.network, TownNetwork)
     assert len(env.road.vehicles) == 7
@@ -43,18 +43,22 @@ def test_town_env_is_an_environment_of_highway_env() -> None:
 
 
 def test_progress_on_the_road_is_rewarded() -> None:
-    env = TownEnv({"vehicles": 0})
+    env = TownEnv({"vehicles": 0}, town="brookside")
     results = drive(env, seed=1, steps=15)
     assert env.vehicle.on_road
     assert results[-1][0] > 0.9 * env.vehicle.speed / env.config["reward_speed"] > 0.3
 
 
 def test_episode_truncates_after_its_duration() -> None:
-    assert [row[2] for row in drive(TownEnv({"vehicles": 0, "duration": 3.0}), seed=1, steps=9)] == [False, False, True]
+    assert [row[2] for row in drive(TownEnv({"vehicles": 0, "duration": 3.0}, town="brookside"), seed=1, steps=9)] == [
+        False,
+        False,
+        True,
+    ]
 
 
 def test_crash_terminates_and_is_penalised() -> None:
-    env = TownEnv({"vehicles": 0})
+    env = TownEnv({"vehicles": 0}, town="brookside")
     env.reset(seed=1)
     env.vehicle.crashed = True
     _, reward, terminated, truncated, info = env.step(1)
@@ -115,7 +119,7 @@ def parts(space: Any) -> list[Any]:
 @pytest.mark.parametrize("name", OBSERVATIONS)
 def test_all_observation_types_work(name: str) -> None:
     config, shape = OBSERVATIONS[name]
-    env = TownEnv({"observation": config, "pedestrians": 6})
+    env = TownEnv({"observation": config, "pedestrians": 6}, town="brookside")
     observation, _ = env.reset(seed=3)
     env.action_space.seed(3)
     for _ in range(20):
@@ -151,7 +155,7 @@ ACTIONS: dict[str, tuple[dict[str, Any], type[Vehicle], Any]] = {
 @pytest.mark.parametrize("name", ACTIONS)
 def test_all_action_types_work(name: str) -> None:
     config, kind, space = ACTIONS[name]
-    env = TownEnv({"action": config, "vehicles": 6})
+    env = TownEnv({"action": config, "vehicles": 6}, town="brookside")
     observation, _ = env.reset(seed=3)
     env.action_space.seed(3)
     assert env.action_space == space
@@ -173,7 +177,10 @@ def test_observed_rows_are_the_rows_of_the_arrays() -> None:
         "normalize": False,
         "vehicles_count": 40,
     }
-    env = TownEnv({"observation": {**kinematics, "see_behind": True, "include_obstacles": False}, "vehicles": 15})
+    env = TownEnv(
+        {"observation": {**kinematics, "see_behind": True, "include_obstacles": False}, "vehicles": 15},
+        town="brookside",
+    )
     observation, _ = env.reset(seed=8)
     near = 0
     for _ in range(12):
@@ -196,14 +203,14 @@ def test_observed_rows_are_the_rows_of_the_arrays() -> None:
 
 
 def test_continuous_actions_work() -> None:
-    env = TownEnv({"action": {"type": "ContinuousAction"}})
+    env = TownEnv({"action": {"type": "ContinuousAction"}}, town="brookside")
     env.reset(seed=3)
     env.step(np.array([1.0, 0.0], dtype=np.float32))
     assert env.vehicle.speed > 1.0
 
 
 def test_rendering_shows_the_town() -> None:
-    env = TownEnv(render_mode="rgb_array")
+    env = TownEnv(render_mode="rgb_array", town="brookside")
     env.reset(seed=3)
     picture = env.render()
     assert picture is not None and picture.shape == (600, 600, 3)
@@ -212,11 +219,11 @@ def test_rendering_shows_the_town() -> None:
 
 
 def test_the_same_seed_drives_the_same() -> None:
-    assert drive(TownEnv(), 5, 12) == drive(TownEnv(), 5, 12)
+    assert drive(TownEnv(town="brookside"), 5, 12) == drive(TownEnv(town="brookside"), 5, 12)
 
 
 def test_the_town_may_change_with_a_reset(tmp_path: Any) -> None:
-    env = TownEnv({"vehicles": 2})
+    env = TownEnv({"vehicles": 2}, town="brookside")
     before = env.road.network
     env.reset(seed=1)
     assert env.road.network is before
@@ -232,16 +239,16 @@ def test_the_same_seed_and_actions_give_the_same_bytes() -> None:
             found += [observation.tobytes(), np.float64(reward).tobytes(), env.road.arrays.tobytes()]
         return found
 
-    env = TownEnv({"pedestrians": 8})
+    env = TownEnv({"pedestrians": 8}, town="brookside")
     first = play(env)
     env.reset(seed=12)
-    assert play(env) == first == play(TownEnv({"pedestrians": 8}))
+    assert play(env) == first == play(TownEnv({"pedestrians": 8}, town="brookside"))
     assert len(set(first)) > len(first) // 2
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_all_others_are_present_and_none_is_close_at_the_start(seed: int) -> None:
-    env = TownEnv({"vehicles": 20, "pedestrians": 15})
+    env = TownEnv({"vehicles": 20, "pedestrians": 15}, town="brookside")
     env.reset(seed=seed)
     others = [*env.road.vehicles[1:], *env.road.objects]
     assert (len(env.road.vehicles), len(env.road.objects)) == (21, 15)
@@ -255,13 +262,16 @@ def test_all_others_are_present_and_none_is_close_at_the_start(seed: int) -> Non
 
 
 def test_a_town_that_is_too_small_for_all_takes_as_many_as_fit() -> None:
-    env = TownEnv({"vehicles": 150})
+    env = TownEnv({"vehicles": 150}, town="brookside")
     assert 20 < len(env.road.vehicles) < 151
     env.step(1)
 
 
 def test_touching_a_pedestrian_is_an_observed_crash() -> None:
-    env = TownEnv({"vehicles": 1, "pedestrians": 1, "action": {"type": "ContinuousAction"}, "policy_frequency": 5})
+    env = TownEnv(
+        {"vehicles": 1, "pedestrians": 1, "action": {"type": "ContinuousAction"}, "policy_frequency": 5},
+        town="brookside",
+    )
     for thing in (lambda: env.road.vehicles[1], lambda: env.road.objects[0]):
         env.reset(seed=2)
         other = thing()
@@ -276,7 +286,7 @@ def test_touching_a_pedestrian_is_an_observed_crash() -> None:
 
 
 def test_gymnasiums_checker_passes_without_warnings() -> None:
-    env = gym.make("dorothie_gym/Town-v0", disable_env_checker=True).unwrapped
+    env = gym.make("dorothie_gym/Town-v0", disable_env_checker=True, town="brookside").unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env, skip_render_check=True)
@@ -288,7 +298,7 @@ def test_stable_baselines_checker_passes_without_warnings() -> None:
         warnings.simplefilter("error")
         # highway-env's `Kinematics` is a table, which a policy of vectors flattens
         warnings.filterwarnings("ignore", message="Your observation  has an unconventional shape")
-        checker.check_env(TownEnv(), warn=True)
+        checker.check_env(TownEnv(town="brookside"), warn=True)
 
 
 def test_simplified_and_changed_copies_are_independent() -> None:
@@ -315,7 +325,9 @@ def test_simplified_and_changed_copies_are_independent() -> None:
 
 
 def test_traces_are_drawn() -> None:
-    env = TownEnv({"show_trajectories": True, "vehicles": 5, "pedestrians": 3}, render_mode="rgb_array")
+    env = TownEnv(
+        {"show_trajectories": True, "vehicles": 5, "pedestrians": 3}, render_mode="rgb_array", town="brookside"
+    )
     env.reset(seed=3)
     for _ in range(2):
         env.step(3)

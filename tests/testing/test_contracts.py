@@ -135,7 +135,7 @@ def test_policy_that_remembers_outside_its_state_is_found() -> None:
 
 
 def test_co_wizard_observes_no_secrets() -> None:
-    check_observations_do_not_leak(DuoWizardEnv(config=QUIET), decisions=25)
+    check_observations_do_not_leak(DuoWizardEnv("brookside", config=QUIET), decisions=25)
 
 
 class LeakingEnv(DuoWizardEnv):
@@ -176,7 +176,7 @@ def test_town_with_a_fault_is_found() -> None:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recorded") / "session"
-    env = DuoWizardEnv(config=QUIET, max_cycles=20)
+    env = DuoWizardEnv("brookside", config=QUIET, max_cycles=20)
     play_session(env, {role: make_policy("scripted", role, env.limits) for role in
                        (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)}, seed=3, folder=folder)  # fmt: skip
     return folder

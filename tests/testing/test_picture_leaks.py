@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
+from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS, load_town
 from dorothie_gym.pictures.camera.camera_perception import CameraPerception
 from dorothie_gym.pictures.camera.scenery import landmarks as landmark_models
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, PerceptionModel
@@ -49,7 +49,7 @@ def test_hidden_landmarks_change_no_picture_while_out_of_view(town: str, config:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("town", [*UNSEEN_TOWNS, *SEEN_TOWNS])
+@pytest.mark.parametrize("town", [*DEVELOPMENT_TOWNS, *SEEN_TOWNS])
 @pytest.mark.parametrize("config", [CONFIG, SYMBOLIC], ids=["camera", "symbolic"])
 def test_hidden_landmarks_change_no_picture_in_many_sessions(town: str, config: EnvConfig) -> None:
     env = DuoWizardEnv(town, config=config)

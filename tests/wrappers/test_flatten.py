@@ -184,7 +184,7 @@ def test_action_of_wrong_shape_raises_error() -> None:
 
 
 def test_flat_environment_is_recreated_from_spec() -> None:
-    env = flatten(gym.make("dorothie_gym/CoWizard-v0", max_cycles=3), fields=("physical",))
+    env = flatten(gym.make("dorothie_gym/CoWizard-v0", max_cycles=3, town="brookside"), fields=("physical",))
     assert env.spec is not None
     again = gym.make(env.spec)
     assert again.action_space == env.action_space

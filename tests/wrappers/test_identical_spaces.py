@@ -19,7 +19,7 @@ FEW = {"participant": ["move"], "co_wizard": ["physical", "angle"], "ad_wizard":
 
 
 def make(max_cycles: int = 30) -> DuoWizardEnv:
-    return DuoWizardEnv(max_cycles=max_cycles)
+    return DuoWizardEnv("brookside", max_cycles=max_cycles)
 
 
 def test_environment_passes_pettingzoo_checks() -> None:

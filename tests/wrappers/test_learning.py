@@ -26,7 +26,7 @@ def one_thread() -> Iterator[None]:
 
 
 def driving() -> Any:
-    env = gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20)
+    env = gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20, town="brookside")
     return dorothie_gym.flatten(env, fields=("physical", "angle"))
 
 
@@ -42,7 +42,7 @@ def test_learner_improves(package: str, name: str) -> None:
 def test_masked_learner_takes_feasible_actions_only() -> None:
     contrib = pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
     env = dorothie_gym.flatten(
-        gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20), fields=("physical",)
+        gym.make("dorothie_gym/CoWizard-v0", partners=QUIET, max_cycles=20, town="brookside"), fields=("physical",)
     )
     model = contrib.MaskablePPO("MultiInputPolicy", env, n_steps=8, batch_size=8, device="cpu", seed=0)
     observation, _ = env.reset(seed=1)

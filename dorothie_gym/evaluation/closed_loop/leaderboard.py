@@ -41,6 +41,8 @@ OTHER: Final = "other"
 
 PART_TITLES: Final[Mapping[str, str]] = {
     "seen": "Seen towns",
+    "development": "Development town",
+    "validation": "Validation towns",
     "unseen": "Unseen towns",
     IMPORTED: "Imported towns",
     OTHER: "Other towns",

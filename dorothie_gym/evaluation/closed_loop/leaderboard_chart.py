@@ -21,7 +21,14 @@ CHART_METRICS: Final = ("success", "goal_condition_success", "driving_score", "s
 """Metrics of the panels of the picture."""
 
 _ROW, _TOP, _BOTTOM = 0.5, 1.2, 0.6
-_COLOURS: Final = {"seen": "#2f62c4", "unseen": "#cf7f1d", IMPORTED: "#8a4fb0", OTHER: "#5f8a3a"}
+_COLOURS: Final = {
+    "seen": "#2f62c4",
+    "development": "#2f8f8a",
+    "validation": "#9a7b1f",
+    "unseen": "#cf7f1d",
+    IMPORTED: "#8a4fb0",
+    OTHER: "#5f8a3a",
+}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,14 +9,17 @@ from typing import Final
 from dorothie_gym.evaluation.closed_loop.leaderboard import ENOUGH, IMPORTED
 from dorothie_gym.evaluation.closed_loop.many_rollouts import folder_name
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
-from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.maps.folds import FOLD_TOWNS, TownFold
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, LANE_FOLLOW, Player
 from dorothie_gym.policies.pretrained import names_for
 from dorothie_gym.session.config import EnvConfig
 
-PARTS: Final = ("seen", "unseen")
+PARTS: Final[tuple[str, ...]] = (TownFold.SEEN, TownFold.UNSEEN)
 """Parts that are played by default."""
+
+CHOICES: Final[tuple[str, ...]] = (TownFold.SEEN, TownFold.DEVELOPMENT, TownFold.UNSEEN)
+"""Parts that can be played."""
 
 
 def usual_rows() -> tuple[str, ...]:
@@ -30,7 +33,7 @@ class LeaderboardPlan:
 
     Attributes:
         co_wizards: players, at least one; participant and Ad-Wizard are scripted.
-        parts: parts to be played: "seen", "unseen".
+        parts: parts to be played, of `CHOICES`.
         imported: OpenDRIVE files; if there are any, the part "imported" is played in them.
         sessions: number of sessions of each row.
         seed: seed of the sessions.
@@ -46,9 +49,9 @@ class LeaderboardPlan:
 
     def __post_init__(self) -> None:
         """Checks the fields."""
-        unknown = [part for part in self.parts if part not in PARTS]
+        unknown = [part for part in self.parts if part not in CHOICES]
         if unknown or not (self.parts or self.imported):
-            raise ValueError(f"parts is {', '.join(self.parts) or 'empty'}; give seen, unseen, or both")
+            raise ValueError(f"parts is {', '.join(self.parts) or 'empty'}; give some of {', '.join(CHOICES)}")
         wrong = [name for name in self.imported if not name.lower().endswith(".xodr")]
         if wrong:
             raise ValueError(f"imported has {wrong[0]}; give OpenDRIVE files (.xodr)")
@@ -58,7 +61,7 @@ class LeaderboardPlan:
 
     def rollouts(self) -> dict[str, RolloutSettings]:
         """Returns the rollouts by the name of their folder, part by part."""
-        towns = {"seen": SEEN_TOWNS, "unseen": UNSEEN_TOWNS, IMPORTED: self.imported}
+        towns = {str(fold): there for fold, there in FOLD_TOWNS.items()} | {IMPORTED: self.imported}
         parts = (*self.parts, *((IMPORTED,) if self.imported else ()))
         return {
             f"{part}-{folder_name(player, Role.CO_WIZARD)}": RolloutSettings(

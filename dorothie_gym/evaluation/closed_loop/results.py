@@ -300,6 +300,9 @@ EXCEPTION_METRICS: Final = ("success", "driving_score", "exceptions_met", "excep
 MAX_PRINTED_SEEDS: Final = 20
 """Number of seeds that are printed; the file and --json have all."""
 
+MAX_PRINTED_TOWNS: Final = 20
+"""Number of towns up to which there is a table of towns; the file and --json have all."""
+
 
 def print_result(result: RolloutResult, console: Console) -> None:
     """Prints the tables of a rollout, its seeds, and its errors."""
@@ -308,12 +311,14 @@ def print_result(result: RolloutResult, console: Console) -> None:
     errors = f", {table.errored} of them ended in an error" if table.errored else ""
     console.print(f"{table.sessions} sessions{errors}: {cast}", markup=False, soft_wrap=True)
     console.print(_overall(table))
-    for name, parts, keys in (
-        ("town", result.per_town(), TOWN_METRICS),
-        ("exception", result.per_exception(), EXCEPTION_METRICS),
-    ):
-        for part in _parts(name, parts, keys, console.width):
+    towns = result.per_town()
+    if len(towns) > MAX_PRINTED_TOWNS:
+        console.print(f"{len(towns)} towns; --json and the file have the figures of each")
+    else:
+        for part in _parts("town", towns, TOWN_METRICS, console.width):
             console.print(part)
+    for part in _parts("exception", result.per_exception(), EXCEPTION_METRICS, console.width):
+        console.print(part)
     if usage := result.usage():
         console.print(usage_table(usage, table.sessions))
     seeds = [str(row.seed) for row in result.rows]

@@ -14,7 +14,8 @@ from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResu
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
 from dorothie_gym.evaluation.closed_loop.usage import SessionUsage, read_usage
 from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
-from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, load_town
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.folds import FOLD_TOWNS, VALIDATION_TOWNS, TownFold
 from dorothie_gym.maps.generated.specification import parse_series, split_names
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
@@ -30,9 +31,8 @@ _ROLLOUTS: Final = 7
 """Branch of the seed; corpora draw from another, so that no policy is tested on a session that it was trained on."""
 
 _GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
-    "seen": SEEN_TOWNS,
-    "unseen": UNSEEN_TOWNS,
-    "all": (*SEEN_TOWNS, *UNSEEN_TOWNS),
+    **{str(fold): towns for fold, towns in FOLD_TOWNS.items()},
+    "all": tuple(town for fold in (TownFold.SEEN, TownFold.DEVELOPMENT, TownFold.UNSEEN) for town in FOLD_TOWNS[fold]),
 }
 
 
@@ -72,7 +72,7 @@ class RolloutSettings:
     """
 
     cast: Mapping[Role, Player] = field(default_factory=lambda: ALL_SCRIPTED)
-    towns: tuple[str, ...] = UNSEEN_TOWNS
+    towns: tuple[str, ...] = VALIDATION_TOWNS
     sessions: int = 20
     seed: int = 0
     config: EnvConfig = field(default_factory=EnvConfig)
@@ -124,7 +124,7 @@ def command_of(settings: Mapping[str, Any]) -> str:
     words = ["dorothie-gym", "rollout"]
     for role in (Role.CO_WIZARD, Role.PARTICIPANT, Role.AD_WIZARD):
         words += [f"--{str(role).replace('_', '-')}", str(settings[str(role)])]
-    words += ["--towns", ",".join(settings["towns"])]
+    words += ["--towns", towns_text(settings["towns"])]
     words += ["--sessions", str(settings["sessions_planned"]), "--seed", str(settings["seed"])]
     for option, name in (("--max-seconds", "max_seconds"), ("--word-errors", "word_error_rate")):
         if config[name] != getattr(usual, name):
@@ -152,7 +152,7 @@ def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str
 
 
 def parse_towns(text: str) -> tuple[str, ...]:
-    """Parses a list of towns: "seen", "unseen", "all", names or files, separated by commas.
+    """Parses a list of towns: "seen", "development", "validation", "unseen", "all", names or files, with commas.
 
     "generated" is another town for each session.
 
@@ -166,13 +166,20 @@ def parse_towns(text: str) -> tuple[str, ...]:
             load_town(name)
         found += [town for town in _GROUPS.get(name, (name,)) if town not in found]
     if not found:
-        raise ValueError(f"towns is {text!r}; give seen, unseen, all, or names separated by commas")
+        groups = ", ".join(_GROUPS)
+        raise ValueError(f"towns is {text!r}; give {groups}, or names separated by commas")
     return tuple(found)
 
 
-def fold_of_towns(towns: Sequence[str]) -> str | None:
-    """Returns "seen" or "unseen" if all towns belong to that fold; otherwise None."""
-    return next((fold for fold in ("seen", "unseen") if towns and set(towns) <= set(_GROUPS[fold])), None)
+def fold_of_towns(towns: Sequence[str]) -> TownFold | None:
+    """Returns the fold to whose list all towns belong, or None."""
+    return next((fold for fold, there in FOLD_TOWNS.items() if towns and set(towns) <= set(there)), None)
+
+
+def towns_text(towns: Sequence[str]) -> str:
+    """Returns towns as `parse_towns` reads them; a fold of generated towns by its name."""
+    whole = (TownFold.VALIDATION, TownFold.UNSEEN)
+    return next((str(fold) for fold in whole if tuple(towns) == FOLD_TOWNS[fold]), ",".join(towns))
 
 
 def _seed(seed: int, number: int) -> int:

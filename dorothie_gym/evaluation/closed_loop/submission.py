@@ -30,11 +30,13 @@ from dorothie_gym.evaluation.closed_loop.running import (
     RolloutSettings,
     fold_of_towns,
     parse_towns,
+    towns_text,
 )
 from dorothie_gym.evaluation.closed_loop.session_check import SessionChecker, SessionFindings, SessionTask
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER
 from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
+from dorothie_gym.maps.folds import TownFold
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
@@ -69,7 +71,7 @@ class LeaderboardProtocol:
         config: settings of the engine.
     """
 
-    folds: tuple[str, ...] = ("seen", "unseen")
+    folds: tuple[str, ...] = (TownFold.SEEN, TownFold.DEVELOPMENT, TownFold.UNSEEN)
     sessions: int = 100
     seed: int = 0
     config: EnvConfig = EnvConfig()
@@ -83,8 +85,8 @@ class LeaderboardProtocol:
         towns = [str(town) for town in settings["towns"]]
         whole = {fold: list(parse_towns(fold)) for fold in self.folds}
         if fold_of_towns(towns) not in self.folds or towns not in whole.values():
-            choices = " or ".join(", ".join(towns) for towns in whole.values())
-            yield f"towns are {one_line(', '.join(towns))}; the protocol has {choices}, in this order"
+            choices = " or ".join(towns_text(there) for there in whole.values())
+            yield f"towns are {one_line(towns_text(towns))}; the protocol has {choices}, in this order"
         if settings["sessions_planned"] != self.sessions:
             yield f"{settings['sessions_planned']} sessions; the protocol has {self.sessions}"
         if settings["seed"] != self.seed:

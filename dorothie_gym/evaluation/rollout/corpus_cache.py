@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import CacheError
-from dorothie_gym.evaluation.rollout.corpus_generation import generate_corpus
+from dorothie_gym.evaluation.rollout.corpus_generation import generate_corpus, named_towns
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.header import FORMAT_VERSION
 from dorothie_gym.support.user_cache import (
@@ -57,7 +57,14 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
     """
     config = CONFIG if config is None else config
     sessions = SESSIONS if sessions is None else sessions
-    key = {"sealed": True, "format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": config.record()}
+    key = {
+        "sealed": True,
+        "format": FORMAT_VERSION,
+        "sessions": sessions,
+        "seed": seed,
+        "config": config.record(),
+        **named_towns(),
+    }
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
     cache = cache_folder()
     if cache is None:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from dorothie_gym.archive.corpus import FOLDS, PAPER_FOLDS, Fold, ManifestRow, manifest_row, write_manifest
 from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
-from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.maps.folds import SEEN_TOWNS, UNSEEN_TOWNS, VALIDATION_TOWNS, check_training_towns
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, safe_name
@@ -20,7 +21,10 @@ from dorothie_gym.session.recording.session import session_state
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())
 """Sessions of the paper's corpus."""
 
-_UNSEEN: Final = frozenset((Fold.VAL_UNSEEN, Fold.TEST_UNSEEN))
+UNSEEN_FOLDS: Final[Mapping[Fold, tuple[str, ...]]] = MappingProxyType(
+    {Fold.VAL_UNSEEN: VALIDATION_TOWNS, Fold.TEST_UNSEEN: UNSEEN_TOWNS}
+)
+"""Towns of the unseen folds, which take turns."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,16 +62,18 @@ def plan_corpus(sessions: int, seed: int, towns: Sequence[str] = SEEN_TOWNS) -> 
 
     Raises:
         ValueError: `sessions` is below 1, `seed` is negative, or there is no town.
+        TownError: a town is for validation or tests.
     """
     if not towns:
         raise ValueError("towns is empty; give at least one")
+    check_training_towns(towns)
     if sessions < 1:
         raise ValueError(f"sessions is {sessions}; it must be at least 1")
     if seed < 0:
         raise ValueError(f"seed is {seed}; it must be at least 0")
     plans: list[SessionPlan] = []
     for fold, count in fold_sizes(sessions).items():
-        there = UNSEEN_TOWNS if fold in _UNSEEN else towns
+        there = UNSEEN_FOLDS.get(fold, towns)
         for k in range(count):
             number = len(plans)
             plans.append(SessionPlan(number=number, fold=fold, town=there[k % len(there)], seed=_seed(seed, number)))
@@ -139,6 +145,7 @@ def generate_corpus(
 
     Raises:
         ValueError: no sessions or no workers, or a negative seed.
+        TownError: a town of the seen folds is for validation or tests.
         SessionError: the folder contains other files, or another process holds its lock.
         ProcessError: a session failed in another process, or there is no such cluster.
         OutputFolderError: the folder was deleted or replaced during the run.
@@ -147,7 +154,7 @@ def generate_corpus(
     plans, root, config = plan_corpus(sessions, seed, towns), Path(root), config or EnvConfig()
     job = SessionJob(
         settings_file=GENERATION_FILE,
-        settings={"sessions": sessions, "seed": seed, "config": config.record()} | _named(towns),
+        settings={"sessions": sessions, "seed": seed, "config": config.record(), **named_towns(towns)},
         config=config,
         cast=ALL_SCRIPTED,
         evaluate=_manifest_row,
@@ -166,9 +173,9 @@ def _manifest_row(played: PlayedSession) -> ManifestRow:
     return manifest_row(played.session, played.folder, played.root)
 
 
-def _named(towns: Sequence[str]) -> dict[str, object]:
-    """Returns the towns as a setting; nothing for the seen towns, as corpora had none before there was a choice."""
-    return {} if tuple(towns) == SEEN_TOWNS else {"towns": list(towns)}
+def named_towns(towns: Sequence[str] = SEEN_TOWNS) -> dict[str, object]:
+    """Returns the towns of a corpus as settings: those of the seen folds, and those of each unseen fold."""
+    return {"towns": list(towns), "unseen_towns": {str(fold): list(there) for fold, there in UNSEEN_FOLDS.items()}}
 
 
 def finished_sessions(root: Path | str, *, sessions: int, seed: int, towns: Sequence[str] = SEEN_TOWNS) -> int:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.errors import TownError
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.generated.grid import draw_grid
 from dorothie_gym.maps.generated.junction_control import control, ring_names, round_junctions, separate
 from dorothie_gym.maps.generated.mixed import draw_mixed
@@ -55,14 +56,14 @@ def generate_town(specification: TownSpecification) -> tuple[Town, ImportNotes]:
         TownError: no town was found.
     """
     _, layout = generate(specification)
-    return town_of_layout(layout, str(specification))
+    return town_of_layout(layout, str(specification), mirror=specification.traffic is DrivingSide.LEFT)
 
 
 def generate(specification: TownSpecification) -> tuple[str, Layout]:
     """Generates a town: the first draft, in a series that the seed determines, that can be laid out.
 
     Returns:
-        The town in the town language, and its layout.
+        The town in the town language, and its layout for traffic on the right (`town_of_layout` mirrors it).
 
     Raises:
         TownError: no draft can be laid out.
@@ -75,7 +76,7 @@ def generate(specification: TownSpecification) -> tuple[str, Layout]:
             continue
         text = town_text(town)
         try:
-            return text, lay_out(parse_plan(text, name))
+            return text, lay_out(parse_plan(text, name).right_handed())
         except TownError as error:  # streets that do not fit together: the next draft is another town
             fault = error
     raise TownError(name, "town", f"no town of this size and style was found; try another seed ({fault})")
@@ -104,6 +105,7 @@ def draft(specification: TownSpecification, attempt: int = 0) -> TownDraft | Non
         speed=_SPEED[size],
         streets=[StreetDraft(name="", chain=chain) for chain in chains],
         heights=heights,
+        traffic=specification.traffic,
     )
     classify(town, rng, size)
     _name(town, rng, rings)

@@ -1,14 +1,15 @@
-"""Names of generated towns: `generated:SEED`, optionally with the size and the style of the town."""
+"""Names of generated towns: `generated:SEED`, optionally with size, style and side of the traffic."""
 
 from __future__ import annotations
 
 import enum
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn, TypedDict
 
 from dorothie_gym.errors import TownError, did_you_mean
+from dorothie_gym.maps.driving_side import DrivingSide
 
 SERIES = "generated"
 """Name of the series of all generated towns."""
@@ -16,6 +17,10 @@ PREFIX = f"{SERIES}:"
 """Start of the name of each generated town."""
 MOST_SEED = 1_000_000_000_000
 """Seeds are smaller than this number."""
+FIRST_VALIDATION_SEED = 800_000_000_000
+"""Towns of this and higher seeds are not in series: they are for the choice of models."""
+FIRST_TEST_SEED = 900_000_000_000
+"""Towns of this and higher seeds are for tests only."""
 
 _SEED = re.compile("[0-9]{1,12}")
 _NEXT_NAME = re.compile(r",(?!\s*(?:size|style|traffic)\s*=)")
@@ -46,11 +51,14 @@ class TownSpecification:
         seed: seed, from 0 to `MOST_SEED` - 1.
         size: size; None lets the seed choose.
         style: plan of the streets; None lets the seed choose.
+        traffic: side of the road on which vehicles drive; with traffic on the left, a town is the mirror image of the
+            one with traffic on the right.
     """
 
     seed: int
     size: TownSize | None = None
     style: TownStyle | None = None
+    traffic: DrivingSide = DrivingSide.RIGHT
 
     def __post_init__(self) -> None:
         """Checks the seed."""
@@ -59,25 +67,32 @@ class TownSpecification:
 
     def __str__(self) -> str:
         """Returns the name of the town, always spelt in the same way."""
-        options = (("size", self.size), ("style", self.style))
+        side = None if self.traffic is DrivingSide.RIGHT else self.traffic
+        options = (("size", self.size), ("style", self.style), ("traffic", side))
         return f"{PREFIX}{self.seed}" + "".join(f",{key}={value}" for key, value in options if value is not None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TownSeries:
-    """Generated towns of one size and style, one for each seed.
+    """Generated towns of one size, style and side of the traffic, one for each seed, without those for tests.
 
     Attributes:
         size: size; None lets the seed choose.
         style: plan of the streets; None lets the seed choose.
+        traffic: side of the road on which vehicles drive.
     """
 
     size: TownSize | None = None
     style: TownStyle | None = None
+    traffic: DrivingSide = DrivingSide.RIGHT
 
     def name(self, seed: int) -> str:
-        """Returns the name of the town of a seed; seeds from `MOST_SEED` on begin with 0 again."""
-        return str(TownSpecification(seed=seed % MOST_SEED, size=self.size, style=self.style))
+        """Returns the name of the town of a seed; seeds from `FIRST_VALIDATION_SEED` on begin with 0 again."""
+        return str(replace(self._first, seed=seed % FIRST_VALIDATION_SEED))
+
+    @property
+    def _first(self) -> TownSpecification:
+        return TownSpecification(seed=0, size=self.size, style=self.style, traffic=self.traffic)
 
     def pool(self, count: int) -> tuple[str, ...]:
         """Returns the names of the first towns."""
@@ -117,32 +132,33 @@ def parse_specification(name: str) -> TownSpecification:
     return TownSpecification(seed=int(seed), **_read_options(name, options))
 
 
-class _Options(TypedDict):
-    size: TownSize | None
-    style: TownStyle | None
+class _Options(TypedDict, total=False):
+    size: TownSize
+    style: TownStyle
+    traffic: DrivingSide
 
 
 def _read_options(name: str, options: Sequence[str]) -> _Options:
-    values: dict[str, str] = {}
+    values = _Options()
     for option in options:
         key, equals, value = option.partition("=")
-        if key == "traffic":
-            _fail(name, "generated towns have right-hand traffic only; remove 'traffic'")
         if not equals or key not in _OPTIONS:
-            _fail(name, f"unknown option {option!r}; {did_you_mean(key, _OPTIONS)}known are size=... and style=...")
+            known = ", ".join(f"{each}=..." for each in _OPTIONS)
+            _fail(name, f"unknown option {option!r}; {did_you_mean(key, _OPTIONS)}known are {known}")
         if key in values:
             _fail(name, f"{key!r} is there twice; remove one")
-        known = [str(member) for member in _OPTIONS[key]]
-        if value not in known:
-            _fail(name, f"{key} is {value!r}; {did_you_mean(value, known)}known are {', '.join(known)}")
-        values[key] = value
-    return {
-        "size": TownSize(values["size"]) if "size" in values else None,
-        "style": TownStyle(values["style"]) if "style" in values else None,
-    }
+        members = [str(member) for member in _OPTIONS[key]]
+        if value not in members:
+            _fail(name, f"{key} is {value!r}; {did_you_mean(value, members)}known are {', '.join(members)}")
+        values[key] = _OPTIONS[key](value)  # type: ignore[literal-required]  # `key` is one of them
+    return values
 
 
-_OPTIONS: dict[str, type[TownSize] | type[TownStyle]] = {"size": TownSize, "style": TownStyle}
+_OPTIONS: dict[str, type[TownSize] | type[TownStyle] | type[DrivingSide]] = {
+    "size": TownSize,
+    "style": TownStyle,
+    "traffic": DrivingSide,
+}
 
 
 def _fail(name: str, reason: str) -> NoReturn:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.generated.named_streets import Chain
 from dorothie_gym.maps.generated.street_graph import GridPoint, StreetGraph
 from dorothie_gym.maps.town import SLOW_CRUISE
@@ -53,6 +54,8 @@ class TownDraft:
         heights: height of bends [m].
         lights: offset of the programme of lights [s], by junction.
         stops, yields, crosswalks: pairs of a junction and the index of a street.
+        traffic: side of the road on which vehicles drive. The draft is that of right-hand traffic; its text is the
+            mirror image if it is the left.
     """
 
     name: str
@@ -65,6 +68,7 @@ class TownDraft:
     stops: list[tuple[int, int]] = field(default_factory=list)
     yields: list[tuple[int, int]] = field(default_factory=list)
     crosswalks: list[tuple[int, int]] = field(default_factory=list)
+    traffic: DrivingSide = DrivingSide.RIGHT
 
     def streets_at(self, node: int) -> list[int]:
         """Returns the indices of the streets through a junction."""
@@ -92,13 +96,16 @@ def _lines(town: TownDraft) -> Iterator[str]:
     yield f"name: {_quoted(town.name)}"
     yield f"speed: {town.speed}"
     yield f"cruise: {SLOW_CRUISE:.0f}"
+    if town.traffic is DrivingSide.LEFT:
+        yield f"traffic: {town.traffic}"
+    sign = town.traffic.sign
     yield "junctions:"
     for node, (x, y) in sorted(graph.places.items()):
         if node in town.roundabouts:
             radius, lanes, name = town.roundabouts[node]
-            yield f"  {name}: {{at: [{x}, {y}], roundabout: {radius}, lanes: {lanes}}}"
+            yield f"  {name}: {{at: [{x}, {sign * y}], roundabout: {radius}, lanes: {lanes}}}"
         else:
-            yield f"  {names[node]}: [{x}, {y}]"
+            yield f"  {names[node]}: [{x}, {sign * y}]"
     yield "streets:"
     for street in town.streets:
         yield f"  {street.name}: {{through: [{', '.join(_course(town, street, names))}]{_properties(street, names)}}}"
@@ -118,12 +125,12 @@ def _quoted(text: str) -> str:
 
 
 def _course(town: TownDraft, street: StreetDraft, names: dict[int, str]) -> Iterator[str]:
-    chain = street.chain
+    chain, sign = street.chain, town.traffic.sign
     yield names[chain.nodes[0]]
     for start, end, edge in zip(chain.nodes, chain.nodes[1:], chain.edges, strict=False):
         for x, y in town.graph.points(edge, start)[1:-1]:
             height = town.heights.get((x, y))
-            yield f"[{x}, {y}]" if height is None else f"[{x}, {y}, {height:g}]"
+            yield f"[{x}, {sign * y}]" if height is None else f"[{x}, {sign * y}, {height:g}]"
         yield names[end]
 
 

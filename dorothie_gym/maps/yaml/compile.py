@@ -44,8 +44,7 @@ def read_yaml_town(path: str | FilePath) -> Town:
 def import_yaml_town(path: str | FilePath) -> tuple[Town, ImportNotes]:
     """Compiles a town file like `read_yaml_town`; also returns what was repaired: lanes that were too long."""
     plan = read_plan(FilePath(path))
-    left = plan.traffic is DrivingSide.LEFT
-    return town_of_layout(lay_out(plan.mirrored() if left else plan), str(path), mirror=left)
+    return town_of_layout(lay_out(plan.right_handed()), str(path), mirror=plan.traffic is DrivingSide.LEFT)
 
 
 def town_of_layout(layout: Layout, source: str, *, mirror: bool = False) -> tuple[Town, ImportNotes]:

@@ -140,8 +140,10 @@ class TownPlan:
     cruise: float | None = None
     traffic: DrivingSide = DrivingSide.RIGHT
 
-    def mirrored(self) -> TownPlan:
-        """Returns the plan with y negated: laid out for right-hand traffic, the mirror image of a left-hand town."""
+    def right_handed(self) -> TownPlan:
+        """Returns the plan to lay out, for right-hand traffic: that of a left-hand town with y negated."""
+        if self.traffic is DrivingSide.RIGHT:
+            return self
         streets = {street.id: _mirrored_street(street) for street in self.streets}
         stops, yields, crosswalks = (
             tuple((name, streets[street.id]) for name, street in pairs)
@@ -159,7 +161,7 @@ class TownPlan:
 
 
 def _mirrored(point: Point) -> Point:
-    return point[0], -point[1]
+    return point[0], 0.0 - point[1]  # never -0.0, whose bearings would be other ones
 
 
 def _mirrored_street(street: StreetPlan) -> StreetPlan:

@@ -25,9 +25,9 @@ def test_results_do_not_depend_on_the_number_of_parallel_episodes(monkeypatch: p
     def act(observations: Any, masks: Any) -> list[int]:
         return [obey(observation, mask) for observation, mask in zip(observations, masks, strict=True)]
 
-    in_parallel = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
+    in_parallel = evaluate_policy(lambda: NavigationEnv("brookside", traffic="none", max_seconds=60.0), act, 5, seed=3)
     monkeypatch.setattr("dorothie_gym.baselines.rl.evaluation.PARALLEL_EPISODES", 1)
-    one_by_one = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
+    one_by_one = evaluate_policy(lambda: NavigationEnv("brookside", traffic="none", max_seconds=60.0), act, 5, seed=3)
     assert in_parallel == one_by_one and in_parallel.episodes == 5
 
 
@@ -58,5 +58,7 @@ def test_episodes_of_several_towns_are_those_of_each() -> None:
 
 
 def test_following_the_lane_has_no_success() -> None:
-    outcome = evaluate_policy(lambda: NavigationEnv(patience=10.0), lambda o, m: [follow_lane(o, m)] * len(o), 3)
+    outcome = evaluate_policy(
+        lambda: NavigationEnv("brookside", patience=10.0), lambda o, m: [follow_lane(o, m)] * len(o), 3
+    )
     assert outcome.success == 0.0 and outcome.low == 0.0 and outcome.high > 0.5

@@ -11,7 +11,7 @@ from dorothie_gym.cli.app import app
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutRow, RolloutSettings, roll_out, submission
 from dorothie_gym.evaluation.closed_loop.leaderboard import labels_of, leaderboard_page, read_entries
-from dorothie_gym.maps import SEEN_TOWNS
+from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
@@ -22,8 +22,12 @@ from tests.evaluation.closed_loop.rollout_edits import PROTOCOL, edit, settings
 def write(folder: Path, name: str, successes: int, **settings: Any) -> Path:
     """The result of four sessions of a Co-Wizard."""
     player = Player(name=name, training={"steps": 50_000, "seconds": 1200.0} if name == "ppo" else {})
-    made = RolloutSettings(cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, sessions=4, **settings)
-    rows = tuple(RolloutRow(number=k, town="brookside", seed=k, record=record(success=k < successes)) for k in range(4))
+    made = RolloutSettings(
+        cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, sessions=4, **{"towns": UNSEEN_TOWNS, **settings}
+    )
+    rows = tuple(
+        RolloutRow(number=k, town=made.towns[0], seed=k, record=record(success=k < successes)) for k in range(4)
+    )
     folder.mkdir(parents=True)
     result = RolloutResult(settings=made.to_json(), rows=rows)
     (folder / "rollout.json").write_text(json.dumps(result.to_json()))
@@ -34,8 +38,12 @@ def test_policies_are_ranked_within_each_fold_of_towns(tmp_path: Path) -> None:
     for name, successes in (("random", 0), ("ppo", 3), ("scripted", 4)):
         write(tmp_path / name, name, successes)
     write(tmp_path / "seen", "random", 1, towns=SEEN_TOWNS)
+    write(tmp_path / "former", "random", 2, towns=DEVELOPMENT_TOWNS)
     ranked = [(entry.part, entry.policy) for entry in read_entries([tmp_path])]
-    assert ranked == [("seen", "random"), ("unseen", "scripted"), ("unseen", "ppo"), ("unseen", "random")]
+    assert ranked == [
+        ("seen", "random"), ("development", "random"),
+        ("unseen", "scripted"), ("unseen", "ppo"), ("unseen", "random"),
+    ]  # fmt: skip
 
 
 def test_towns_from_files_have_a_part_of_their_own(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from dorothie_gym.cli.app import app
 from dorothie_gym.evaluation.closed_loop.leaderboard import ENOUGH
 from dorothie_gym.evaluation.closed_loop.leaderboard_plan import LeaderboardPlan, usual_rows
 from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol
-from dorothie_gym.maps import SEEN_TOWNS
+from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import Player
 from dorothie_gym.policies.pretrained import names_for
@@ -31,17 +31,17 @@ def board(tmp_path: Path, *arguments: str) -> dict[str, Any]:
 def test_one_command_plays_and_ranks_and_makes_the_same_figures_elsewhere(tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-    one = board(tmp_path / "one", "--play", *ROWS, "--parts", "unseen", *SHORT)
-    two = board(tmp_path / "two", "--play", *ROWS, "--parts", "unseen", *SHORT)
+    one = board(tmp_path / "one", "--play", *ROWS, "--parts", "development", *SHORT)
+    two = board(tmp_path / "two", "--play", *ROWS, "--parts", "development", *SHORT)
     assert [row["policy"] for row in one["rows"]] == [row["policy"] for row in two["rows"]]
     assert one["sha256"] == two["sha256"]
     page = (tmp_path / "one" / "board.md").read_text()
-    assert one["sha256"] in page and "### Unseen towns, by exception" in page
+    assert one["sha256"] in page and "### Development town, by exception" in page
     heads = [line for line in page.splitlines() if line.startswith("| Co-Wizard |") and "| none |" in line]
     assert heads and all(line.count("none") == 1 for line in heads)
     assert f"Rows of fewer than {ENOUGH} sessions" in page
     assert board(tmp_path / "one")["sha256"] == one["sha256"]  # from the folder, without playing
-    rollout = tmp_path / "one" / "runs" / "unseen-silent" / "rollout.json"
+    rollout = tmp_path / "one" / "runs" / "development-silent" / "rollout.json"
     found = json.loads(rollout.read_text())
     found["rows"][0]["record"]["seconds"] += 0.5
     rollout.write_text(json.dumps(found))
@@ -52,7 +52,7 @@ def test_plan_has_all_rows_in_all_parts() -> None:
     plan = LeaderboardPlan(co_wizards=[Player(name="scripted")], imported=("Town01.xodr",))
     rollouts = plan.rollouts()
     assert list(rollouts) == ["seen-scripted", "unseen-scripted", "imported-scripted"]
-    assert rollouts["seen-scripted"].towns == SEEN_TOWNS
+    assert rollouts["seen-scripted"].towns == SEEN_TOWNS and rollouts["unseen-scripted"].towns == UNSEEN_TOWNS
     assert {one.sessions for one in rollouts.values()} == {ENOUGH} == {LeaderboardProtocol().sessions}
 
 
@@ -64,7 +64,7 @@ def test_usual_rows_have_scripts_and_all_shipped_models() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"parts": ("seen", "home")}, "give seen, unseen"),
+        ({"parts": ("seen", "home")}, "give some of seen, development, unseen"),
         ({"imported": ("town.yaml",)}, "OpenDRIVE"),
         ({"co_wizards": []}, "nobody"),
     ],

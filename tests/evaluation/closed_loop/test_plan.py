@@ -8,7 +8,7 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.evaluation.closed_loop import RolloutSettings, parse_towns
 from dorothie_gym.evaluation.closed_loop.running import command_of, fold_of_towns
 from dorothie_gym.evaluation.rollout import plan_corpus
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.maps import DEVELOPMENT_TOWNS, FOLD_TOWNS, SEEN_TOWNS, UNSEEN_TOWNS, VALIDATION_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
@@ -34,17 +34,19 @@ def test_towns_take_turns() -> None:
 
 def test_towns_are_named_one_by_one_or_by_fold() -> None:
     assert parse_towns("seen") == SEEN_TOWNS and parse_towns("unseen") == UNSEEN_TOWNS
-    assert parse_towns("all") == (*SEEN_TOWNS, *UNSEEN_TOWNS)
+    assert parse_towns("development") == DEVELOPMENT_TOWNS and parse_towns("validation") == VALIDATION_TOWNS
+    assert parse_towns("all") == (*SEEN_TOWNS, *DEVELOPMENT_TOWNS, *UNSEEN_TOWNS)
     assert parse_towns("brookside, midtown,brookside") == ("brookside", "midtown")
     assert parse_towns("generated:1,size=small,generated") == ("generated:1,size=small", "generated")
     with pytest.raises(TownError, match="atlantis"):
         parse_towns("midtown,atlantis")
-    with pytest.raises(ValueError, match="give seen, unseen"):
+    with pytest.raises(ValueError, match="give seen, development, validation, unseen, all"):
         parse_towns(",")
 
 
 def test_fold_is_that_of_all_towns() -> None:
     assert fold_of_towns(SEEN_TOWNS[:1]) == "seen" and fold_of_towns(UNSEEN_TOWNS) == "unseen"
+    assert all(fold_of_towns(towns) == fold for fold, towns in FOLD_TOWNS.items())
     assert fold_of_towns((*SEEN_TOWNS, *UNSEEN_TOWNS)) is None and fold_of_towns(("elsewhere",)) is None
 
 
@@ -54,6 +56,17 @@ def test_command_plays_the_same_again() -> None:
         "--co-wizard", "scripted", "--participant", "scripted", "--ad-wizard", "scripted",
         "--towns", "midtown,my town.yaml", "--sessions", "3", "--seed", "5", "--max-seconds", "40",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("fold", ["seen", "development", "validation", "unseen"])
+def test_command_names_the_fold_of_generated_towns(fold: str) -> None:
+    words = shlex.split(command_of(RolloutSettings(towns=parse_towns(fold)).to_json()))
+    named = words[words.index("--towns") + 1]
+    assert parse_towns(named) == parse_towns(fold) and len(named) < 40
+
+
+def test_towns_for_tests_are_not_those_of_a_rollout_that_names_none() -> None:
+    assert RolloutSettings().towns == VALIDATION_TOWNS
 
 
 @pytest.mark.parametrize(

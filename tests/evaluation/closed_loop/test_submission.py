@@ -91,7 +91,7 @@ def test_honest_rollout_has_no_fault(honest: Path) -> None:
     assert found.submission is not None
     page: Any = json.loads(json.dumps(found.submission))
     assert [len(row["sha256"]) for row in page["sessions"]] == [64] * 3
-    assert page["part"] == "unseen" and page["results"]["sessions"] == 3
+    assert page["part"] == "development" and page["results"]["sessions"] == 3
     assert found.seed is not None
     assert page["check"] == {
         "resimulated": list(found.resimulated),

@@ -137,7 +137,7 @@ def test_vectors_are_those_of_flatten(
     name = export_minari(found, Role.CO_WIZARD, tmp_path, storage=storage, fields=fields)
     dataset = loaded(tmp_path, name, monkeypatch)
     env = dataset.recover_environment()
-    flat = dorothie_gym.flatten(gym.make("dorothie_gym/CoWizard-v0", config=found[0].config), fields)
+    flat = dorothie_gym.flatten(gym.make("dorothie_gym/CoWizard-v0", config=found[0].config, town="brookside"), fields)
     assert env.observation_space == dataset.observation_space == flat.observation_space["observation"]
     assert env.action_space == flat.action_space and env.action_space.sample() in dataset.action_space
     for episode, read in zip(found, dataset.iterate_episodes(), strict=True):

@@ -9,7 +9,7 @@ from statistics import mean
 
 import pytest
 
-from dorothie_gym.maps import check_town, load_town
+from dorothie_gym.maps import DrivingSide, check_town, load_town, mirrored
 from dorothie_gym.maps.catalogue import find_town, import_report
 from dorothie_gym.maps.generated.generate import generate
 from dorothie_gym.maps.generated.specification import TownSize, TownSpecification, TownStyle, parse_specification
@@ -43,11 +43,22 @@ def test_text_of_a_town_is_always_the_same() -> None:
     )
 
 
-def test_text_of_a_town_is_a_town_file(tmp_path: Path) -> None:
-    specification = parse_specification("generated:5,size=small")
+@pytest.mark.parametrize("name", ["generated:5,size=small", "generated:5,size=small,traffic=left"])
+def test_text_of_a_town_is_a_town_file(tmp_path: Path, name: str) -> None:
+    specification = parse_specification(name)
     file = tmp_path / "own.yaml"
     file.write_text(generate(specification)[0])
     assert town_bits(read_yaml_town(file)) == town_bits(load_town(str(specification)))
+
+
+@pytest.mark.parametrize("options", ["", ",size=large,style=grid", ",size=small,style=radial"])
+def test_town_with_traffic_on_the_left_is_the_mirror_image_of_the_other(options: str) -> None:
+    name = f"generated:11{options}"
+    right, left = load_town(name), load_town(f"{name},traffic=left")
+    assert (right.traffic, left.traffic) == (DrivingSide.RIGHT, DrivingSide.LEFT)
+    assert left.name == f"{name},traffic=left" and check_town(left) == ()
+    assert town_bits(left)[1:] == town_bits(mirrored(right))[1:]  # all but the name
+    assert find_town(left.name, None) is left
 
 
 def test_seeds_give_different_towns() -> None:

@@ -16,7 +16,10 @@ from dorothie_gym.maps.generated.specification import (
 )
 
 
-@pytest.mark.parametrize("name", ["generated:0", "generated:7,size=small", "generated:7,size=large,style=organic"])
+@pytest.mark.parametrize(
+    "name",
+    ["generated:0", "generated:7,size=small", "generated:7,size=large,style=organic", "generated:7,traffic=left"],
+)
 def test_name_of_a_specification_is_the_name_that_was_read(name: str) -> None:
     assert str(parse_specification(name)) == name
 
@@ -25,6 +28,8 @@ def test_options_are_read_in_any_order_and_spelt_in_one() -> None:
     found = parse_specification("generated:12,style=grid,size=medium")
     assert found == TownSpecification(seed=12, size=TownSize.MEDIUM, style=TownStyle.GRID)
     assert str(found) == "generated:12,size=medium,style=grid"
+    assert str(parse_specification("generated:12,traffic=left,size=small")) == "generated:12,size=small,traffic=left"
+    assert str(parse_specification("generated:12,traffic=right")) == "generated:12"
 
 
 @pytest.mark.parametrize(
@@ -38,7 +43,7 @@ def test_options_are_read_in_any_order_and_spelt_in_one() -> None:
         ("generated:1,stile=grid", "did you mean 'style'"),
         ("generated:1,style", "unknown option"),
         ("generated:1,size=small,size=small", "twice"),
-        ("generated:1,traffic=left", "right-hand traffic"),
+        ("generated:1,traffic=both", "known are right, left"),
     ],
 )
 def test_wrong_name_is_refused_with_the_remedy(name: str, reason: str) -> None:

@@ -268,7 +268,7 @@ def test_other_models_are_refused(value: Any) -> None:
 
 def test_batches_refuse_it() -> None:
     with pytest.raises(ValueError, match=r'config\.perception is "camera"; batches do not perceive by it'):
-        DuoWizardVectorEnv(2, config=CONFIG)
+        DuoWizardVectorEnv(2, "brookside", config=CONFIG)
 
 
 def test_environments_take_it_by_name() -> None:

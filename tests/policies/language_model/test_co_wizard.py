@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.evaluation.rollout import resimulate
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import LanguageModelPolicy
 from dorothie_gym.policies.policy import policy_seed
@@ -18,7 +18,7 @@ from dorothie_gym.session.session_engine import SessionEngine
 from tests.policies.language_model.prompt_reader import CoWizardReader
 from tests.policies.language_model.sessions import NOWHERE, PromptModel, play
 
-TOWNS = (*UNSEEN_TOWNS, *SEEN_TOWNS)
+TOWNS = (*DEVELOPMENT_TOWNS, *SEEN_TOWNS)
 
 
 def completed(sessions: int, first_seed: int, co_wizard: bool) -> tuple[int, int, float]:

@@ -22,7 +22,7 @@ from tests.envs.navigation_drivers import obey
 
 @pytest.fixture(scope="module")
 def env() -> NavigationEnv:
-    return NavigationEnv(guidance="goals")
+    return NavigationEnv("brookside", guidance="goals")
 
 
 def test_recorded_observations_equal_those_of_the_driver() -> None:

@@ -140,7 +140,7 @@ def test_speed_and_lights_are_set_on_request() -> None:
 
 
 def test_estimated_mask_agrees_with_environment() -> None:
-    env = NavigationEnv(guidance="goals", traffic="medium")
+    env = NavigationEnv("brookside", guidance="goals", traffic="medium")
     same = total = 0
     for seed in range(10, 18):
         observation, info = env.reset(seed=seed)

@@ -21,7 +21,7 @@ from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.rollout.folder import locked_folder
 from dorothie_gym.evaluation.rollout.processes import run_tasks
-from dorothie_gym.maps.catalogue import SEEN_TOWNS
+from dorothie_gym.maps.folds import SEEN_TOWNS
 
 SETTINGS_FILE: Final = "training.json"
 LESSONS: Final = "lessons"
