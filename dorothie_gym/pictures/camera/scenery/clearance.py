@@ -32,6 +32,8 @@ _TREES = (palette.TREE, palette.COUNTRY_TREE)
 _OPEN = (palette.COUNTRY, palette.BLOCK, palette.PARK, palette.BRIDGE_SHADOW, *_TREES)
 """Colours of ground on which scenery may stand."""
 
+_ASPHALT = (palette.ROAD, palette.BAY, palette.TUNNEL)
+_NOT_GROUND = (palette.BRIDGE_SHADOW, *_TREES, palette.MEDIAN_TREE)
 _PAINT = (
     palette.LANE_LINE,
     palette.EDGE_LINE,
@@ -81,6 +83,21 @@ class Clearance:
         self.blocks = shapely.STRtree(
             [shapely.Polygon(s.points).buffer(0.0) for s in drawn if s.colour == palette.BLOCK]
         )
+        ground = [shape for shape in drawn if shape.colour not in _NOT_GROUND]
+        self._ground = shapely.STRtree([shapely.Polygon(shape.points) for shape in ground])
+        self._paved = np.array([shape.colour in _ASPHALT for shape in ground], dtype=bool)
+
+    def on_asphalt(self, places: Array, radius: float = 0.0) -> NDArray[np.bool_]:
+        """Returns which places (n, 2) [m], or points around them at a radius [m], are asphalt: roads and lay-bys."""
+        paved = np.zeros(len(places), dtype=bool)
+        for dx, dy in ((0.0, 0.0), (radius, 0.0), (-radius, 0.0), (0.0, radius), (0.0, -radius)):
+            place, shape = self._ground.query(shapely.points(places + (dx, dy)), predicate="intersects")
+            top = np.full(len(places), -1)
+            np.maximum.at(top, place, shape)
+            paved |= (top >= 0) & self._paved[top]
+            if radius == 0.0:
+                break
+        return paved
 
     @cached_property
     def lots(self) -> tuple[Lot, ...]:

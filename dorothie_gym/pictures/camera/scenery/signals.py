@@ -13,6 +13,7 @@ from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.atlas import STREET_NAMES, Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of
+from dorothie_gym.pictures.camera.scenery.far_lights import Eye, FarSides, eye_at, is_read_from
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, Lenses
 from dorothie_gym.pictures.camera.scenery.placing import Heights, stamped
 from dorothie_gym.pictures.maps.shapes import disc
@@ -51,13 +52,14 @@ class _Head(NamedTuple):
 def build_signals(layers: MapLayers, clearance: Clearance, ground: Heights) -> tuple[Mesh, Lenses]:
     """Returns lights and signs at all posts of a map, and the lenses among their triangles.
 
-    Each light is repeated on the far side of its junction where there is room, so that the first car in a queue, which
-    stands beside the post, also sees it.
+    Lights are repeated on the far sides of junctions, so that the first car in a queue, which stands beside the post,
+    also sees the light of its lane.
     """
     light, parts = _traffic_light()
     templates = {SignalKind.TRAFFIC_LIGHT: light, SignalKind.STOP: _stop_sign(), SignalKind.YIELD: _yield_sign()}
     heads = [_head(layers, post, ground) for post in layers.posts]
     heads += _repeaters(layers, clearance, ground, heads)
+    heads += _further_heads(layers, clearance, ground, heads)
     meshes: list[Mesh] = []
     ranges, signals, colours = [], [], []
     first = 0
@@ -107,11 +109,54 @@ def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: 
         aside = town.traffic.sign * (target.width_at(0.0) / 2.0 + _FAR_ASIDE)
         x, y = target.position(_FAR, aside).tolist()
         others = [row.at for row in (*heads, *found)]
-        room = free_of(np.array([shapely.Point(x, y).buffer(0.3)]), clearance.lanes)[0]
+        room = _has_room(clearance, x, y, 0.3)
         if room and all(pm.dist((x, y), other) > _HEADS_APART for other in others):
             foot = _foot(layers, ground, (x, y), target.height_at(0.0))
             found.append(_Head(post.kind, (x, y), head.look, foot, head.signal))
     return found
+
+
+def _has_room(clearance: Clearance, x: float, y: float, radius: float) -> bool:
+    """Returns whether a post of a radius [m] stands on no lane, and not on other asphalt such as a lay-by."""
+    off_lanes = free_of(np.array([shapely.Point(x, y).buffer(radius)]), clearance.lanes)[0]
+    return bool(off_lanes and not clearance.on_asphalt(np.array([(x, y)]), radius)[0])
+
+
+def _further_heads(layers: MapLayers, clearance: Clearance, ground: Heights, heads: list[_Head]) -> list[_Head]:
+    """Returns a light for each lane that sees none of its own from its stop line."""
+    town, sides = layers.town, FarSides(layers, clearance)
+    found: list[_Head] = []
+    for post in layers.posts:
+        if post.kind is not SignalKind.TRAFFIC_LIGHT:
+            continue
+        signal = _signal_of(town, post)
+        for lane in (town.lanes[k] for k in post.lanes if not town.lanes[k].in_junction):
+            eye = eye_at(lane, layers.stops.get(lane.id, lane.length))
+            others = [*heads, *found]
+            if any(_is_seen(sides, eye, head, others) for head in others if head.signal == signal):
+                continue
+            road = lane.height_at(lane.length)
+            places = sides.places(eye, lane.points[-1, :2].tolist(), town.traffic.sign, [row.at for row in others])
+            for at in places:
+                look = pm.atan2(at[1] - eye.y, at[0] - eye.x)
+                head = _Head(post.kind, at, look, _foot(layers, ground, at, road), signal)
+                if _is_framed(eye, head):
+                    found.append(head)
+                    break
+    return found
+
+
+def _is_seen(sides: FarSides, eye: Eye, head: _Head, others: list[_Head]) -> bool:
+    """Returns whether a driver sees a light, past all others."""
+    if not _is_framed(eye, head) or not is_read_from(eye, head.at, head.look):
+        return False
+    return bool(sides.sees(eye, np.array([head.at]), [other.at for other in others if other is not head])[0])
+
+
+def _is_framed(eye: Eye, head: _Head) -> bool:
+    (ahead,), (aside,) = eye.ahead_and_aside(np.array([head.at]))
+    height = head.foot + _HEAD - eye.z
+    return eye.frames(ahead, aside, height + _BETWEEN) and eye.frames(ahead, aside, height - _BETWEEN)
 
 
 def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:
@@ -240,7 +285,7 @@ def _corner(lane: Lane, sign: int, clearance: Clearance, others: list[Blade]) ->
     for aside in _CORNER:
         x, y = lane.position(lane.length - 0.5, sign * (lane.width_at(lane.length) / 2.0 + aside)).tolist()
         apart = all(pm.hypot(x - blade.at[0], y - blade.at[1]) > _CORNERS_APART for blade in others)
-        if apart and free_of(np.array([shapely.Point(x, y).buffer(0.15)]), clearance.lanes)[0]:
+        if apart and _has_room(clearance, x, y, 0.15):
             return x, y
     return None
 

@@ -49,6 +49,7 @@ def lamp_places(layers: MapLayers, clearance: Clearance) -> Array:
         feet = np.stack((x, y), axis=-1) + _ASIDE * out
         free = free_of(np.asarray(shapely.buffer(shapely.points(feet), 0.2), dtype=np.object_), clearance.lanes)
         free &= ~layers.raised.hold(np.column_stack((x, y, z)))
+        free[free] = ~clearance.on_asphalt(feet[free], 0.2)  # a lay-by has its lamps before and behind it
         for foot, way in zip(feet[free], (-out)[free], strict=True):
             others = np.concatenate((posts, kept))
             if not len(others) or pn.hypot(*(others - foot).T).min() > _APART:
