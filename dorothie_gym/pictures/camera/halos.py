@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps.model import Array
 from dorothie_gym.pictures.camera.lighting import clearness
 from dorothie_gym.pictures.camera.rasterizer import NEAR
 from dorothie_gym.support.compilation import compiled, concurrent, inlined
 from dorothie_gym.support.compilation.records import by_reference
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Array
     from dorothie_gym.pictures.camera.optics import Optics
     from dorothie_gym.pictures.camera.pose import View
     from dorothie_gym.pictures.camera.rasterizer import VisibilityBuffer

@@ -131,7 +131,11 @@ def averaged_along(
     level, density, last = 0, 1.0 / TEXEL, ground.levels.shape[1] - 1
     while level < last and width * density >= 2.0:
         level, density = level + 1, 0.5 * density
-    columns, rows, first = ground.levels[sheet, level, 0], ground.levels[sheet, level, 1], ground.levels[sheet, level, 2]
+    columns, rows, first = (
+        ground.levels[sheet, level, 0],
+        ground.levels[sheet, level, 1],
+        ground.levels[sheet, level, 2],
+    )
     u, v = (x - ground.origins[sheet, 0]) * density, (y - ground.origins[sheet, 1]) * density
     step = length * density / _FAR_POINTS
     red = green = blue = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -83,6 +84,8 @@ class Clearance:
         self.blocks = shapely.STRtree(
             [shapely.Polygon(s.points).buffer(0.0) for s in drawn if s.colour == palette.BLOCK]
         )
+        self.views = shapely.STRtree([])
+        """Ground between drivers and the lights and boards that are for them, see `keep_views`."""
         ground = [shape for shape in drawn if shape.colour not in _NOT_GROUND]
         self._ground = shapely.STRtree([shapely.Polygon(shape.points) for shape in ground])
         self._paved = np.array([shape.colour in _ASPHALT for shape in ground], dtype=bool)
@@ -98,6 +101,15 @@ class Clearance:
             if radius == 0.0:
                 break
         return paved
+
+    def keep_views(self, views: Sequence[shapely.Polygon]) -> None:
+        """Adds ground that buildings must leave free, so that lights and boards are seen."""
+        self.views = shapely.STRtree([*self.views.geometries, *views])
+
+    def has_room(self, x: float, y: float, radius: float) -> bool:
+        """Returns whether a post of a radius [m] stands on no lane, and not on other asphalt such as a lay-by."""
+        off_lanes = free_of(np.array([shapely.Point(x, y).buffer(radius)]), self.lanes)[0]
+        return bool(off_lanes and not self.on_asphalt(np.array([(x, y)]), radius)[0])
 
     @cached_property
     def lots(self) -> tuple[Lot, ...]:

@@ -95,9 +95,9 @@ class FarSides:
         self._near = shapely.STRtree([shapely.Polygon(ribbon(lane, _KERB)).buffer(0.0) for lane in town.lanes])
         crowns = [shapely.Polygon(shape.points) for shape in layers.shapes if shape.colour in _TREES]
         lots = [
-            rectangles(
-                np.array([lot.middle]), np.array([lot.heading]), np.array([lot.depth]), np.array([lot.length])
-            )[0]
+            rectangles(np.array([lot.middle]), np.array([lot.heading]), np.array([lot.depth]), np.array([lot.length]))[
+                0
+            ]
             for lot in clearance.lots
         ]
         self._hiding = shapely.STRtree([*crowns, *lots])
@@ -106,9 +106,9 @@ class FarSides:
             [shapely.Polygon(shape.points) for shape in layers.shapes if shape.colour == palette.BRIDGE_PARAPET]
         )
 
-    def places(self, eye: Eye, end: tuple[float, float], side: int, others: Sequence[tuple[float, float]]) -> Iterator[
-        tuple[float, float]
-    ]:
+    def places(
+        self, eye: Eye, end: tuple[float, float], side: int, others: Sequence[tuple[float, float]]
+    ) -> Iterator[tuple[float, float]]:
         """Yields places (x, y) [m] for a light that the driver sees, the best first.
 
         Args:
@@ -136,7 +136,7 @@ class FarSides:
         yield from ((x, y) for x, y in kept.tolist())
 
     def _has_room(self, points: Array, others: Array) -> NDArray[np.bool_]:
-        """Returns which places (n, 2) [m] are at a kerb, off lanes, crosswalks and parapets, and not at another post."""
+        """Returns which places (n, 2) [m] are at a kerb, off roads, crosswalks and parapets, and not at a post."""
         spots = np.asarray(shapely.buffer(shapely.points(points), _FROM_LANES - 0.3), dtype=np.object_)
         free = free_of(spots, self._clearance.lanes) & ~free_of(spots, self._near)
         free &= free_of(spots, self._crossings) & free_of(spots, self._parapets)
@@ -144,6 +144,10 @@ class FarSides:
             free &= pn.hypot(*(points - other).T) > _APART
         free[free] = ~self._clearance.on_asphalt(points[free], _FROM_LANES)
         return free
+
+    def keep_view(self, eye: Eye, at: tuple[float, float]) -> None:
+        """Keeps buildings out of the way between a driver and a light."""
+        self._clearance.keep_views([shapely.LineString([(eye.x, eye.y), at]).buffer(0.4)])
 
     def sees(self, eye: Eye, points: Array, others: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
         """Returns from which of the places (n, 2) [m] neither trees, landmarks nor other lights hide a light."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.pictures.camera.halos import Halos, no_halos
-from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.sim.state.codes import Colour
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.mesh import Mesh
 
 LENS_ON: dict[Colour, tuple[int, int, int]] = {
     Colour.GREEN: (70, 255, 130),
