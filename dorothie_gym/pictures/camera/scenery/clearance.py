@@ -76,7 +76,9 @@ class Clearance:
         ways = [shapely.Polygon(shape.points) for shape in drawn if shape.colour not in _OPEN]
         beside = [shapely.Polygon(ribbon(lane, BESIDE)).buffer(0.0) for lane in town.lanes]
         pavements = [shapely.LineString(walk.points[:, :2]).buffer(walk.width / 2.0 + 0.2) for walk in town.sidewalks]
-        self.ways = shapely.STRtree([*ways, *beside, *pavements, *_footways(town)])
+        footways = _footways(town)
+        self._walked = shapely.STRtree([*pavements, *footways])
+        self.ways = shapely.STRtree([*ways, *beside, *pavements, *footways])
         """Roads, pavements, footways, medians, lay-bys."""
         self.lanes = shapely.STRtree([shapely.Polygon(ribbon(lane, 0.3)).buffer(0.0) for lane in town.lanes])
         self.trees = shapely.STRtree([shapely.Polygon(s.points) for s in drawn if s.colour in _TREES])
@@ -101,6 +103,10 @@ class Clearance:
             if radius == 0.0:
                 break
         return paved
+
+    def on_footway(self, places: Array) -> NDArray[np.bool_]:
+        """Returns which places (n, 2) [m] are on pavements or on the ways of pedestrians."""
+        return ~free_of(np.asarray(shapely.points(places), dtype=np.object_), self._walked)
 
     def keep_views(self, views: Sequence[shapely.Polygon]) -> None:
         """Adds ground that buildings must leave free, so that lights and boards are seen."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -37,8 +38,9 @@ _BOARD_HEIGHT = 2.4  # [m] of its lower edge: above people
 _OVERHEAD = 5.0  # [m] of a board above the road: above lorries
 _POST_APART = 0.8  # [m] from the post of such a board to others
 _BOARD_APART = 3.0  # [m] from a board to posts and other boards
-_BEFORE = (33.0, 31.0, 35.0, 29.0, 37.0, 27.0, 40.0, 24.0, 20.0, 16.0)  # [m] before a stop line, the best first
-_AFTER = (38.0, 36.0, 40.0, 34.0, 42.0, 31.0, 28.0, 25.0, 22.0, 18.0)  # [m] after a junction
+# distances [m] before a stop line and after a junction, the best first; the others only where none of them has room
+_BEFORE = ((33.0, 31.0, 35.0, 29.0, 37.0, 27.0, 40.0), (24.0, 20.0, 16.0))
+_AFTER = ((38.0, 36.0, 40.0, 34.0, 42.0), (31.0, 28.0, 25.0, 22.0, 18.0))
 _ROADSIDE = (0.7, 1.2, 1.8, 2.6, 3.6)  # [m] from the edge of the road to the near edge of a board
 _SAME_DRIVERS = 16.0  # [m] between two boards at the same height for the same drivers
 _READ_FROM = 18.0  # [m] before a board, from where nothing may hide it
@@ -146,7 +148,7 @@ def plan_boards(layers: MapLayers, clearance: Clearance, taken: Array) -> list[B
             (_before_junction(layers, lane), _crossing_streets(town, lane)),
             (_after_junction(town, lane), (lane.street,)),
         ):
-            board = _first_apart(_boards(layers, clearance, list(spots), streets, kept), found) if streets else None
+            board = _first_apart(_boards(layers, clearance, spots, streets, kept), found) if streets else None
             if board is not None:
                 found.append(board)
                 clearance.keep_views([_view_of(board)])
@@ -182,13 +184,13 @@ def _crossing_streets(town: Town, lane: Lane) -> tuple[int, ...]:
     return tuple(street for street in others if street not in (lane.street, NO_STREET))[:_MOST_NAMES]
 
 
-def _before_junction(layers: MapLayers, lane: Lane) -> Iterator[tuple[Lane, float]]:
-    """Yields places on the way to a stop line, which may be on the lanes before."""
+def _before_junction(layers: MapLayers, lane: Lane) -> list[list[tuple[Lane, float]]]:
+    """Returns places on the way to a stop line, which may be on the lanes before."""
     stop = layers.stops.get(lane.id)
-    for distance in _BEFORE if stop is not None else ():
-        place = _back(layers.town, lane, stop, distance)
-        if place is not None:
-            yield place
+    if stop is None:
+        return []
+    places = [[_back(layers.town, lane, stop, distance) for distance in group] for group in _BEFORE]
+    return [[place for place in group if place is not None] for group in places]
 
 
 def _back(town: Town, lane: Lane, station: float, distance: float) -> tuple[Lane, float] | None:
@@ -205,19 +207,24 @@ def _back(town: Town, lane: Lane, station: float, distance: float) -> tuple[Lane
     return lane, station - distance
 
 
-def _after_junction(town: Town, lane: Lane) -> Iterator[tuple[Lane, float]]:
-    """Yields places on a lane that begins at a junction."""
-    if lane.length >= _SHORTEST and any(town.lanes[k].in_junction for k in town.predecessors(lane.id)):
-        yield from ((lane, station) for station in _AFTER if station < lane.length - 2.0)
+def _after_junction(town: Town, lane: Lane) -> list[list[tuple[Lane, float]]]:
+    """Returns places on a lane that begins at a junction."""
+    if lane.length < _SHORTEST or not any(town.lanes[k].in_junction for k in town.predecessors(lane.id)):
+        return []
+    return [[(lane, station) for station in group if station < lane.length - 2.0] for group in _AFTER]
 
 
 def _boards(
-    layers: MapLayers, clearance: Clearance, spots: list[tuple[Lane, float]], streets: tuple[int, ...], taken: Array
+    layers: MapLayers,
+    clearance: Clearance,
+    spots: list[list[tuple[Lane, float]]],
+    streets: tuple[int, ...],
+    taken: Array,
 ) -> Iterator[Board]:
-    """Yields boards for which there is room: at the roadside, then above the lane."""
+    """Yields boards for which there is room, group by group of places: at the roadside, then above the lane."""
     sign = layers.town.traffic.sign
-    for overhead in (False, True):
-        for lane, station in spots:
+    for group, overhead in product(spots, (False, True)):
+        for lane, station in group:
             heading, height = lane.heading_at(station), lane.height_at(station)
             if layers.raised.hold(np.array([(*lane.position(station).tolist(), height)]))[0]:
                 continue
