@@ -15,6 +15,7 @@ from dorothie_gym.pictures.camera.cells import CellOrder, CellTable, new_order, 
 from dorothie_gym.pictures.camera.daylight import Daylight, daylight_of
 from dorothie_gym.pictures.camera.faces import new_faces
 from dorothie_gym.pictures.camera.ground.lookup import GroundArrays
+from dorothie_gym.pictures.camera.halos import Halos, add_halos, no_halos
 from dorothie_gym.pictures.camera.head_lights import draw_head_lights, new_head_lights
 from dorothie_gym.pictures.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.pictures.camera.lighting import LampMap, add_rain
@@ -44,7 +45,7 @@ _ROOM = 4096  # triangles of bodies, at first
 _NO_BODIES = empty_records(PlacementRecord, 0)
 
 _draw_scene, _shade, _write_labels = fixed(draw_scene), fixed(shade), fixed(write_labels)
-_draw_head_lights = direct(draw_head_lights)
+_draw_head_lights, _add_halos = direct(draw_head_lights), fixed(add_halos)
 
 
 @shared
@@ -158,6 +159,7 @@ class FirstPersonCamera:
         self._samples = new_samples()
         self._shadows = new_shadow_maps(enabled=config.shadows and self._draws_rgb)
         self._pose: CameraPose | None = None
+        self._halos = no_halos()
         self._keys = np.unique(self._overlay.instances[self._overlay.instances != TOWN])
         if self._draws_rgb:
             self._buffer = new_buffer(width * samples, height * samples)
@@ -184,6 +186,10 @@ class FirstPersonCamera:
             colours: (n, 3) RGB.
         """
         self._overlay.colours[self._rows[rows]] = colours
+
+    def glow(self, halos: Halos) -> None:
+        """Gives following pictures the halos of traffic lights."""
+        self._halos = halos
 
     def view_of(self, pose: CameraPose) -> View:
         """Returns the projection of a picture from a pose; that of the last pose is kept."""
@@ -225,12 +231,15 @@ class FirstPersonCamera:
             if light.beams > 0.0:
                 _draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
+            optics = optics_of(view, self._light_numbers, self._shadows, pose.tilt)
             _shade(
-                view, optics_of(view, self._light_numbers, self._shadows, pose.tilt), self._buffer, config.samples,
+                view, optics, self._buffer, config.samples,
                 self.scene.town, self._overlay, self._bodies, self.scene.ground, self._textures, light,
                 self.scene.noise, self.scene.lamps, self._beams, self._shadows, self._samples, self._faces,
                 picture.reshape(-1, 3),
             )  # fmt: skip
+            if self._halos.lit.any():
+                _add_halos(view, optics, self._buffer, config.samples, self._halos, picture)
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))
             apply_faults(picture, faults, self._scratch)

@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 from dorothie_gym.pictures.camera.ground.colours import (
     BLENDED,
     GRAINS,
+    LONG,
     PATCHES,
     SHARP,
+    WIDE,
+    averaged_along,
     colour_at,
     grain_weight,
+    look_along,
     mean_look,
     noise_at,
     noise_place,
@@ -62,6 +66,7 @@ if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.optics import Optics
 
 _GROUND = int(Surface.GROUND)
+_LEAST_SLANT = 0.012  # a view as flat as this one has the footprints of it
 _DONE = -1  # instead of a material: the colour has been written
 
 
@@ -74,6 +79,11 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
     cells, noise = ground.cells[ground.firsts[sheet] :], ground.noise
     outside, inverse = int(ground.outside[sheet]), 1.0 / ground.size[0]
     for k in range(count):
+        across = values[DEPTH + k] * optics.pixel
+        along = across / max(values[SLANT + k], _LEAST_SLANT)
+        if along > LONG:
+            _add_long(optics, ground, sheet, values, places, k, along, across)
+            continue
         width, place, material = values[ONE + k], places[FIRST + k], outside
         if place >= 0:
             material = int(cells[place // PARTS])
@@ -94,6 +104,25 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
             values[RED + k], values[GREEN + k], values[BLUE + k] = colour_at(
                 ground, sheet, values[X + k], values[Y + k], width
             )
+
+
+@inlined
+def _add_long(
+    optics: Optics, ground: GroundArrays, sheet: int, values: Array, places: NDArray[np.int64], k: int, along: float,
+    across: float,
+) -> None:  # fmt: skip
+    """Writes the colour of a sample with a long footprint, where the view of the ground is grazing."""
+    x, y = values[X + k], values[Y + k]
+    dx, dy = x - optics.x, y - optics.y
+    scale = 1.0 / max(math.sqrt(dx * dx + dy * dy), 1e-6)
+    if across >= WIDE:
+        values[RED + k], values[GREEN + k], values[BLUE + k] = averaged_along(
+            ground, sheet, x, y, dx * scale, dy * scale, along, across
+        )
+        return
+    red, green, blue, grain = look_along(ground, sheet, x, y, dx * scale, dy * scale, along, across)
+    factor = 1.0 + grain * _noise(ground.noise, values, places, k)
+    values[RED + k], values[GREEN + k], values[BLUE + k] = red * factor, green * factor, blue * factor
 
 
 @inlined

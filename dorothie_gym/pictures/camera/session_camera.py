@@ -18,7 +18,7 @@ from dorothie_gym.pictures.camera.ground.materials import KERB_HEIGHT, LOOKS, Ma
 from dorothie_gym.pictures.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
 from dorothie_gym.pictures.camera.pose import CameraPose, View, pose_on_car
 from dorothie_gym.pictures.camera.road_slopes import RoadSlopes, rise_at
-from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
+from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows, lit_lenses
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.sim.state.world_arrays import CAR_KEY
 from dorothie_gym.support import portable_math as pm
@@ -85,6 +85,8 @@ class SessionCamera:
         self.scene, self.config = scene, config
         self.camera = FirstPersonCamera(scene.camera_scene, config, scene.overlay)
         self._placed = empty_records(PlacementRecord, 256)
+        self._halos = lit_lenses(scene.town.lenses, scene.town.signals)
+        self.camera.glow(self._halos)
         self._shown: NDArray[np.int64] | None = None
         self._phases: list[LightPhase] | None = None  # that the lenses show, if those of the programmes
         self._steady = 0.0, 0.0  # [s] from when until when they stay
@@ -190,6 +192,7 @@ class SessionCamera:
             return
         before, self._shown = self._shown, shown
         lit = shown == lenses.colours
+        self._halos.lit[:] = lit
         changed = np.full(len(lit), True) if before is None else lit != (before == lenses.colours)
         rows = lens_rows(lenses, changed)
         counts = np.diff(lenses.ranges[changed], axis=1)[:, 0]

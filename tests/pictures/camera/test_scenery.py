@@ -21,8 +21,9 @@ from dorothie_gym.pictures.camera.mesh import MeshBuilder, Surface
 from dorothie_gym.pictures.camera.scenery.buildings import Building, Style, build_buildings, plan_buildings
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance
 from dorothie_gym.pictures.camera.scenery.placing import FlatGround, stamped
-from dorothie_gym.pictures.camera.scenery.signals import build_blades, build_signals, plan_blades
+from dorothie_gym.pictures.camera.scenery.signals import build_signals
 from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places
+from dorothie_gym.pictures.camera.scenery.street_signs import build_blades, plan_blades
 from dorothie_gym.pictures.camera.scenery.town_scenery import Scenery, build_scenery
 from dorothie_gym.pictures.camera.scenery.trees import build_trees, tree_places
 from dorothie_gym.pictures.maps.map_layers import MapLayers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -58,6 +59,8 @@ _DECK_OVERLAP = 0.3  # [m] of a deck beyond the ends of a bridge
 _DECK_THICKNESS = 0.9  # [m]
 _PARAPET = 0.85  # [m] height
 _PARAPET_WIDTH = 0.3  # [m]
+_STEP = 0.05  # [m] between the heights of parapets that meet, at most
+_SHARPEST = 0.4  # 1 + the cosine of the sharpest corner with a mitre
 _LOWER = 1.0  # [m] by which the ground lies lower beside a parapet
 _PILLARS = 18.0  # [m] apart
 _PILLAR_WIDTH = 1.2  # [m]
@@ -252,15 +255,41 @@ def _add_quads(builder: MeshBuilder, low: Array, high: Array, colour: tuple[int,
 
 
 def _add_parapets(builder: MeshBuilder, lines: Array) -> None:
-    """Adds low walls on the right of lines (n, 2, 3) [m], on the map."""
+    """Adds low walls on the right of lines (n, 2, 3) [m], on the map; they meet in mitres at common ends."""
     if not len(lines):
         return
     up = np.array([0.0, 0.0, _PARAPET])
-    aside = np.concatenate((_PARAPET_WIDTH * _inward(lines), np.zeros((len(lines), 1))), axis=1)[:, None]
-    inner = lines + aside
+    aside, alone = _mitres(lines)
+    inner = lines.copy()
+    inner[..., :2] += _PARAPET_WIDTH * aside
     _add_quads(builder, lines, lines + up, _CONCRETE, ObjectClass.BRIDGE)
     _add_quads(builder, inner[:, ::-1], inner[:, ::-1] + up, _CONCRETE, ObjectClass.BRIDGE)
     _add_quads(builder, lines + up, inner + up, _CONCRETE, ObjectClass.BRIDGE)
-    for first, second in ((lines[:, :1], inner[:, :1]), (inner[:, 1:], lines[:, 1:])):
-        end = np.concatenate((second, first), axis=1)
+    for rows, first, second in ((alone[:, 0], lines[:, :1], inner[:, :1]), (alone[:, 1], inner[:, 1:], lines[:, 1:])):
+        end = np.concatenate((second, first), axis=1)[rows]
         _add_quads(builder, end, end + up, _CONCRETE, ObjectClass.BRIDGE)
+
+
+def _mitres(lines: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Returns the inner sides of walls at both ends of lines (n, 2, 2), and which ends have no neighbour (n, 2).
+
+    A wall of width 1 lies on the right of its line; two that meet share the corner on the bisector of their sides.
+    """
+    inward = _inward(lines)
+    aside = np.stack((inward, inward), axis=1)
+    alone = np.ones((len(lines), 2), dtype=bool)
+    places = [[tuple(place) for place in row] for row in np.rint(lines[..., :2] / GRID).astype(np.int64).tolist()]
+    starts: dict[tuple[int, ...], list[int]] = {}
+    for k, (start, _) in enumerate(places):
+        starts.setdefault(start, []).append(k)
+    ends = Counter(end for _, end in places)
+    for k, (_, end) in enumerate(places):
+        after = starts.get(end, [])
+        if len(after) != 1 or ends[end] != 1 or abs(lines[k, 1, 2] - lines[after[0], 0, 2]) > _STEP:
+            continue
+        both = inward[k] + inward[after[0]]
+        longer = float(both @ both) / 2.0  # 1 + the cosine of the corner
+        if longer > _SHARPEST:
+            aside[k, 1] = aside[after[0], 0] = both / longer
+            alone[k, 1] = alone[after[0], 0] = False
+    return aside, alone

@@ -15,6 +15,7 @@ from dorothie_gym.pictures.camera.ground.lookup import (
     material_of_part,
     materials_around,
     part_at,
+    part_of,
 )
 from dorothie_gym.support.compilation import compiled, inlined
 
@@ -33,6 +34,15 @@ BLENDED = 0.3
 SHARP = 0.03
 """Width of a footprint up to which one sample is sufficient [m]."""
 
+LONG = 0.4
+"""Length of a footprint from which points along the ray are sampled [m]; shorter ones are sampled as squares."""
+
+WIDE = 0.4
+"""Width of a long footprint from which averaged colours are sufficient [m]: lines are then much narrower."""
+
+_SHORT = 2.5  # [m] length of a footprint up to which four points suffice
+_FAR_POINTS = 6  # points along a wide footprint
+_GOLDEN, _FIRST_ASIDE = 0.618033988749895, 0.5  # places across a footprint: no two points lie side by side
 _PATCH_SHARE = 0.5  # strength of the patches relative to the grains
 _SHIFT = 1 << 20  # makes all coordinates positive: truncation instead of rounding down
 _MASK = NOISE_SIZE - 1
@@ -68,6 +78,77 @@ def _sampled(ground: GroundArrays, sheet: int, x: float, y: float, footprint: fl
     noise += noise_at(ground.noise, noise_place(x, y, PATCHES)) * patch_weight(footprint)
     factor = 1.0 + grain * noise
     return red * factor, green * factor, blue * factor
+
+
+@compiled
+def look_along(
+    ground: GroundArrays, sheet: int, x: float, y: float, ahead_x: float, ahead_y: float, length: float, width: float
+) -> tuple[float, float, float, float]:
+    """Returns the mean red, green, blue and strength of the noise in a long footprint, from points along the ray.
+
+    A square footprint of the same area would be many times as wide as the pixel, and lines would fade.
+
+    Args:
+        ground: materials.
+        sheet: sheet of the ground.
+        x: x coordinate of the middle [m].
+        y: y coordinate of the middle [m].
+        ahead_x: x of the unit vector along the footprint.
+        ahead_y: y of the unit vector along the footprint.
+        length: [m].
+        width: [m].
+    """
+    count = 4 if length < _SHORT else 6
+    red = green = blue = grain = 0.0
+    left, top = ground.origins[sheet, 0], ground.origins[sheet, 1]
+    inverse, columns, rows = 1.0 / ground.size[0], ground.shapes[sheet, 0], ground.shapes[sheet, 1]
+    step, same, last, aside = length / count, 0, -1, _FIRST_ASIDE
+    for k in range(count):
+        along, across = (k + 0.5) * step - 0.5 * length, (aside - 0.5) * width
+        aside += _GOLDEN if aside < 1.0 - _GOLDEN else _GOLDEN - 1.0
+        px, py = x + along * ahead_x - across * ahead_y, y + along * ahead_y + across * ahead_x
+        material = material_of_part(ground, sheet, part_of(left, top, inverse, columns, rows, px, py), px, py)
+        if material == last:
+            same += 1
+            continue
+        if same:
+            r, g, b, n = _look(ground, last)
+            red, green, blue, grain = red + same * r, green + same * g, blue + same * b, grain + same * n
+        last, same = material, 1
+    r, g, b, n = _look(ground, last)
+    share = 1.0 / count
+    return (red + same * r) * share, (green + same * g) * share, (blue + same * b) * share, (grain + same * n) * share
+
+
+@compiled
+def averaged_along(
+    ground: GroundArrays, sheet: int, x: float, y: float, ahead_x: float, ahead_y: float, length: float, width: float
+) -> tuple[float, float, float]:
+    """Returns the mean red, green and blue in a footprint that is wide as well, from averaged colours along the ray.
+
+    Arguments are those of `look_along`.
+    """
+    level, density, last = 0, 1.0 / TEXEL, ground.levels.shape[1] - 1
+    while level < last and width * density >= 2.0:
+        level, density = level + 1, 0.5 * density
+    columns, rows, first = (
+        ground.levels[sheet, level, 0],
+        ground.levels[sheet, level, 1],
+        ground.levels[sheet, level, 2],
+    )
+    u, v = (x - ground.origins[sheet, 0]) * density, (y - ground.origins[sheet, 1]) * density
+    step = length * density / _FAR_POINTS
+    red = green = blue = 0.0
+    for k in range(_FAR_POINTS):
+        along = (k + 0.5 - 0.5 * _FAR_POINTS) * step
+        column, row = math.floor(u + along * ahead_x), math.floor(v + along * ahead_y)
+        if column < 0 or row < 0 or column >= columns or row >= rows:
+            r, g, b, _ = _look(ground, int(ground.outside[sheet]))
+        else:
+            texel = first + row * columns + column
+            r, g, b = float(ground.texels[texel, 0]), float(ground.texels[texel, 1]), float(ground.texels[texel, 2])
+        red, green, blue = red + r, green + g, blue + b
+    return red * (1.0 / _FAR_POINTS), green * (1.0 / _FAR_POINTS), blue * (1.0 / _FAR_POINTS)
 
 
 @inlined

@@ -237,7 +237,7 @@ def _along(
         centres = spots + (setbacks + depths / 2.0)[:, None] * ways
         ground = rectangles(centres, turns, depths, lengths)
         free = middles + lengths / 2.0 <= stations[-1] + 4.0
-        for tree in (clearance.ways, clearance.trees, clearance.parks, clearance.reserved):
+        for tree in (clearance.ways, clearance.trees, clearance.parks, clearance.reserved, clearance.views):
             if free.any():
                 free[free] = free_of(ground[free], tree)
         radii = pn.hypot(lengths, depths) / 2.0

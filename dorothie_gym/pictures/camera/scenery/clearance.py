@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,8 @@ _TREES = (palette.TREE, palette.COUNTRY_TREE)
 _OPEN = (palette.COUNTRY, palette.BLOCK, palette.PARK, palette.BRIDGE_SHADOW, *_TREES)
 """Colours of ground on which scenery may stand."""
 
+_ASPHALT = (palette.ROAD, palette.BAY, palette.TUNNEL)
+_NOT_GROUND = (palette.BRIDGE_SHADOW, *_TREES, palette.MEDIAN_TREE)
 _PAINT = (
     palette.LANE_LINE,
     palette.EDGE_LINE,
@@ -73,7 +76,9 @@ class Clearance:
         ways = [shapely.Polygon(shape.points) for shape in drawn if shape.colour not in _OPEN]
         beside = [shapely.Polygon(ribbon(lane, BESIDE)).buffer(0.0) for lane in town.lanes]
         pavements = [shapely.LineString(walk.points[:, :2]).buffer(walk.width / 2.0 + 0.2) for walk in town.sidewalks]
-        self.ways = shapely.STRtree([*ways, *beside, *pavements, *_footways(town)])
+        footways = _footways(town)
+        self._walked = shapely.STRtree([*pavements, *footways])
+        self.ways = shapely.STRtree([*ways, *beside, *pavements, *footways])
         """Roads, pavements, footways, medians, lay-bys."""
         self.lanes = shapely.STRtree([shapely.Polygon(ribbon(lane, 0.3)).buffer(0.0) for lane in town.lanes])
         self.trees = shapely.STRtree([shapely.Polygon(s.points) for s in drawn if s.colour in _TREES])
@@ -81,6 +86,36 @@ class Clearance:
         self.blocks = shapely.STRtree(
             [shapely.Polygon(s.points).buffer(0.0) for s in drawn if s.colour == palette.BLOCK]
         )
+        self.views = shapely.STRtree([])
+        """Ground between drivers and the lights and boards that are for them, see `keep_views`."""
+        ground = [shape for shape in drawn if shape.colour not in _NOT_GROUND]
+        self._ground = shapely.STRtree([shapely.Polygon(shape.points) for shape in ground])
+        self._paved = np.array([shape.colour in _ASPHALT for shape in ground], dtype=bool)
+
+    def on_asphalt(self, places: Array, radius: float = 0.0) -> NDArray[np.bool_]:
+        """Returns which places (n, 2) [m], or points around them at a radius [m], are asphalt: roads and lay-bys."""
+        paved = np.zeros(len(places), dtype=bool)
+        for dx, dy in ((0.0, 0.0), (radius, 0.0), (-radius, 0.0), (0.0, radius), (0.0, -radius)):
+            place, shape = self._ground.query(shapely.points(places + (dx, dy)), predicate="intersects")
+            top = np.full(len(places), -1)
+            np.maximum.at(top, place, shape)
+            paved |= (top >= 0) & self._paved[top]
+            if radius == 0.0:
+                break
+        return paved
+
+    def on_footway(self, places: Array) -> NDArray[np.bool_]:
+        """Returns which places (n, 2) [m] are on pavements or on the ways of pedestrians."""
+        return ~free_of(np.asarray(shapely.points(places), dtype=np.object_), self._walked)
+
+    def keep_views(self, views: Sequence[shapely.Polygon]) -> None:
+        """Adds ground that buildings must leave free, so that lights and boards are seen."""
+        self.views = shapely.STRtree([*self.views.geometries, *views])
+
+    def has_room(self, x: float, y: float, radius: float) -> bool:
+        """Returns whether a post of a radius [m] stands on no lane, and not on other asphalt such as a lay-by."""
+        off_lanes = free_of(np.array([shapely.Point(x, y).buffer(radius)]), self.lanes)[0]
+        return bool(off_lanes and not self.on_asphalt(np.array([(x, y)]), radius)[0])
 
     @cached_property
     def lots(self) -> tuple[Lot, ...]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.pictures.camera.halos import Halos, no_halos
 from dorothie_gym.sim.state.codes import Colour
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.mesh import Mesh
 
 LENS_ON: dict[Colour, tuple[int, int, int]] = {
     Colour.GREEN: (70, 255, 130),
@@ -40,3 +44,16 @@ def lens_rows(lenses: Lenses, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Returns the triangles of the given lenses."""
     parts = [np.arange(first, last) for first, last in lenses.ranges[chosen].tolist()]
     return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)
+
+
+def lit_lenses(lenses: Lenses, mesh: Mesh) -> Halos:
+    """Returns the lenses of a mesh for their halos, all of them off."""
+    halos = no_halos(len(lenses.signals))
+    for k, (first, last) in enumerate(lenses.ranges.tolist()):
+        corners = mesh.corners[first:last].reshape(-1, 3).astype(np.float64)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        halos.centres[k] = (low + high) / 2.0
+        halos.radii[k] = (high[2] - low[2]) / 2.0
+        halos.looks[k] = mesh.normals[first]
+        halos.colours[k] = LENS_ON[Colour(int(lenses.colours[k]))]
+    return halos

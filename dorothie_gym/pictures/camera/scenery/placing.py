@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Protocol
 
@@ -13,6 +14,7 @@ from dorothie_gym.support import portable_arrays as pn
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 
 class Heights(Hashable, Protocol):
@@ -21,6 +23,9 @@ class Heights(Hashable, Protocol):
     def height_at(self, points: Array) -> Array:
         """Returns the heights (n,) [m] of the ground at points (n, 2) [m], NaN if there is none."""
         ...
+
+
+_OTHER_LEVEL = 2.5  # [m] between a road and the ground above or below it
 
 
 class FlatGround:
@@ -82,3 +87,10 @@ def stamped(
         *(repeated(column) for column in (template.textures, template.surfaces, template.classes)),
         repeated(template.instances),
     )
+
+
+def foot_beside_road(layers: MapLayers, ground: Heights, at: tuple[float, float], road: float) -> float:
+    """Returns the height of the ground, or on bridges and in tunnels that of the road beside [m]."""
+    height = float(ground.height_at(np.array([at]))[0])
+    raised = layers.raised.hold(np.array([(*at, road)]))[0]
+    return road if raised or not math.isfinite(height) or abs(height - road) > _OTHER_LEVEL else height

@@ -1,4 +1,4 @@
-"""Traffic lights, stop and yield signs at the posts of the map, and blades with street names at corners."""
+"""Traffic lights, stop and yield signs at the posts of the map, and further lights on the far sides of junctions."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
 
-from dorothie_gym.maps.model import NO_STREET, Array, Lane, SignalKind
+from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.pictures.camera.atlas import STREET_NAMES, Texture
+from dorothie_gym.pictures.camera.atlas import Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, Surface, joined
-from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of
+from dorothie_gym.pictures.camera.scenery.far_lights import Eye, FarSides, eye_at, is_read_from
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, Lenses
-from dorothie_gym.pictures.camera.scenery.placing import Heights, stamped
+from dorothie_gym.pictures.camera.scenery.placing import Heights, foot_beside_road, stamped
 from dorothie_gym.pictures.maps.shapes import disc
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.support import portable_arrays as pn
@@ -22,17 +21,13 @@ from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.camera.scenery.clearance import Clearance
     from dorothie_gym.pictures.maps.map_layers import MapLayers, Post
 
 _HEAD = 3.4  # [m] height of the centre of a traffic light
 _LENS, _BETWEEN = 0.2, 0.46  # [m] radius of a lens, distance of two
 _SIGN = 2.4  # [m] height of the centre of a sign
 _METAL, _BACK = (100, 104, 104), (150, 152, 154)
-_BLADE = 2.2, 0.55  # [m] width and height of a street name
-_BLADE_HEIGHT = 4.3  # [m] of the lower blade: above the lights at the same corner
-_CORNER = (3.0, 1.9, 1.2)  # [m] from the edge of the road to the post with names; the first that has room
-_CORNERS_APART = 6.0  # [m]
-_OTHER_LEVEL = 2.5  # [m] between a road and the ground above or below it
 _STRAIGHT = 45  # [degrees] largest turn of an exit that counts as straight on
 _FAR, _FAR_ASIDE = 1.5, 1.3  # [m] from the start and from the edge of the exit to a repeated light
 _HEADS_APART = 1.5  # [m] between lights
@@ -51,13 +46,14 @@ class _Head(NamedTuple):
 def build_signals(layers: MapLayers, clearance: Clearance, ground: Heights) -> tuple[Mesh, Lenses]:
     """Returns lights and signs at all posts of a map, and the lenses among their triangles.
 
-    Each light is repeated on the far side of its junction where there is room, so that the first car in a queue, which
-    stands beside the post, also sees it.
+    Lights are repeated on the far sides of junctions, so that the first car in a queue, which stands beside the post,
+    also sees the light of its lane.
     """
     light, parts = _traffic_light()
     templates = {SignalKind.TRAFFIC_LIGHT: light, SignalKind.STOP: _stop_sign(), SignalKind.YIELD: _yield_sign()}
     heads = [_head(layers, post, ground) for post in layers.posts]
     heads += _repeaters(layers, clearance, ground, heads)
+    heads += _further_heads(layers, clearance, ground, heads)
     meshes: list[Mesh] = []
     ranges, signals, colours = [], [], []
     first = 0
@@ -83,14 +79,9 @@ def build_signals(layers: MapLayers, clearance: Clearance, ground: Heights) -> t
 
 def _head(layers: MapLayers, post: Post, ground: Heights) -> _Head:
     look, height = _pose(layers.town, layers, post)
-    return _Head(post.kind, post.at, look, _foot(layers, ground, post.at, height), _signal_of(layers.town, post))
-
-
-def _foot(layers: MapLayers, ground: Heights, at: tuple[float, float], road: float) -> float:
-    """Returns the height of the ground, or on bridges and in tunnels that of the road beside [m]."""
-    height = float(ground.height_at(np.array([at]))[0])
-    raised = layers.raised.hold(np.array([(*at, road)]))[0]
-    return road if raised or not math.isfinite(height) or abs(height - road) > _OTHER_LEVEL else height
+    return _Head(
+        post.kind, post.at, look, foot_beside_road(layers, ground, post.at, height), _signal_of(layers.town, post)
+    )
 
 
 def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: list[_Head]) -> list[_Head]:
@@ -107,11 +98,51 @@ def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: 
         aside = town.traffic.sign * (target.width_at(0.0) / 2.0 + _FAR_ASIDE)
         x, y = target.position(_FAR, aside).tolist()
         others = [row.at for row in (*heads, *found)]
-        room = free_of(np.array([shapely.Point(x, y).buffer(0.3)]), clearance.lanes)[0]
+        room = clearance.has_room(x, y, 0.3)
         if room and all(pm.dist((x, y), other) > _HEADS_APART for other in others):
-            foot = _foot(layers, ground, (x, y), target.height_at(0.0))
+            foot = foot_beside_road(layers, ground, (x, y), target.height_at(0.0))
             found.append(_Head(post.kind, (x, y), head.look, foot, head.signal))
     return found
+
+
+def _further_heads(layers: MapLayers, clearance: Clearance, ground: Heights, heads: list[_Head]) -> list[_Head]:
+    """Returns a light for each lane that sees none of its own from its stop line."""
+    town, sides = layers.town, FarSides(layers, clearance)
+    found: list[_Head] = []
+    for post in layers.posts:
+        if post.kind is not SignalKind.TRAFFIC_LIGHT:
+            continue
+        signal = _signal_of(town, post)
+        for lane in (town.lanes[k] for k in post.lanes if not town.lanes[k].in_junction):
+            eye = eye_at(lane, layers.stops.get(lane.id, lane.length))
+            others = [*heads, *found]
+            seen = [head for head in others if head.signal == signal and _is_seen(sides, eye, head, others)]
+            if seen:
+                sides.keep_view(eye, seen[0].at)
+                continue
+            road = lane.height_at(lane.length)
+            places = sides.places(eye, lane.points[-1, :2].tolist(), town.traffic.sign, [row.at for row in others])
+            for at in places:
+                look = pm.atan2(at[1] - eye.y, at[0] - eye.x)
+                head = _Head(post.kind, at, look, foot_beside_road(layers, ground, at, road), signal)
+                if _is_framed(eye, head):
+                    found.append(head)
+                    sides.keep_view(eye, at)
+                    break
+    return found
+
+
+def _is_seen(sides: FarSides, eye: Eye, head: _Head, others: list[_Head]) -> bool:
+    """Returns whether a driver sees a light, past all others."""
+    if not _is_framed(eye, head) or not is_read_from(eye, head.at, head.look):
+        return False
+    return bool(sides.sees(eye, np.array([head.at]), [other.at for other in others if other is not head])[0])
+
+
+def _is_framed(eye: Eye, head: _Head) -> bool:
+    (ahead,), (aside,) = eye.ahead_and_aside(np.array([head.at]))
+    height = head.foot + _HEAD - eye.z
+    return eye.frames(ahead, aside, height + _BETWEEN) and eye.frames(ahead, aside, height - _BETWEEN)
 
 
 def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:
@@ -201,68 +232,4 @@ def _yield_sign() -> Mesh:
     _polygon(builder, _round(-0.06, _SIGN, 0.42, 3, down), (252, 252, 250), kind)
     builder.panel((-0.07, 0.0, _SIGN + 0.06), 0.0, 0.5, 0.5, colour=(255, 255, 255), kind=kind, texture=Texture.YIELD)
     _polygon(builder, _round(-0.04, _SIGN, 0.62, 3, down), _BACK, kind, backwards=True)
-    return builder.build()
-
-
-# --- Street names -----------------------------------------------------------------------------------------------------
-
-
-class Blade(NamedTuple):
-    """Posts with the names of the streets that meet at a corner: (street, direction in which it is read [rad])."""
-
-    at: tuple[float, float]
-    height: float
-    names: tuple[tuple[int, float], ...]
-
-
-def plan_blades(layers: MapLayers, clearance: Clearance) -> list[Blade]:
-    """Returns the corners with street names: at the kerb of each approach to a junction, where there is room."""
-    town = layers.town
-    found: list[Blade] = []
-    for lane in town.lanes:
-        if lane.in_junction or lane.street == NO_STREET or lane.id in layers.borders.outer_neighbour:
-            continue
-        exits = [e for e in town.exits(lane.id) if e.junction_id >= 0]
-        others = {town.lanes[e.lane].street: None for e in exits}
-        cross = [street for street in others if street not in (lane.street, NO_STREET)]
-        if not exits:
-            continue
-        at = _corner(lane, town.traffic.sign, clearance, found)
-        if at is None:
-            continue
-        heading = lane.heading_at(lane.length)
-        names = [(lane.street, heading + math.pi / 2.0), *((street, heading) for street in cross[:2])]
-        found.append(Blade(at, lane.height_at(lane.length), tuple(names)))
-    return found
-
-
-def _corner(lane: Lane, sign: int, clearance: Clearance, others: list[Blade]) -> tuple[float, float] | None:
-    for aside in _CORNER:
-        x, y = lane.position(lane.length - 0.5, sign * (lane.width_at(lane.length) / 2.0 + aside)).tolist()
-        apart = all(pm.hypot(x - blade.at[0], y - blade.at[1]) > _CORNERS_APART for blade in others)
-        if apart and free_of(np.array([shapely.Point(x, y).buffer(0.15)]), clearance.lanes)[0]:
-            return x, y
-    return None
-
-
-def build_blades(layers: MapLayers, blades: list[Blade], ground: Heights) -> Mesh:
-    """Returns posts with lit street names; the textures are those of the streets, `STREET_NAMES` and following."""
-    builder = MeshBuilder()
-    for blade in blades:
-        base = _foot(layers, ground, blade.at, blade.height)
-        top = base + _BLADE_HEIGHT + len(blade.names) * (_BLADE[1] + 0.06)
-        builder.prism(disc(blade.at, 0.05, 5), base - 0.1, top, colour=_METAL, kind=ObjectClass.POLE)
-        for k, (street, look) in enumerate(blade.names):
-            z = base + _BLADE_HEIGHT + k * (_BLADE[1] + 0.06) + _BLADE[1] / 2.0
-            for turned in (look, look + math.pi):
-                c, s = pm.cos(turned), pm.sin(turned)
-                builder.panel(
-                    (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z),
-                    turned,
-                    *_BLADE,
-                    colour=(235, 235, 235),
-                    kind=ObjectClass.TRAFFIC_SIGN,
-                    texture=STREET_NAMES + street,
-                    surface=Surface.EMISSIVE,
-                )
     return builder.build()

@@ -27,6 +27,7 @@ _ARM = 1.6  # [m] from the pole to the light, over the road
 _ASIDE = 0.7  # [m] from the edge of the road
 _SPACING, _FIRST = 30.0, 14.0  # [m] along the road
 _APART = 9.0  # [m] between lamps on different edges, and from the posts of signs
+_LOT_SPOTS = ((-0.4, 1.5), (0.6, 1.6), (1.6, 1.6), (3.0, 1.6), (0.6, 0.8))  # [m] behind the front, beside the lot
 _METAL = (88, 92, 94)
 
 
@@ -49,11 +50,29 @@ def lamp_places(layers: MapLayers, clearance: Clearance) -> Array:
         feet = np.stack((x, y), axis=-1) + _ASIDE * out
         free = free_of(np.asarray(shapely.buffer(shapely.points(feet), 0.2), dtype=np.object_), clearance.lanes)
         free &= ~layers.raised.hold(np.column_stack((x, y, z)))
+        free[free] = ~clearance.on_asphalt(feet[free], 0.2)  # a lay-by has its lamps before and behind it
         for foot, way in zip(feet[free], (-out)[free], strict=True):
             others = np.concatenate((posts, kept))
             if not len(others) or pn.hypot(*(others - foot).T).min() > _APART:
                 kept = np.concatenate((kept, foot[None]))
                 rows.append((float(foot[0]), float(foot[1]), pm.atan2(way[1], way[0])))
+    return np.array(rows).reshape(-1, 3)
+
+
+def lot_lamps(clearance: Clearance) -> Array:
+    """Returns feet and headings (n, 3) of the lamps of lots [m, rad]: on both sides of the front, where there is room.
+
+    All lots have them, whether a session has a landmark there or not.
+    """
+    rows: list[tuple[float, float, float]] = []
+    for lot in clearance.lots:
+        for side in (-1.0, 1.0):
+            for deep, beyond in _LOT_SPOTS:
+                x, y = lot.at(deep, side * (lot.length / 2.0 + beyond))
+                if clearance.has_room(x, y, 0.2) and not clearance.on_footway(np.array([(x, y)]))[0]:
+                    front = lot.at(0.0, 0.0)
+                    rows.append((x, y, pm.atan2(front[1] - y, front[0] - x)))
+                    break
     return np.array(rows).reshape(-1, 3)
 
 

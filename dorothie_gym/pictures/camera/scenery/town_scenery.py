@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from dorothie_gym.pictures.camera.mesh import Mesh, joined
 from dorothie_gym.pictures.camera.scenery.buildings import build_buildings, plan_buildings
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance
+from dorothie_gym.pictures.camera.scenery.guard_rails import build_rails, rail_lines
 from dorothie_gym.pictures.camera.scenery.lenses import Lenses
 from dorothie_gym.pictures.camera.scenery.lots import Lot
-from dorothie_gym.pictures.camera.scenery.signals import build_blades, build_signals, plan_blades
-from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places
+from dorothie_gym.pictures.camera.scenery.signals import build_signals
+from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places, lot_lamps
+from dorothie_gym.pictures.camera.scenery.street_signs import build_blades, build_boards, plan_blades, plan_boards
 from dorothie_gym.pictures.camera.scenery.trees import build_trees
 
 if TYPE_CHECKING:
@@ -50,10 +52,16 @@ def build_scenery(layers: MapLayers, ground: Heights) -> Scenery:
     """
     clearance = Clearance(layers)
     signals, lenses = build_signals(layers, clearance, ground)
-    lamps, lights = build_lamps(lamp_places(layers, clearance), ground)
+    lamp_feet, blades = lamp_places(layers, clearance), plan_blades(layers, clearance)
+    lamps, lights = build_lamps(np.concatenate((lamp_feet, lot_lamps(clearance))), ground)
+    lit = np.array([post.at for post in layers.posts]).reshape(-1, 2)
+    corners = np.array([blade.at for blade in blades]).reshape(-1, 2)
+    boards = plan_boards(layers, clearance, np.concatenate((lit, lamp_feet[:, :2], corners)))
     parts = [
         lamps,
-        build_blades(layers, plan_blades(layers, clearance), ground),
+        build_blades(layers, blades, ground),
+        build_boards(layers, boards, ground),
+        build_rails(rail_lines(layers, clearance, ground)),
         build_trees(layers, ground),
         build_buildings(plan_buildings(layers, clearance), ground),
     ]
