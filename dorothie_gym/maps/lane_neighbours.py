@@ -48,6 +48,13 @@ MIN_GAP = 1.0
 MAX_OFFSET = 3.0
 """Largest distance along the lane to the closest point of the other lane [m]; beyond it the other lane has ended."""
 
+LEAST_TO_TURN, LEAST_TO_WAIT = 10.0, 5.0
+"""Least length of a lane on which a car can turn round [m], and of one at whose end it waits.
+
+It waits where no lane leads on, or one must be chosen. On a shorter lane the centre of a waiting car lies before the
+lane, and a moving car passes it before it has braked.
+"""
+
 SAMPLING = 4.0
 """Spacing of the points by which candidate lanes are found [m]; up to twice as much on short lanes."""
 
@@ -81,8 +88,8 @@ class OncomingLanes:
     def at(self, lane_id: int, station: float) -> Oncoming | None:
         """Returns the opposite point on the oncoming lane.
 
-        None in a junction, on a lane that is not the innermost, and without an oncoming lane nearby. At a dead end,
-        where all lanes end, cars turn round from the other lanes too.
+        None in a junction, on a lane that is not the innermost or too short, and without an oncoming lane nearby. At a
+        dead end, where all lanes end, cars turn round from the other lanes too.
         """
         candidates = self.candidates(lane_id)
         if not len(candidates):
@@ -103,8 +110,10 @@ class OncomingLanes:
         """Returns the lanes outside junctions that are close enough to be oncoming somewhere along a lane."""
         lane = self._town.lanes[lane_id]
         innermost = self._town.neighbour(lane_id, self._town.traffic.to_middle) is None
-        ends = not self._town.successors(lane_id) and self._town.merge(lane_id) is None
-        if lane.in_junction or not (innermost or ends):
+        ways_on = len(self._town.successors(lane_id))
+        ends = ways_on == 0 and self._town.merge(lane_id) is None
+        short = lane.length < (LEAST_TO_TURN if ways_on == 1 else LEAST_TO_WAIT)
+        if lane.in_junction or short or not (innermost or ends):
             return np.empty(0, dtype=np.int64)
         reach = pm.hypot(WIDEST_MEDIAN, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
         own = self._points[self._owners == lane_id]

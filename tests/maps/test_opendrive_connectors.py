@@ -9,7 +9,7 @@ from dorothie_gym.maps.import_notes import ImportNote
 from dorothie_gym.maps.lint import check_town
 from dorothie_gym.maps.lint.fault import FaultKind
 from dorothie_gym.maps.opendrive import import_opendrive
-from dorothie_gym.maps.opendrive.connectors import Pose, shortest_legs
+from dorothie_gym.maps.opendrive.car_paths import Pose, shortest_legs
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section
 

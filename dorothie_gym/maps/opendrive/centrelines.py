@@ -10,8 +10,9 @@ import numpy as np
 
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.opendrive.connectors import repair_connectors
+from dorothie_gym.maps.opendrive.connectors import lane_name, repair_connectors
 from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
+from dorothie_gym.maps.opendrive.folds import without_folds
 from dorothie_gym.maps.opendrive.parse import refuse_empty
 from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord, SectionRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
@@ -97,7 +98,8 @@ def sample_centrelines(
     """Returns the centre lines of all lanes in the frame of the town and in driving direction, joined at links.
 
     A lane that opens or closes beside others without a link at that end begins where it reaches half of its width:
-    the wedge before cannot be driven. A lane whose centre line has no length, or a jump, is dropped with a note.
+    the wedge before cannot be driven. Loops inside bends that are too sharp for a lane are cut off. A lane whose centre
+    line has no length, jumps or turns back is dropped with a note.
 
     Args:
         records: records of the file.
@@ -114,15 +116,13 @@ def sample_centrelines(
         lines = _dense_lines(records, topology, samples)
         faults = {k: fault for k, line in enumerate(lines) if (fault := _fault(line))}
         for k, fault in faults.items():
-            first = topology.chains[k][0]
-            element = f"road {records.roads[first.road].name} / laneSection {first.section} / lane {first.lane}"
-            records.notes.dropped(NoteKind.LANE, element, fault)
+            records.notes.dropped(NoteKind.LANE, lane_name(records, topology, k), fault)
         if len(faults) == len(lines):
             refuse_empty(records.source, records.notes, "has no driving lane whose centre line can be driven")
         if not faults:
             break
         topology = topology.without(faults)  # ends that have lost their links may now be wedges
-    lines = [thin(line) for line in lines]
+    lines = [thin(_cut(records, topology, k, line)) for k, line in enumerate(lines)]
     topology, lines = repair_connectors(records, topology, lines)
     _stitch(lines, topology.links)
     return topology, lines
@@ -164,7 +164,19 @@ def _fault(dense: Array) -> str:
     if pn.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
         return "its centre line shrinks to a point: the bend is too sharp for it"
     jump = float(np.max(pn.hypot(*np.diff(dense[:, :2], axis=0).T)))
-    return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths" if jump > _LARGEST_JUMP else ""
+    if jump > _LARGEST_JUMP:
+        return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths"
+    return "its centre line turns back; check geometry and offsets" if without_folds(dense) is None else ""
+
+
+def _cut(records: OpenDriveRecords, topology: Topology, lane: int, dense: Array) -> Array:
+    """Returns a centre line (n, 4) without loops, which `_fault` has found possible; with a note if there are any."""
+    line = without_folds(dense)
+    if line is None or line is dense:
+        return dense
+    reason = "lies inside a bend that is too sharp for it; the loops of its centre line were cut off"
+    records.notes.repaired(NoteKind.LANE, lane_name(records, topology, lane), reason)
+    return line
 
 
 def sample_road(road: RoadRecord) -> RoadSamples:
