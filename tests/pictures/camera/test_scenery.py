@@ -17,12 +17,17 @@ from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.camera.atlas import STREET_NAMES, Texture
+from dorothie_gym.pictures.camera.ground.arrays import ground_arrays
+from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET, material_at
+from dorothie_gym.pictures.camera.ground.materials import LOOKS, Material
+from dorothie_gym.pictures.camera.ground.sheets import town_sheets
 from dorothie_gym.pictures.camera.mesh import MeshBuilder, Surface
 from dorothie_gym.pictures.camera.scenery.buildings import Building, Style, build_buildings, plan_buildings
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance
+from dorothie_gym.pictures.camera.scenery.guard_rails import BESIDE, build_rails, rail_lines
 from dorothie_gym.pictures.camera.scenery.placing import FlatGround, stamped
 from dorothie_gym.pictures.camera.scenery.signals import build_signals
-from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places
+from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places, lot_lamps
 from dorothie_gym.pictures.camera.scenery.street_signs import build_blades, plan_blades
 from dorothie_gym.pictures.camera.scenery.town_scenery import Scenery, build_scenery
 from dorothie_gym.pictures.camera.scenery.trees import build_trees, tree_places
@@ -284,3 +289,44 @@ def test_a_town_has_few_triangles_and_the_same_bytes_in_another_process() -> Non
     )
     other = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.strip()
     assert other == digest
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_no_lamp_or_light_stands_on_asphalt(name: str) -> None:
+    layers, clearance = layers_of(name), clearance_of(name)
+    lamps = np.concatenate((lamp_places(layers, clearance), lot_lamps(clearance)))[:, :2]
+    mesh, _ = build_signals(layers, clearance, FlatGround())
+    poles = mesh.corners[mesh.classes == ObjectClass.POLE.value].reshape(-1, 3)[:, :2].astype(float)
+    own = np.array([post.at for post in layers.posts]).reshape(-1, 2)
+    if len(own):
+        poles = poles[np.hypot(*(poles[:, None] - own).transpose(2, 0, 1)).min(axis=1) > 0.3]
+    sheet = ground_arrays(town_sheets(load_town(name)))
+    for feet in (lamps, poles):
+        kinds = [LOOKS[Material(material_at(sheet, GROUND_SHEET, x, y))].kind for x, y in feet.tolist()]
+        assert ObjectClass.ROAD not in kinds
+        assert ObjectClass.ROAD_LINE not in kinds
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_most_lots_are_lit_at_night(name: str) -> None:
+    clearance = clearance_of(name)
+    _, lights = build_lamps(lot_lamps(clearance), FlatGround())
+    near = [np.hypot(*(lights[:, :2] - lot.front).T).min() < lot.length / 2.0 + 4.0 for lot in clearance.lots]
+    assert np.mean(near) > 0.9
+
+
+def test_rails_stand_where_the_ground_beside_a_road_is_much_lower() -> None:
+    class Plateau:
+        def height_at(self, points: Array) -> Array:
+            return np.where(points[:, 0] > 0.0, -5.0, 0.0)
+
+    layers, clearance = layers_of("brookside"), clearance_of("brookside")
+    assert rail_lines(layers, clearance, FlatGround()) == []
+    lines = rail_lines(layers, clearance, Plateau())
+    assert lines
+    for line in lines:
+        assert not clearance.on_asphalt(line[:, :2]).any()
+        assert not clearance.on_footway(line[:, :2]).any()
+        assert line[:, 0].max() > -BESIDE - 8.0
+    mesh = build_rails(lines)
+    assert set(mesh.classes.tolist()) == {ObjectClass.GUARD_RAIL.value}
