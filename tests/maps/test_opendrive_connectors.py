@@ -159,6 +159,40 @@ def test_a_turnaround_that_can_be_followed_stays_as_it_is(tmp_path: Path) -> Non
     assert connector.length == pytest.approx(math.pi * 5.0, abs=0.05)
 
 
+def _corner(folder: Path, angle: float) -> tuple[Town, tuple[ImportNote, ...]]:
+    """Two lanes that meet at a corner 1.6 m apart; the curve of the file between them turns back twice."""
+    turn = math.radians(angle)
+    plan = "".join(
+        geometry("<line/>", 2.0, s=2.0 * k, x=100.0, hdg=heading)
+        for k, heading in enumerate((0.0, math.pi, turn))
+    )
+    x, y = 100.0 + 1.6 * math.cos(0.5 * turn), 1.6 * math.sin(0.5 * turn)
+    after = geometry("<line/>", 100.0, x=x, y=y, hdg=turn)
+    centred = '<laneOffset s="0" a="2" b="0" c="0" d="0"/>'
+    parts = [
+        road(1, sections=LANE, link=_to_junction("successor"), offset=centred),
+        road(2, sections=LANE, plan=after, link=_to_junction("predecessor"), offset=centred),
+        road(3, sections=LANE, length=6.0, plan=plan, junction=1, link=_link(1, 2), offset=centred),
+        '<junction id="1"><connection id="0" incomingRoad="1" connectingRoad="3" contactPoint="start">'
+        '<laneLink from="-1" to="-1"/></connection></junction>',
+    ]
+    path = folder / "town.xodr"
+    path.write_text(opendrive(*parts))
+    town, notes = import_opendrive(path)
+    return town, notes.sorted()
+
+
+@pytest.mark.parametrize("angle", [60.0, 90.0, 120.0, -90.0])
+def test_a_corner_without_room_for_the_car_is_a_bend_without_loops(tmp_path: Path, angle: float) -> None:
+    town, notes = _corner(tmp_path, angle)
+    (connector,) = (of for of in town.lanes if of.in_junction)
+    turns = np.diff(np.unwrap(connector.headings))
+    assert np.abs(turns).max() < math.radians(30.0)
+    assert np.abs(turns).sum() < math.radians(abs(angle) + 70.0)
+    assert {link.target for link in town.links if link.source == connector.id}
+    assert NoteAction.REPAIRED in {note.action for note in notes}
+
+
 def test_a_path_that_would_be_a_loop_is_left_alone(tmp_path: Path) -> None:
     """Two lanes side by side in one direction, linked by a connector across: only a loop could join them."""
     parts = [

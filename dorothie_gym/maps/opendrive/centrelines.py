@@ -10,9 +10,10 @@ import numpy as np
 
 from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.opendrive.car_paths import turn_between
 from dorothie_gym.maps.opendrive.connectors import lane_name, repair_connectors
 from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
-from dorothie_gym.maps.opendrive.folds import without_folds
+from dorothie_gym.maps.opendrive.folds import SHARPEST, turns_back, without_folds
 from dorothie_gym.maps.opendrive.parse import refuse_empty
 from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord, SectionRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
@@ -123,9 +124,25 @@ def sample_centrelines(
             break
         topology = topology.without(faults)  # ends that have lost their links may now be wedges
     lines = [thin(_cut(records, topology, k, line)) for k, line in enumerate(lines)]
-    topology, lines = repair_connectors(records, topology, lines)
+    topology, lines = _leading_on(records, *repair_connectors(records, topology, lines))
+    topology = _without_breaks(records, topology, lines)
     _stitch(lines, topology.links)
     return topology, lines
+
+
+def _without_breaks(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> Topology:
+    """Returns the topology without links between lanes that do not meet, or meet in opposite directions."""
+    kept = []
+    for source, target in topology.links:
+        gap = float(pn.hypot(*(lines[target][0, :2] - lines[source][-1, :2])))
+        turn = turn_between(lines[source], lines[target])
+        if gap > _LARGEST_JUMP or turn > SHARPEST:
+            to = lane_name(records, topology, target)
+            reason = f"does not lead to {to}: {gap:.1f} m away, at an angle of {np.degrees(turn):.0f} degrees"
+            records.notes.dropped(NoteKind.LANE_LINK, lane_name(records, topology, source), reason)
+        else:
+            kept.append((source, target))
+    return topology if len(kept) == len(topology.links) else Topology(topology.chains, tuple(kept))
 
 
 def _dense_lines(records: OpenDriveRecords, topology: Topology, samples: Mapping[int, RoadSamples]) -> list[Array]:
@@ -164,19 +181,28 @@ def _fault(dense: Array) -> str:
     if pn.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
         return "its centre line shrinks to a point: the bend is too sharp for it"
     jump = float(np.max(pn.hypot(*np.diff(dense[:, :2], axis=0).T)))
-    if jump > _LARGEST_JUMP:
-        return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths"
-    return "its centre line turns back; check geometry and offsets" if without_folds(dense) is None else ""
+    return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths" if jump > _LARGEST_JUMP else ""
 
 
 def _cut(records: OpenDriveRecords, topology: Topology, lane: int, dense: Array) -> Array:
-    """Returns a centre line (n, 4) without loops, which `_fault` has found possible; with a note if there are any."""
+    """Returns a centre line (n, 4) without loops, with a note; one that turns back for good stays as it is."""
     line = without_folds(dense)
     if line is None or line is dense:
         return dense
     reason = "lies inside a bend that is too sharp for it; the loops of its centre line were cut off"
     records.notes.repaired(NoteKind.LANE, lane_name(records, topology, lane), reason)
     return line
+
+
+def _leading_on(records: OpenDriveRecords, topology: Topology, lines: list[Array]) -> tuple[Topology, list[Array]]:
+    """Returns the lanes without those whose centre lines (n, 4) turn back."""
+    bad = {k for k, line in enumerate(lines) if turns_back(line)}
+    for k in sorted(bad):
+        reason = "its centre line turns back; check geometry and offsets"
+        records.notes.dropped(NoteKind.LANE, lane_name(records, topology, k), reason)
+    if len(bad) == len(lines):
+        refuse_empty(records.source, records.notes, "has no driving lane whose centre line can be driven")
+    return topology.without(bad), [line for k, line in enumerate(lines) if k not in bad]
 
 
 def sample_road(road: RoadRecord) -> RoadSamples:

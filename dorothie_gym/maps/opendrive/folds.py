@@ -53,6 +53,11 @@ def without_folds(line: Array) -> Array | None:
         line = _joined(line, places, *cut)
 
 
+def turns_back(line: Array) -> bool:
+    """Returns whether a line (n, >= 2) turns back somewhere."""
+    return len(_turning_points(line)[1]) > 0
+
+
 def _turning_points(line: Array) -> tuple[Array, IntArray]:
     """Returns the distance along a line at its points (n,) [m], and the points at which it turns back.
 
