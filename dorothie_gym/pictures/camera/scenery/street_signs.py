@@ -275,8 +275,9 @@ def build_boards(layers: MapLayers, boards: list[Board], ground: Heights) -> Mes
             for across in (-0.3 * width, 0.3 * width):
                 foot = oriented([(0.06, across)], board.at, board.look)[0]
                 builder.prism(
-                    disc(foot, 0.05, 5), low - _BOARD_HEIGHT - 0.3, low + tall, colour=_METAL, kind=ObjectClass.POLE
-                )
+                    disc(foot, 0.05, 3), low - _BOARD_HEIGHT - 0.3, low + tall, colour=_METAL, kind=ObjectClass.POLE,
+                    closed=(False, False),
+                )  # fmt: skip
         else:
             low = board.height + _OVERHEAD
             _add_arm(builder, board, board.post, foot_beside_road(layers, ground, board.post, board.height), low, tall)
@@ -295,7 +296,7 @@ def _add_arm(
 ) -> None:
     """Adds the post of a board above the road, and its arm behind the board."""
     top, kind = low + tall, ObjectClass.POLE
-    builder.prism(disc(post, 0.11, 6), base - 0.3, top, colour=_METAL, kind=kind)
+    builder.prism(disc(post, 0.11, 4), base - 0.3, top, colour=_METAL, kind=kind)
     behind = oriented([(0.09, 0.0)], board.at, board.look)[0]
     way = np.array(post) - behind
     out = way / max(float(pn.hypot(*way)), 1e-9) * (_BOARD[0] / 2.0)
