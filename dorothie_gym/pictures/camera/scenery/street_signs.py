@@ -36,6 +36,7 @@ _CORNERS_APART = 6.0  # [m]
 _BOARD = 4.0, 1.0  # [m] width and height of a name on a board: legible at 20 m in a picture of 480 pixels
 _BOARD_HEIGHT = 2.4  # [m] of its lower edge: above people
 _OVERHEAD = 5.0  # [m] of a board above the road: above lorries
+_ARM_BEHIND = 0.2  # [m] from such a board to its post and arm
 _POST_APART = 0.8  # [m] from the post of such a board to others
 _BOARD_APART = 3.0  # [m] from a board to posts and other boards
 # distances [m] before a stop line and after a junction, the best first; the others only where none of them has room
@@ -296,11 +297,11 @@ def _add_arm(
 ) -> None:
     """Adds the post of a board above the road, and its arm behind the board."""
     top, kind = low + tall, ObjectClass.POLE
-    builder.prism(disc(post, 0.11, 4), base - 0.3, top, colour=_METAL, kind=kind)
-    behind = oriented([(0.09, 0.0)], board.at, board.look)[0]
-    way = np.array(post) - behind
+    foot, behind = (oriented([(_ARM_BEHIND, 0.0)], place, board.look)[0] for place in (post, board.at))
+    builder.prism(disc(foot, 0.11, 4), base - 0.3, top, colour=_METAL, kind=kind)
+    way = foot - behind
     out = way / max(float(pn.hypot(*way)), 1e-9) * (_BOARD[0] / 2.0)
-    middle, length = (behind - out + post) / 2.0, float(pn.hypot(*(way + out)))
+    middle, length = (behind - out + foot) / 2.0, float(pn.hypot(*(way + out)))
     builder.box(
         middle, pm.atan2(way[1], way[0]), length, 0.12, top - 0.35, top - 0.2, colour=_METAL, kind=kind,
         closed=(True, True),
