@@ -158,17 +158,25 @@ def plan_boards(layers: MapLayers, clearance: Clearance, taken: Array) -> list[B
 
 
 def _first_apart(boards: Iterator[Board], others: list[Board]) -> Board | None:
-    """Returns the first board that neither hides another one for the same drivers nor is hidden by it."""
+    """Returns the first board that neither hides another one for the same drivers nor is hidden by it.
+
+    If there is none, the board that is farthest from the others.
+    """
+    best, farthest = None, _BOARD_APART
     for board in boards:
-        c, s = pm.cos(board.look), pm.sin(board.look)
-        if not any(
-            pm.dist(board.at, other.at) < _SAME_DRIVERS
-            and c * pm.cos(other.look) + s * pm.sin(other.look) > 0.5
-            and (board.post is None) == (other.post is None)
-            for other in others
-        ):
+        away = min((_apart(board, other) for other in others), default=_SAME_DRIVERS)
+        if away >= _SAME_DRIVERS:
             return board
-    return None
+        if away > farthest:
+            best, farthest = board, away
+    return best
+
+
+def _apart(board: Board, other: Board) -> float:
+    """Returns the distance of two boards at the same height for the same drivers [m], otherwise infinity."""
+    facing = pm.cos(board.look) * pm.cos(other.look) + pm.sin(board.look) * pm.sin(other.look) > 0.5
+    alike = facing and (board.post is None) == (other.post is None)
+    return pm.dist(board.at, other.at) if alike else math.inf
 
 
 def _view_of(board: Board) -> shapely.Polygon:
