@@ -36,6 +36,7 @@ _CORNERS_APART = 6.0  # [m]
 _BOARD = 4.0, 1.0  # [m] width and height of a name on a board: legible at 20 m in a picture of 480 pixels
 _BOARD_HEIGHT = 2.4  # [m] of its lower edge: above people
 _OVERHEAD = 5.0  # [m] of a board above the road: above lorries
+_ARM_BEHIND = 0.2  # [m] from such a board to its post and arm
 _POST_APART = 0.8  # [m] from the post of such a board to others
 _BOARD_APART = 3.0  # [m] from a board to posts and other boards
 # distances [m] before a stop line and after a junction, the best first; the others only where none of them has room
@@ -157,17 +158,25 @@ def plan_boards(layers: MapLayers, clearance: Clearance, taken: Array) -> list[B
 
 
 def _first_apart(boards: Iterator[Board], others: list[Board]) -> Board | None:
-    """Returns the first board that neither hides another one for the same drivers nor is hidden by it."""
+    """Returns the first board that neither hides another one for the same drivers nor is hidden by it.
+
+    If there is none, the board that is farthest from the others.
+    """
+    best, farthest = None, _BOARD_APART
     for board in boards:
-        c, s = pm.cos(board.look), pm.sin(board.look)
-        if not any(
-            pm.dist(board.at, other.at) < _SAME_DRIVERS
-            and c * pm.cos(other.look) + s * pm.sin(other.look) > 0.5
-            and (board.post is None) == (other.post is None)
-            for other in others
-        ):
+        away = min((_apart(board, other) for other in others), default=_SAME_DRIVERS)
+        if away >= _SAME_DRIVERS:
             return board
-    return None
+        if away > farthest:
+            best, farthest = board, away
+    return best
+
+
+def _apart(board: Board, other: Board) -> float:
+    """Returns the distance of two boards at the same height for the same drivers [m], otherwise infinity."""
+    facing = pm.cos(board.look) * pm.cos(other.look) + pm.sin(board.look) * pm.sin(other.look) > 0.5
+    alike = facing and (board.post is None) == (other.post is None)
+    return pm.dist(board.at, other.at) if alike else math.inf
 
 
 def _view_of(board: Board) -> shapely.Polygon:
@@ -275,8 +284,9 @@ def build_boards(layers: MapLayers, boards: list[Board], ground: Heights) -> Mes
             for across in (-0.3 * width, 0.3 * width):
                 foot = oriented([(0.06, across)], board.at, board.look)[0]
                 builder.prism(
-                    disc(foot, 0.05, 5), low - _BOARD_HEIGHT - 0.3, low + tall, colour=_METAL, kind=ObjectClass.POLE
-                )
+                    disc(foot, 0.05, 3), low - _BOARD_HEIGHT - 0.3, low + tall, colour=_METAL, kind=ObjectClass.POLE,
+                    closed=(False, False),
+                )  # fmt: skip
         else:
             low = board.height + _OVERHEAD
             _add_arm(builder, board, board.post, foot_beside_road(layers, ground, board.post, board.height), low, tall)
@@ -295,11 +305,11 @@ def _add_arm(
 ) -> None:
     """Adds the post of a board above the road, and its arm behind the board."""
     top, kind = low + tall, ObjectClass.POLE
-    builder.prism(disc(post, 0.11, 6), base - 0.3, top, colour=_METAL, kind=kind)
-    behind = oriented([(0.09, 0.0)], board.at, board.look)[0]
-    way = np.array(post) - behind
+    foot, behind = (oriented([(_ARM_BEHIND, 0.0)], place, board.look)[0] for place in (post, board.at))
+    builder.prism(disc(foot, 0.11, 4), base - 0.3, top, colour=_METAL, kind=kind)
+    way = foot - behind
     out = way / max(float(pn.hypot(*way)), 1e-9) * (_BOARD[0] / 2.0)
-    middle, length = (behind - out + post) / 2.0, float(pn.hypot(*(way + out)))
+    middle, length = (behind - out + foot) / 2.0, float(pn.hypot(*(way + out)))
     builder.box(
         middle, pm.atan2(way[1], way[0]), length, 0.12, top - 0.35, top - 0.2, colour=_METAL, kind=kind,
         closed=(True, True),
