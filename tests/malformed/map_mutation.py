@@ -13,9 +13,9 @@ from lxml import etree
 Element: TypeAlias = etree._Element
 
 VALUES: Final = (
-    "", " ", "0", "-0", "1", "-1", "2", "-2", "0.5", "1e-9", "-1e-9", "1e-320", "1e3", "1e5", "1e6", "1e9", "-1e9", "1e12",
-    "1e308", "-1e308", "1e999", "nan", "inf", "-inf", "9" * 400, "0x10", "1,5", "½", "true", "none", "driving", "start", "end",
-    "road", "junction", "LHT", "RHT", "a_b", "ü\u202e", "x" * 3000,
+    "", " ", "0", "-0", "1", "-1", "2", "-2", "0.5", "1e-9", "-1e-9", "1e-320", "1e3", "1e5", "1e6", "1e9", "-1e9",
+    "1e12", "1e308", "-1e308", "1e999", "nan", "inf", "-inf", "9" * 400, "0x10", "1,5", "½", "true", "none", "driving",
+    "start", "end", "road", "junction", "LHT", "RHT", "a_b", "ü\u202e", "x" * 3000,
 )  # fmt: skip
 """Values that replace those of attributes."""
 
@@ -189,6 +189,6 @@ def _replace_contents(root: Element, random: Random) -> None:
 
 
 _MUTATIONS: Final[tuple[Callable[[Element, Random], None], ...]] = (
-    _change, _change, _change, _change, _change_all, _change_all, _drop_attribute, _swap_values, _swap_values, _same_values,
-    _drop, _drop_all, _repeat, _shuffle, _move, _nest, _rename, _replace_contents,
+    _change, _change, _change, _change, _change_all, _change_all, _drop_attribute, _swap_values, _swap_values,
+    _same_values, _drop, _drop_all, _repeat, _shuffle, _move, _nest, _rename, _replace_contents,
 )  # fmt: skip

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import defaultdict, deque
 from pathlib import Path
 from random import Random
+from typing import TYPE_CHECKING
 
 from lxml import etree
 
+from tests.maps.yaml_text import MIDTOWN
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps import Town
+
 Element = etree._Element
+
+WHOLE = 60_000
+"""Largest file that is mutated as a whole [bytes]."""
 
 
 def piece(content: bytes, roads: int, random: Random) -> bytes:
@@ -52,7 +62,51 @@ def _linked(root: Element, by_id: dict[str, Element], count: int, random: Random
     return found
 
 
-def maps_at_hand() -> list[Path]:
-    """Returns the maps beside the repository, in the order of their names; none where there are none."""
-    folder = Path(__file__).parents[2] / "../shared/maps"
-    return sorted(folder.glob("*.xodr"))
+# --- Originals --------------------------------------------------------------------------------------------------------
+
+
+def make_written(folder: Path) -> None:
+    """Writes a town with lights, a roundabout, turn lanes, sidewalks and crosswalks."""
+    _write(_town(folder), folder)
+
+
+def make_left(folder: Path) -> None:
+    """Writes the same town with left-hand traffic."""
+    from dorothie_gym.maps import mirrored
+
+    _write(mirrored(_town(folder)), folder)
+
+
+def make_ends(folder: Path) -> None:
+    """Writes a ring with lanes that taper away, and a one-way road that leaves the map."""
+    from tests.maps.ending_lanes import stub
+
+    stub(folder / "town.xodr")
+
+
+def make_at_hand(folder: Path) -> None:
+    """Copies the largest map beside the repository; where there is none, writes a shipped town."""
+    from dorothie_gym.maps import load_town
+
+    maps = sorted((Path(__file__).parents[2] / "../shared/maps").glob("*.xodr"))
+    if maps:
+        shutil.copy(max(maps, key=lambda path: path.stat().st_size), folder / "town.xodr")
+    else:
+        _write(load_town("midtown"), folder)
+
+
+def _town(folder: Path) -> Town:
+    from dorothie_gym.maps import load_town
+    from tests.maps.yaml_text import written
+
+    file = written(folder, MIDTOWN)
+    try:
+        return load_town(file)
+    finally:
+        file.unlink()
+
+
+def _write(town: Town, folder: Path) -> None:
+    from dorothie_gym.maps import write_opendrive
+
+    write_opendrive(town, folder / "town.xodr")

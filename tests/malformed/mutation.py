@@ -14,6 +14,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
 
+from tests.malformed.map_mutation import mutate_map
+from tests.malformed.map_pieces import WHOLE, piece
+
 NUMBERS = (
     0, -1, 1, 2, 0.5, -0.0, 1e308, -1e308, 1e-320, 2**31, 2**53, 2**63, -(2**63) - 1, 10**25, 10**60,
     float("nan"), float("inf"), float("-inf"),
@@ -183,6 +186,13 @@ _BOMB = (
 )
 
 
+def of_map(content: bytes, random: Random) -> bytes:
+    """Mutates a map by its elements or by its text; of a large map, a piece."""
+    if len(content) > WHOLE:
+        content = piece(content, random.choice((3, 8, 20, 40)), random)
+    return mutate_map(content, random) if random.random() < 0.6 else of_xml(content, random)
+
+
 def of_xml(content: bytes, random: Random) -> bytes:
     if random.random() < 0.02:
         return random.choice((_BOMB, b"<OpenDRIVE>" + b"<road>" * 3000, b"<OpenDRIVE/>"))
@@ -255,7 +265,7 @@ BY_SUFFIX: dict[str, Callable[[bytes, Random], bytes]] = {
     ".jsonl": of_lines,
     ".csv": of_csv,
     ".yaml": of_yaml,
-    ".xodr": of_xml,
+    ".xodr": of_map,
     ".parquet": of_parquet,
     ".safetensors": of_safetensors,
 }

@@ -9,11 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from random import Random
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tests.malformed.map_pieces import make_at_hand, make_ends, make_left, make_written
+from tests.malformed.map_use import use_map
 from tests.malformed.side_files import (
     make_annotations,
     make_cassette,
@@ -189,6 +192,11 @@ def _read_town(folder: Path) -> None:
         describe(town)
         check_town(town)
         town_arrays(TownNetwork(town))
+
+
+def _use_maps(folder: Path) -> None:
+    for path in sorted(folder.iterdir()):
+        use_map(path, Random(path.stat().st_size if path.is_file() else 0))
 
 
 def _storyboard(folder: Path) -> None:
@@ -449,6 +457,10 @@ SUBJECTS: Final = MappingProxyType(
         "predictions": Subject(_predictions, _read_predictions),
         "yaml": Subject(_yaml_town, _read_town, slow=True),
         "opendrive": Subject(_opendrive_town, _read_town),
+        "map-written": Subject(make_written, _use_maps, slow=True),
+        "map-left": Subject(make_left, _use_maps, slow=True),
+        "map-ends": Subject(make_ends, _use_maps, slow=True),
+        "map-at-hand": Subject(make_at_hand, _use_maps, slow=True),
         "storyboard": Subject(_storyboard, _read_storyboard),
         "study": Subject(make_study, read_study),
         "rollout": Subject(_rollout, _read_rollout),

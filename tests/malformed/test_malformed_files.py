@@ -38,6 +38,7 @@ GROUPS = (
         "audio",
     ),
     ("yaml",),
+    ("map-written", "map-left", "map-ends", "map-at-hand"),
     ("rl", "ad-wizard", "run", "benchmark", "co-wizard", "participant"),
 )
 """Kinds that share a process, by the time that they take."""

@@ -163,8 +163,7 @@ def _corner(folder: Path, angle: float) -> tuple[Town, tuple[ImportNote, ...]]:
     """Two lanes that meet at a corner 1.6 m apart; the curve of the file between them turns back twice."""
     turn = math.radians(angle)
     plan = "".join(
-        geometry("<line/>", 2.0, s=2.0 * k, x=100.0, hdg=heading)
-        for k, heading in enumerate((0.0, math.pi, turn))
+        geometry("<line/>", 2.0, s=2.0 * k, x=100.0, hdg=heading) for k, heading in enumerate((0.0, math.pi, turn))
     )
     x, y = 100.0 + 1.6 * math.cos(0.5 * turn), 1.6 * math.sin(0.5 * turn)
     after = geometry("<line/>", 100.0, x=x, y=y, hdg=turn)
