@@ -147,7 +147,7 @@ class ClauseReader:
             return False
         for number in range(place, min(place + _SUBJECT_WORDS, len(words))):
             word = words[number]
-            if word == "," or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
+            if word in (",", "then") or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
                 return False
             if self._is_finite(number, place):
                 return _ENOUGH.isdisjoint(words[number + 1 : number + 3])

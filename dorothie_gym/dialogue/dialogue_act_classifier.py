@@ -225,7 +225,7 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
         # Small talk remains irrelevant, unless it is a bare answer: "the blue one".
         if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(parsed)):
             move = changes.get(move, move)
-    if sign_of_hearing(parsed, move, after):
+    if formula is not DialogueMove.IRRELEVANT and sign_of_hearing(parsed, move, after):
         move = DialogueMove.ACKNOWLEDGE
     return DialogueAct(move, _slots(parsed, move))
 

@@ -39,6 +39,8 @@ _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 
 _COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
 _WHAT_TO_DO: Final = ("what you", "what we", "okay so what you", "so what you", "right so what you", "all you")
+_CONDITIONS: Final = ("where ", "when ", "wherever ", "whenever ", "so when ", "so where ", "and when ", "then when ")
+"""First words of a condition of an order: "where the wall ends, make a left"."""
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
 _OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
 """Words by which the car offers what it asks: "would you like me to turn?"."""
@@ -123,7 +125,7 @@ _PAST: Final = frozenset(
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
 _CALLS: Final = frozenset(
-    {"oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
+    {"whoa", "woah", "oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
 )
 _REPAIRING: Final = frozenset(
     {
@@ -185,6 +187,8 @@ _OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant)
 _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
+_NOT_NAMED: Final = re.compile(r"#\w+ (?:, )?(?:\w+ , )?not (?:the |on |at |to )?#\w+|\b(?:left|right) (?:, )?not (?:the )?(?:left|right|#left|#ok)\b")
+"""What is meant before what is not: "Bishop, not Beal"."""
 _DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
 
 
@@ -204,6 +208,10 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return answer
     if after in _NEWS and _corrects(parsed):
         return DialogueMove.CLARIFY
+    if after is DialogueMove.CHECK and _insists(parsed):
+        return DialogueMove.CLARIFY  # "first right, I told you"
+    if after in _ANSWERED and parsed.masked.startswith("not ") and parsed.parse is not None and parsed.plan:
+        return DialogueMove.REPLY_N  # "not the second, the third"
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
     if after is None and _refuses(parsed, move):
@@ -270,7 +278,7 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
-    if after is None and move in _SIGNS_FIRST and _runs_on(parsed):
+    if after is None and move in _SIGNS_FIRST and (_runs_on(parsed) or parsed.masked.startswith("please do not")):
         return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
     commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
     if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
@@ -280,7 +288,9 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
         offered = offered or (mine and not all(step.action in _FOR_PASSENGERS for step in parsed.plan))
         return move if offered else DialogueMove.INSTRUCT
-    told = move is DialogueMove.QUERY_W and parsed.masked.startswith(_WHAT_TO_DO)
+    told = move is DialogueMove.QUERY_W and (
+        parsed.masked.startswith(_WHAT_TO_DO) or (_ends_in_order(parse) and parsed.masked.startswith(_CONDITIONS))
+    )
     if (move is DialogueMove.CHECK or told) and not parsed.question:
         return DialogueMove.INSTRUCT
     if (
@@ -289,14 +299,21 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         and parsed.masked.startswith(("no #", "no lights", "no head"))
     ):
         return DialogueMove.INSTRUCT
-    if move is DialogueMove.ACKNOWLEDGE and parsed.masked.startswith(("sorry", "oops", "whoops")):
-        return DialogueMove.INSTRUCT  # "sorry, left"
+    if move is DialogueMove.ACKNOWLEDGE and (
+        requested or parsed.masked.startswith(("sorry", "oops", "whoops", "whoa", "woah"))
+    ):
+        return DialogueMove.INSTRUCT  # "sorry, left"; "okay, that's me"
     if move is DialogueMove.CLARIFY and after is DialogueMove.QUERY_W:
         return DialogueMove.REPLY_W
     own = _OWN_REPAIR.search(parsed.masked) is not None or (parsed.parse is not None and parsed.parse.repaired)
     if move is DialogueMove.CLARIFY and own and after is None:
         return DialogueMove.INSTRUCT
     return move
+
+
+def _ends_in_order(parse: PlanParse | None) -> bool:
+    """Returns whether the last clause is an order, with a step."""
+    return parse is not None and bool(parse.plan.steps) and parse.moods[-1] in ORDERED
 
 
 def _acknowledges(parsed: ParsedText) -> bool:
@@ -322,6 +339,13 @@ def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(("no turning", "no more"))
 
 
+def _insists(parsed: ParsedText) -> bool:
+    """Returns whether a span says what has been said before."""
+    return not parsed.question and bool(parsed.plan.steps or parsed.values) and any(
+        phrase in parsed.masked for phrase in ("i said", "i told you", "i asked", "like i said", "as i said")
+    )
+
+
 def _corrects(parsed: ParsedText) -> bool:
     """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
     if parsed.question:
@@ -331,7 +355,8 @@ def _corrects(parsed: ParsedText) -> bool:
     if not (parsed.plan.steps or parsed.values) or parsed.masked.startswith(("no thanks", "no thank you")):
         return False
     words = parsed.masked.split()
-    return not _DENIALS.isdisjoint(words[:3]) or any(phrase in parsed.masked for phrase in _MEANT)
+    denied = not _DENIALS.isdisjoint(words[:3]) or _NOT_NAMED.search(parsed.masked) is not None
+    return denied or any(phrase in parsed.masked for phrase in _MEANT)
 
 
 def sign_of_hearing(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> bool:

@@ -52,6 +52,9 @@ _STATES: Final = frozenset(
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
+_RANKS: Final = {"first": "advance", "beforehand": "advance", "last": "defer"}
+"""Adverbs behind an errand that put it in front of, or behind the others."""
+_BEHIND_RANKS: Final = frozenset({"", ",", "?", "and", "then", "please", "though", "but"})
 _CHANCES: Final = frozenset({"chance", "moment", "minute", "second", "opportunity"})
 _COMPARED: Final = frozenset({"quicker", "faster", "slower", "quick", "fast", "slow"})
 _STATED: Final = frozenset({"it's", "that's", "is", "are", "was", "it'd", "gets", "looks", "there's"})
@@ -67,6 +70,20 @@ _IN_VIEW: Final = (
     "shows up",
     "in view",
     "in sight",
+    "comes up",
+    "comes along",
+    "comes on",
+    "turns up",
+    "pops into view",
+    "pops out",
+    "looms",
+    "is visible",
+    "becomes visible",
+    "is in sight",
+    "is in view",
+    "are in sight",
+    "is coming up",
+    "is ahead",
 )
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
@@ -101,6 +118,7 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             self._contingency,
             self._cancelled,
             self._stop_noun,
+            self._ranked,
             self.read_direction,
             self.read_quantity,
             self._phrase,
@@ -134,6 +152,15 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         ) == "stop":
             return max(behind, place + 1) + 1
         return place
+
+    def _ranked(self, place: int) -> int:
+        """Reads that the errand named just before comes first or last: "the Shell and the KFC, the KFC first"."""
+        kind = _RANKS.get(self.words[place])
+        named = isinstance(self.names.get(place - 1), LandmarkName) and self.word_at(place + 1) in _BEHIND_RANKS
+        if kind is None or not named:
+            return place
+        self.items.append(ActionItem(kind, place, place + 1))
+        return place + 1
 
     def _comma(self, place: int) -> int:
         if self.words[place] not in (",", "?"):
@@ -311,7 +338,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         rest = " ".join(self.words[behind : behind + 3])
         for phrase in _IN_VIEW:
             if rest.startswith(phrase):
-                relation, behind = ConditionRelation.SEEN, behind + len(phrase.split())
+                relation = relation if relation is ConditionRelation.UNTIL else ConditionRelation.SEEN
+                behind += len(phrase.split())
                 break
         if self.words[place] in _WORDY and found.reference is not None and found.reference.object is not None:
             left = self.grammar.leaving.longest(self.words, behind) if self.word_at(behind) else None
