@@ -336,6 +336,9 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
         return spans  # nothing was said that could be answered or corrected
     if any(_joins_sentences(part, spans) for part, _ in found):
         return spans
+    changes = _cues().answers.get(after) if after is not None else None
+    if changes is not None and found[0][1] is not DialogueMove.IRRELEVANT:
+        found[0] = found[0][0], changes.get(found[0][1], found[0][1])
     ruled = {(span.text, span.act.move): span for span in spans}
     return tuple(
         ruled.get((part, move)) or Span(part, DialogueAct(move, _slots(understand(part), move))) for part, move in found

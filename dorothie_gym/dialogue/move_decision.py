@@ -20,7 +20,7 @@ from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import is_mere_sign
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
@@ -34,6 +34,12 @@ _SHORT: Final = 4
 _NEWS: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.CONFIRM, DialogueMove.ACKNOWLEDGE})
 """Moves of the car that a listener takes note of, or sets right."""
 
+_VAGUE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT, DialogueMove.ACKNOWLEDGE})
+"""Moves that the cues give to an answer of unknown form."""
+
+_LONGEST_ANSWER: Final = 6
+_NEGATIVE: Final = frozenset({"no", "not", "never", "cannot", "nothing", "neither", "nor", "hardly"})
+
 _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 """Moves that the cues give to an order of unknown form."""
 
@@ -42,7 +48,7 @@ _WHAT_TO_DO: Final = ("what you", "what we", "okay so what you", "so what you", 
 _CONDITIONS: Final = ("where ", "when ", "wherever ", "whenever ", "so when ", "so where ", "and when ", "then when ")
 """First words of a condition of an order: "where the wall ends, make a left"."""
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
-_OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
+_OFFERS: Final = ("may i", "shall i", "shall we", "should i", "should we", "like me", "want me", "would you like", "do you want", "if i", "can i take", "do i", "will i", "would i")
 """Words by which the car offers what it asks: "would you like me to turn?"."""
 
 _FOR_PASSENGERS: Final = frozenset({StepAction.STOP, StepAction.VISIT, StepAction.WAIT})
@@ -99,6 +105,10 @@ _MEANT: Final = (
     "not what i",
     "i told",
     " we're after",
+    " i want$",
+    " we want$",
+    " i wanted$",
+    " we need$",
     " i'm after",
     "i never said",
 )
@@ -208,6 +218,8 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return answer
     if after in _NEWS and _corrects(parsed):
         return DialogueMove.CLARIFY
+    if after is DialogueMove.QUERY_YN and move in _VAGUE and (short := _short_answer(parsed)) is not None:
+        return short
     if after is DialogueMove.CHECK and _insists(parsed):
         return DialogueMove.CLARIFY  # "first right, I told you"
     if after in _ANSWERED and parsed.masked.startswith("not ") and parsed.parse is not None and parsed.plan:
@@ -273,7 +285,7 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
     named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
-    alone = move is DialogueMove.REPLY_N or (move is DialogueMove.REPLY_U and requested)
+    alone = move in (DialogueMove.REPLY_N, DialogueMove.REPLY_U)
     if after is None and alone and not parsed.question and not parsed.masked.startswith(_COMMA_ANSWERS):
         return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
@@ -339,6 +351,15 @@ def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(("no turning", "no more"))
 
 
+def _short_answer(parsed: ParsedText) -> DialogueMove | None:
+    """Returns the answer that few words give which name nothing: "it certainly is", "only if it's safe"."""
+    words = [word for word in parsed.masked.split() if word != ","]
+    if parsed.values or parsed.plan.steps or parsed.question or len(words) > _LONGEST_ANSWER:
+        return None
+    denied = any(word in _NEGATIVE or word.endswith("n't") for word in words)
+    return DialogueMove.REPLY_N if denied else DialogueMove.REPLY_Y
+
+
 def _insists(parsed: ParsedText) -> bool:
     """Returns whether a span says what has been said before."""
     return not parsed.question and bool(parsed.plan.steps or parsed.values) and any(
@@ -350,13 +371,13 @@ def _corrects(parsed: ParsedText) -> bool:
     """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
     if parsed.question:
         return False
-    if any(phrase in parsed.masked for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
+    if any(phrase in f"{parsed.masked}$" for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
         return True
     if not (parsed.plan.steps or parsed.values) or parsed.masked.startswith(("no thanks", "no thank you")):
         return False
     words = parsed.masked.split()
     denied = not _DENIALS.isdisjoint(words[:3]) or _NOT_NAMED.search(parsed.masked) is not None
-    return denied or any(phrase in parsed.masked for phrase in _MEANT)
+    return denied or any(phrase in f"{parsed.masked}$" for phrase in _MEANT)
 
 
 def sign_of_hearing(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> bool:
@@ -386,7 +407,8 @@ def in_context(
     goes_on = after is DialogueMove.QUERY_W and set(before) == {DialogueMove.REPLY_W}
     if move is DialogueMove.INSTRUCT and before and goes_on and ordered:
         move = DialogueMove.REPLY_W
-    return act if move is act.move else DialogueAct(move, act.slots)
+    stops = parsed.parse is not None and StepAction.STOP in parsed.parse.implied and ordered
+    return act if move is act.move else DialogueAct(move, act.slots | ({ActionValue.STOP} if stops else set()))
 
 
 def belong_together(head: str, rest: str) -> bool:

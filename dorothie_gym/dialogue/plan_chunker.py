@@ -26,7 +26,7 @@ from dorothie_gym.dialogue.plan_nouns import NounReader
 from dorothie_gym.dialogue.plan_quantities import QuantityReader
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
 from dorothie_gym.dialogue.routes import ConditionRelation
-from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
 
 _BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "got", "with", "see", "need", "want"})
 """Words behind which "no" says that there is none, and corrects nothing."""
@@ -86,6 +86,8 @@ _IN_VIEW: Final = (
     "is ahead",
 )
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
+_LEAVING: Final = frozenset({*_WORDY, "until", "till", "til"})
+"""First words of a relation to an object that leaves: "wait until that truck's gone"."""
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
@@ -217,6 +219,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return self.word_at(end) not in _LAST
         noun = self.word_at(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
         noun = noun or (match.kind == "wait" and self.word_at(place - 1) in _WAITING)
+        if self.words[place] == "park" and self.word_at(place - 1) in ("car", "a", "the"):
+            return True
         return noun and (match.kind == "wait" or self.words[place] in ("stop", "stops"))
 
     def _item(self, match: Match, place: int) -> int:
@@ -241,6 +245,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return "speed"  # "the limit is thirty, stick to it"
         if match.kind == "lane" and self._visits(place, end):
             return "visit"  # "let's get over there"
+        if match.kind == "slower" and self.words[end - 1] == "down" and isinstance(self.names.get(end), StreetName):
+            return "follow"  # "take us down Hubbard"
         if match.kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
             return "stop"  # "that's where I get off", not "get off the highway"
         return f"lights_{match.kind}" if match.group == "lights" else match.kind
@@ -341,7 +347,7 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
                 relation = relation if relation is ConditionRelation.UNTIL else ConditionRelation.SEEN
                 behind += len(phrase.split())
                 break
-        if self.words[place] in _WORDY and found.reference is not None and found.reference.object is not None:
+        if self.words[place] in _LEAVING and found.reference is not None and found.reference.object is not None:
             left = self.grammar.leaving.longest(self.words, behind) if self.word_at(behind) else None
             if left is not None:  # "when this lorry is gone"
                 relation, behind = ConditionRelation.AFTER, behind + left.length

@@ -356,7 +356,7 @@ class PlanState:
 
 def _says_again(before: Frame, frame: Frame) -> bool:
     """Returns whether a turn behind a comma is the one before it, with the same or with more detail."""
-    if before.direction is not frame.direction or frame.direction is None:
+    if before.direction is not frame.direction or frame.direction is None or frame.verb or frame.word:
         return False
     pairs = ((before.ordinal, frame.ordinal), (before.at, frame.at), (before.distance, frame.distance))
     return all(old is None or new is None or old == new for old, new in pairs) and all(

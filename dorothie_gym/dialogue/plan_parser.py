@@ -188,7 +188,9 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         waiting = (pending.at, pending.ordinal, pending.distance) != (None, None, None)
         last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
         if last is not None and last.mood in ORDERED:
-            self.stop_between()
+            stops = last.action in (StepAction.STOP, StepAction.WAIT) and last.at is None and last is self.frames[-1]
+            if not (stops and self.joint in ("", ",")):  # not in "stop on the right, at the KFC"
+                self.stop_between()
             if last.at is None and pending.at is not None:
                 self.attach(last, pending.relation or ConditionRelation.AT, pending.at)
             last.distance = last.distance or pending.distance
@@ -204,6 +206,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
                 described.append(step)
                 if frame.mood in ORDERED:
                     named = bool(frame.word or frame.verb in _TAKING) and step.action is StepAction.TURN
+                    named = named or frame.joint == "then"
                     append_step(contingent if frame.contingent else ordered, step, named=named)
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
@@ -325,6 +328,9 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         self.negation = item.kind
 
     def _verb(self, item: VerbItem) -> None:
+        said = self.frame is not None and not self.fresh and self.frame.action is StepAction.VISIT
+        if said and self.frame is not None and self.frame.place is not None and self._ends(item.end):
+            return  # "off to the Shell we go"
         if self.frame is None or self.fresh or self.frame.action is not None:
             frame = self.open_step(None)
             frame.verb = item.word
@@ -335,7 +341,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
 
     def _action(self, item: ActionItem) -> None:
         if item.kind in _RANKING:
-            self._rank(item.kind)
+            self._rank(item.kind, self.clauses.words[item.place : item.end])
             return
         if item.kind == "after_that" or self._follows_errand(item):
             self.defer_last()
@@ -362,10 +368,12 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
             action = frame.action if frame.action is not None and frame.word != "to" else action
         self._begin(frame, action, item)
 
-    def _rank(self, kind: str) -> None:
+    def _rank(self, kind: str, words: Sequence[str]) -> None:
         """Accepts what has been named, or puts it first or last."""
         if kind == "accept":
             self._accept()
+            if words[-1] in ("us", "me") and not any(frame.action is StepAction.STOP for frame in self.frames):
+                self.open_step(StepAction.STOP)  # "second on the right and that's us"
         elif kind == "defer":
             self.defer_last()
         else:

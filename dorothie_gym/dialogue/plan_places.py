@@ -44,6 +44,9 @@ _PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
 _ALONG: Final = frozenset({"on", "along", "up", "down"})
 """Last words of an order to go on behind which a street is the one to go along."""
 
+_ROUND: Final = frozenset({"round", "around", "past", "by"})
+"""Last words of an order to get past another vehicle."""
+
 _HAVING: Final = frozenset({"be", "have", "get", "want", "need"})
 """Verbs by which a place becomes an errand: "have a bite at the Panera"."""
 
@@ -159,6 +162,8 @@ class PlaceReader(PlanState):
             and not place.landmark
         ):
             frame.place = place
+        elif frame.action is None and frame.verb == "be" and _names_only_street(place):
+            frame.action, frame.place = StepAction.FOLLOW, place  # "you need to be on Division"
         elif frame.action is None and frame.verb == "be" and place.landmark is not None:
             frame.action, frame.place = StepAction.VISIT, place
         elif frame.action is None and frame.verb in ("have", "get", "want", "need") and place.landmark is not None:
@@ -265,6 +270,8 @@ class PlaceReader(PlanState):
             frame.action, frame.place = StepAction.FOLLOW, place
         elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
+        elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
+            frame.action = StepAction.LANE  # "go round this bus"
         elif frame.action is StepAction.VISIT and place.object is not None and frame.word in ("stop", "stopping"):
             frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
