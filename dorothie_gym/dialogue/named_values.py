@@ -72,6 +72,9 @@ _WITHDRAWN: Final = re.compile(
     r"(?: one| last one| last bit)?(?: ,|$)"
 )
 """Words that take back the last order, rather than the errand named behind them."""
+_ONCE_DONE: Final = re.compile(r"\b(?:when|once|after|as soon as) (?:\w+(?:'\w+)? ){1,4}(?:done|finished|sorted|through)\b")
+"""Condition of the errand that comes next."""
+
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
     r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!\ba )\bleft(?= now| to do| then|$)"
@@ -133,6 +136,8 @@ def _with_status(
         found = [value for value in found if value is not GoalStatus.COMPLETE]  # "let's get the KFC done first"
     if landmarks and not parse.cancelled and _WITHDRAWN.match(spoken):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, make it the KFC"
+    if parse.plan.steps and _ONCE_DONE.search(spoken):
+        found = [value for value in found if value is not GoalStatus.COMPLETE]  # "when we're done at the KFC, go home"
     if driving and not landmarks:
         found = [value for value in found if value is not GoalStatus.PENDING]  # "later on a left"
     if landmarks and not actions and _LEFT_OVER.search(spoken) and GoalStatus.PENDING not in found:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from dorothie_gym.dialogue.clause_moods import is_participle
 from dorothie_gym.dialogue.contingencies import find_contingency
 from dorothie_gym.dialogue.plan_directions import DirectionReader
 from dorothie_gym.dialogue.plan_items import (
@@ -207,10 +208,15 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
                 return end
-            if self.word_at(end) == "u":
-                self.items.append(NegationItem("forbid"))  # "no U-turns"
+            if self.word_at(end) == "u" or (is_participle(self.word_at(end)) and self._acts(end)):
+                self.items.append(NegationItem("forbid"))  # "no U-turns", "no stopping"
                 return end
         return place if self._is_part(match, place) else self._item(match, place)
+
+    def _acts(self, place: int) -> bool:
+        """Returns whether an action stands at a place."""
+        match = self.grammar.terminals.longest(self.words, place)
+        return match is not None and match.group == "actions"
 
     def _is_part(self, match: Match, place: int) -> bool:
         """Returns whether a phrase is a part of another one: "what's the hold up?", "that stop", "that's me sorted"."""
@@ -245,8 +251,10 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return "speed"  # "the limit is thirty, stick to it"
         if match.kind == "lane" and self._visits(place, end):
             return "visit"  # "let's get over there"
-        if match.kind == "slower" and self.words[end - 1] == "down" and isinstance(self.names.get(end), StreetName):
-            return "follow"  # "take us down Hubbard"
+        if match.kind == "slower" and isinstance(self.names.get(end), StreetName):
+            if self.words[end - 1] == "down":
+                return "follow"  # "take us down Hubbard"
+            return "leave" if "off" in self.words[place:end] else match.kind  # "come off the highway"
         if match.kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
             return "stop"  # "that's where I get off", not "get off the highway"
         return f"lights_{match.kind}" if match.group == "lights" else match.kind

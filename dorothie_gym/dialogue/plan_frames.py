@@ -359,9 +359,7 @@ def _says_again(before: Frame, frame: Frame) -> bool:
     if before.direction is not frame.direction or frame.direction is None or frame.verb or frame.word:
         return False
     pairs = ((before.ordinal, frame.ordinal), (before.at, frame.at), (before.distance, frame.distance))
-    return all(old is None or new is None or old == new for old, new in pairs) and all(
-        old is None for old, _ in pairs
-    )
+    return all(old is None or new is None or old == new for old, new in pairs) and all(old is None for old, _ in pairs)
 
 
 def _other_errand(frame: Frame) -> PlanStep | None:

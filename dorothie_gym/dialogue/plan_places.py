@@ -314,6 +314,8 @@ class PlaceReader(PlanState):
             elif place.reference is not None:
                 self.pending.relation, self.pending.at = ConditionRelation.AT, self._resolved(place)
             return
+        if place.landmark is not None and self._passes_on(place):
+            return
         if place.landmark is not None:
             frame = self.open_step(StepAction.VISIT)
             frame.place, frame.bare = place, True
@@ -322,6 +324,16 @@ class PlaceReader(PlanState):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _passes_on(self, place: PlaceReference) -> bool:
+        """Goes on past a second place: "past the Burger King and the Shell"."""
+        frame = self.frame
+        if frame is None or frame.action is not StepAction.STRAIGHT or self.joint != "and":
+            return False
+        if frame.relation not in _PASSED or frame.at is None or frame.at.landmark is None:
+            return False
+        frame.at, self.fresh = place, False
+        return True
 
     def _adds_street(self, place: PlaceReference) -> bool:
         """Gives the visited place right before it a street without a preposition: "take me to the house, um, Beal"."""

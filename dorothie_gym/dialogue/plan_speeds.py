@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _OPPOSITE: Final = {StepChange.FASTER: StepChange.SLOWER, StepChange.SLOWER: StepChange.FASTER}
 _AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
 _DEGREES: Final = frozenset({"too", "less"})
+_UNITS: Final = frozenset({"hour", "mph", "kph", "kmh", "kmph", "k", "clicks"})
 _BY: Final = frozenset({"knock", "shave", "take"})
 """Verbs behind which a speed tells by how much to change it: "knock ten off that"."""
 
@@ -37,7 +38,7 @@ class SpeedReader(PlanState):
         if frame is not None and not self.fresh and frame.action is not None:
             if frame.action is StepAction.SPEED:
                 frame.change = frame.change or change
-                if before.isdecimal() or before in NUMBER_WORDS:
+                if before.isdecimal() or before in NUMBER_WORDS or before in _UNITS:
                     frame.speed = frame.bare_number = None  # "go ten faster"
                 return
             if frame.action is StepAction.STRAIGHT and before in _AMOUNTS:
