@@ -72,7 +72,9 @@ _WITHDRAWN: Final = re.compile(
     r"(?: one| last one| last bit)?(?: ,|$)"
 )
 """Words that take back the last order, rather than the errand named behind them."""
-_ONCE_DONE: Final = re.compile(r"\b(?:when|once|after|as soon as) (?:\w+(?:'\w+)? ){1,4}(?:done|finished|sorted|through)\b")
+_ONCE_DONE: Final = re.compile(
+    r"\b(?:when|once|after|as soon as) (?:\w+(?:'\w+)? ){1,4}(?:done|finished|sorted|through)\b"
+)
 """Condition of the errand that comes next."""
 
 _LEFT_OVER: Final = re.compile(

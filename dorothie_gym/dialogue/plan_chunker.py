@@ -385,6 +385,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         return ConditionRelation.PAST if match.kind == "across" else ConditionRelation(match.kind)
 
     def _noun(self, place: int) -> int:
+        if self.words[place] == "just" and place + 1 < len(self.words) and self._acts(place + 1):
+            return place  # "just turn back", no "just turn"
         found, behind = self.noun_phrase(place)
         if found is None:
             return place
