@@ -216,7 +216,17 @@ def _asks_for_agreement(words: Sequence[str]) -> bool:
             return False
         return words[0] in _TELLING or " ".join(words[:2]) in _TELLING
     places = (place for place in (len(words) - 2, len(words) - 3) if place > 1 and _ends_in_tag(words, place))
-    return any(words[place] not in _REQUESTING for place in places)
+    return any(words[place] not in _REQUESTING and not _orders(words[:place]) for place in places)
+
+
+def _orders(words: Sequence[str]) -> bool:
+    """Returns whether words order something by their first ones: "you take a right, isn't it" asks nothing."""
+    opening = route_grammar().openers.longest(words, 0)
+    if opening is not None and opening.kind != "soft":
+        return opening.kind == "request"
+    begins = route_grammar().terminals.longest(words, 0)
+    ordered = words[0] == "you" and words[1:2] != [] and route_grammar().terminals.longest(words, 1) is not None
+    return begins is not None or ordered
 
 
 def _ends_in_tag(words: Sequence[str], place: int) -> bool:

@@ -25,6 +25,9 @@ ORDERED: Final = frozenset({ClauseMood.COMMAND, ClauseMood.REQUEST})
 _BASE_FORMS: Final = frozenset({"speed", "proceed", "need", "bring", "swing"})
 """Verbs that end as participles do."""
 
+_ORDERED_LAST: Final = frozenset({"next", "first", "now", "please", "instead", "then"})
+"""Last words of an errand without a verb."""
+
 _LOCATING: Final = frozenset({"by", "next", "near", "close", "beside", "opposite", "just"})
 """First words of phrases that tell where something stands."""
 
@@ -39,6 +42,14 @@ _ENOUGH: Final = frozenset({"plenty", "enough", "ample", "tops", "max", "maximum
 
 _IMPERATIVES: Final = frozenset({"actions", "verbs", "lights"})
 """Groups of the grammar with which an order begins."""
+
+_IN_YOUR_PLACE: Final = (" if i were you ", " if i was you ", " in your shoes ", " in your place ")
+_WHERE: Final = frozenset({"where", "when", "wherever", "whenever"})
+_INVERTED: Final = (
+    ["is"], ["are"], ["do"], ["does"], ["did"], ["can"], ["could"], ["should"], ["shall"], ["will"], ["would"], ["was"],
+    ["were"], ["have"], ["has"], ["to"], ["am"], ["next"], ["now"], ["exactly"], ["else"],
+)  # fmt: skip
+"""Words behind "where" that make a question of it."""
 
 _RELATIVE: Final = (["i"], ["we"], ["you"], ["that"], ["who"])
 _ORDERING: Final = frozenset({"actions", "verbs", "lights", "relations", "negations"})
@@ -68,10 +79,32 @@ class ClauseReader:
             new: whether the clause begins the sentence.
         """
         found = mood_of(self.words, place)
+        if found is ClauseMood.STATEMENT and self._advises(place):
+            return ClauseMood.REQUEST  # "I'd get in the other lane if I were you"
+        if found is ClauseMood.QUESTION and new and not self.question and self._conditions(place):
+            found = None  # "where Plymouth meets Draper take a right"
         word = self.words[place] if place < len(self.words) else ""
         if found is ClauseMood.QUESTION and not new and not self.question and word in _SUBORDINATING:
             found = None
         return self._inherited(place, before, new=new) if found is None else found
+
+    def _advises(self, place: int) -> bool:
+        """Returns whether a clause tells what the speaker would do in the driver's place."""
+        joined = f" {' '.join(self.words[place:])} "
+        return any(phrase in joined for phrase in _IN_YOUR_PLACE)
+
+    def _conditions(self, place: int) -> bool:
+        """Returns whether a clause that begins as a question tells where or when what follows is due."""
+        place = self._behind_soft(place)
+        words, grammar = self.words, route_grammar()
+        if place >= len(words) or words[place] not in _WHERE or words[place + 1 : place + 2] in _INVERTED:
+            return False
+        for number in range(place + 2, len(words)):
+            match = grammar.terminals.longest(words, number)
+            acts = match is not None and match.group in ("actions", "verbs", "lights")
+            if acts or words[number] in ("left", "right"):
+                return True
+        return False
 
     def _inherited(self, place: int, before: ClauseMood, *, new: bool) -> ClauseMood:
         """Returns the mood of a clause whose opening does not tell it."""
@@ -117,6 +150,8 @@ class ClauseReader:
         """Returns whether a clause goes on with nothing but a name: "it's on the left, the Panera, stop there"."""
         grammar, words = route_grammar(), self.words
         end = next((number for number in range(place, len(words)) if words[number] in (",", "?")), len(words))
+        if words[end - 1] in _ORDERED_LAST:
+            return False  # "that's the Coco ticked off, the KFC next"
         named = any(words[number].startswith("#") for number in range(place, end))
         quiet = all(
             words[number] not in ("left", "right") and grammar.terminals.longest(words, number) is None
@@ -147,7 +182,7 @@ class ClauseReader:
             return False
         for number in range(place, min(place + _SUBJECT_WORDS, len(words))):
             word = words[number]
-            if word == "," or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
+            if word in (",", "then") or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
                 return False
             if self._is_finite(number, place):
                 return _ENOUGH.isdisjoint(words[number + 1 : number + 3])

@@ -225,7 +225,7 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
         # Small talk remains irrelevant, unless it is a bare answer: "the blue one".
         if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(parsed)):
             move = changes.get(move, move)
-    if sign_of_hearing(parsed, move, after):
+    if formula is not DialogueMove.IRRELEVANT and sign_of_hearing(parsed, move, after):
         move = DialogueMove.ACKNOWLEDGE
     return DialogueAct(move, _slots(parsed, move))
 
@@ -336,6 +336,9 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
         return spans  # nothing was said that could be answered or corrected
     if any(_joins_sentences(part, spans) for part, _ in found):
         return spans
+    changes = _cues().answers.get(after) if after is not None else None
+    if changes is not None and found[0][1] is not DialogueMove.IRRELEVANT:
+        found[0] = found[0][0], changes.get(found[0][1], found[0][1])
     ruled = {(span.text, span.act.move): span for span in spans}
     return tuple(
         ruled.get((part, move)) or Span(part, DialogueAct(move, _slots(understand(part), move))) for part, move in found

@@ -24,8 +24,16 @@ _RIGHT_OPENS = frozenset({"you", "so", "well", "ho", "i"})
 _DOUBT = frozenset({"sure", "know", "certain", "idea", "clue", "wonder"})
 _CLAUSE_ENDS = frozenset({",", "?", "then", "and"})
 _SAYS = frozenset({"it's", "that's"})
-_ENDS = frozenset({"", ",", "then", "and", "at", "again"})
+_ENDS = frozenset(
+    {"", ",", "then", "and", "at", "again", "here", "now", "there", "please", "up", "next", "onto", "into", "out"}
+)
 """Words behind "it's left" where it is a direction."""
+
+_TAKING = frozenset({
+    "take", "taking", "make", "want", "need", "grab", "do", "get", "catch", "miss", "hang", "use",
+    "whip", "swing", "cut", "bring", "pull", "hook", "chuck", "steer", "turn", "throw", "bang", "spin",
+})  # fmt: skip
+"""Verbs behind which "this right" is a turn."""
 
 _SIDED = frozenset({"lane", "hand", "turning", "side", "kerb", "curb"})
 """Words behind "right" that make it a direction wherever it stands: "to that right lane"."""
@@ -97,7 +105,11 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
                 and after == ","
                 and (following in _LISTED or (following == "then" and not _LISTED.isdisjoint(words[3:6])))
             )
-            masked[place] = "right" if listed else _right(before, after, following, place, lists)
+            taken = (
+                before in ("this", "that", "it", "her") and words[place - 2 : place - 1] and words[place - 2] in _TAKING
+            )
+            direct = listed or (taken and after not in lists.right_never_before | lists.right_not_before)
+            masked[place] = "right" if direct else _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):
             masked[place] = "#left"
         elif word == "left" and (list(words[place + 1 : place + 3]) == ["to", "do"] or _remains(words, place)):

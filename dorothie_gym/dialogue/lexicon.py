@@ -64,21 +64,18 @@ class Lexicon:
 
 
 _TYPOGRAPHY = str.maketrans({"\u2019": "'", "\u2018": "'", "-": " ", "/": " "})
-_CONTRACTED = {
-    "y'all": ("you",), "ya'll": ("you",), "yall": ("you",), "lemme": ("let", "me"), "gimme": ("give", "me"),
-    "'em": ("them",), "cuz": ("because",), "'cause": ("because",), "imma": ("i'll",), "dont": ("don't",),
-    "cant": ("can't",), "thats": ("that's",), "wont": ("won't",), "didnt": ("didn't",), "im": ("i'm",),
-    "isnt": ("isn't",), "doesnt": ("doesn't",), "whats": ("what's",), "wheres": ("where's",), "theres": ("there's",),
-    "youre": ("you're",), "theyre": ("they're",), "ive": ("i've",), "youve": ("you've",), "weve": ("we've",),
-    "couldnt": ("couldn't",), "wouldnt": ("wouldn't",), "shouldnt": ("shouldn't",), "arent": ("aren't",),
-    "wasnt": ("wasn't",), "havent": ("haven't",), "hasnt": ("hasn't",), "lets": ("let's",), "hes": ("he's",),
-    "shes": ("she's",), "d'you": ("do", "you"), "d'ya": ("do", "you"),
-}  # fmt: skip
-"""Contractions and words without apostrophe, as typed by people and emitted by speech recognisers."""
 _APOSTROPHES = str.maketrans({"\u2019": "'", "\u2018": "'"})
 _EDGES = '.,;:!?\u2014\u2013\u2026"()-'
 _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
 _WORD = re.compile(r"[a-z0-9']+|\?|,")
+_STAMMER = re.compile(r"\b(\w{1,3})(?:-\1)*-+(?=\1)")
+"""Beginning of a word that is said once more: "t-turn", "l-l-left"."""
+
+_DRAWL = re.compile(r"([a-z])\1{2,}")
+"""Letters of a drawl: "stooop"."""
+
+_DOUBLED = frozenset("eo")
+"""Vowels of which a drawl stands for two where the word is none with one: "sloow" but "sleeep"."""
 
 
 YamlMapping: TypeAlias = Mapping[str, Any]
@@ -91,18 +88,72 @@ def word_set(file: str, data: YamlMapping, name: str) -> frozenset[str]:
 
 
 def split_words(text: str) -> list[str]:
-    """Returns lower-case tokens: "?" and "," are tokens, other stops become ",", hyphens and contractions are split."""
-    words = _WORD.findall(_STOP.sub(" , ", text.lower().translate(_TYPOGRAPHY)))
-    if _CONTRACTED.keys().isdisjoint(words):
-        return words
-    return [part for word in words for part in _CONTRACTED.get(word, (word,))]
+    """Returns lower-case tokens: "?" and "," are tokens, other stops become ",", hyphens and contractions are split.
+
+    Spellings of speech and of dialects become plain words, see data/spoken_forms.yaml.
+    """
+    plain = _STOP.sub(" , ", _fluent(text.lower().translate(_APOSTROPHES)).translate(_TYPOGRAPHY))
+    return [part for word in _WORD.findall(plain) for part in _spoken(word)]
 
 
 def plain_word(word: str) -> str:
-    """Returns a word of a text in lower case, without marks around it and with its apostrophes restored."""
-    word = word.lower().translate(_APOSTROPHES).strip(_EDGES)
-    spelt = _CONTRACTED.get(word)
-    return spelt[0] if spelt is not None and len(spelt) == 1 else word
+    """Returns a word of a text in lower case, without marks around it and with its plain spelling."""
+    word = _fluent(word.lower().translate(_APOSTROPHES)).strip(_EDGES)
+    spoken = _spoken(word)
+    return spoken[0] if len(spoken) == 1 else word
+
+
+def _fluent(text: str) -> str:
+    """Returns a text without beginnings of words that are said once more, and without drawls."""
+    if "-" in text:
+        text = _STAMMER.sub("", text)
+    return _DRAWL.sub(_undrawled, text) if _DRAWL.search(text) else text
+
+
+def _undrawled(match: re.Match[str]) -> str:
+    letter = match[1]
+    before, behind = match.string[: match.start()], match.string[match.end() :]
+    begin, end = re.split(r"[^a-z]", before)[-1], re.split(r"[^a-z]", behind)[0]
+    return letter if begin + letter + end in _spoken_forms().single else letter * (1 + (letter in _DOUBLED))
+
+
+@functools.lru_cache(maxsize=16384)
+def _spoken(word: str) -> tuple[str, ...]:
+    """Returns the plain words for which a word of speech stands: "of" for "o'", "coming" for "comin"."""
+    forms = _spoken_forms()
+    found = forms.words.get(word)
+    if found is not None:
+        return found
+    if word.endswith("in'") and len(word) > _SHORTEST_ING:
+        return (f"{word[:-1]}g",)
+    return (f"{word}g",) if word.endswith("in") and f"{word}g" in forms.ings else (word,)
+
+
+_SHORTEST_ING = 4
+"""Letters of the shortest verb whose ending may lack its g: "goin'" has more."""
+
+
+@dataclass(frozen=True)
+class _SpokenForms:
+    """Contents of data/spoken_forms.yaml; that file explains each list."""
+
+    words: Mapping[str, tuple[str, ...]]
+    ings: frozenset[str]
+    single: frozenset[str]
+
+
+@functools.cache
+def _spoken_forms() -> _SpokenForms:
+    file = "spoken_forms.yaml"
+    data = read_data(file)
+    listed = data.get("words")
+    if not isinstance(listed, dict) or not all(isinstance(text, str) for pair in listed.items() for text in pair):
+        raise PhraseFileError(f"{file}: words must be a mapping from spellings to words; quote words such as 'no'")
+    return _SpokenForms(
+        words={spelling: tuple(text.split()) for spelling, text in listed.items()},
+        ings=word_set(file, data, "ings"),
+        single=word_set(file, data, "drawled"),
+    )
 
 
 def read_data(name: str) -> YamlMapping:

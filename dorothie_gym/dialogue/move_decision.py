@@ -16,11 +16,12 @@ from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_reading import read_plan
+from dorothie_gym.dialogue.reactions import DENIALS, corrects, insists, short_answer
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import is_mere_sign
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
@@ -34,13 +35,33 @@ _SHORT: Final = 4
 _NEWS: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.CONFIRM, DialogueMove.ACKNOWLEDGE})
 """Moves of the car that a listener takes note of, or sets right."""
 
+_VAGUE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT, DialogueMove.ACKNOWLEDGE})
+"""Moves that the cues give to an answer of unknown form."""
+
 _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 """Moves that the cues give to an order of unknown form."""
 
 _COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
 _WHAT_TO_DO: Final = ("what you", "what we", "okay so what you", "so what you", "right so what you", "all you")
+_CONDITIONS: Final = ("where ", "when ", "wherever ", "whenever ", "so when ", "so where ", "and when ", "then when ")
+"""First words of a condition of an order: "where the wall ends, make a left"."""
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
-_OFFERS: Final = ("may i", "shall", "should", "like me", "want me", "if i", "can i take", "do i", "will i", "would i")
+_OFFERS: Final = (
+    "may i",
+    "shall i",
+    "shall we",
+    "should i",
+    "should we",
+    "like me",
+    "want me",
+    "would you like",
+    "do you want",
+    "if i",
+    "can i take",
+    "do i",
+    "will i",
+    "would i",
+)
 """Words by which the car offers what it asks: "would you like me to turn?"."""
 
 _FOR_PASSENGERS: Final = frozenset({StepAction.STOP, StepAction.VISIT, StepAction.WAIT})
@@ -50,56 +71,7 @@ _NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
 _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
-_OTHER: Final = (
-    "other side",
-    "the other side",
-    "the one after",
-    "the one before",
-    "the other one",
-    "other kerb",
-    "wrong side",
-    "after it",
-    "before it",
-    "it's the other",
-    "that's the wrong",
-    "nobody said",
-    "who said",
-    "who asked",
-    "i never",
-    "i think you mis",
-    "you misunder",
-    "you misheard",
-    "you've got the wrong",
-    "you got the wrong",
-    "you've stopped",
-    "you stopped",
-    "that was you",
-    "this isn't it",
-    "that isn't",
-    "this is not",
-    "other way",
-    "the other way ,",
-    "wrong way",
-    "not that",
-    "not this",
-    "not the",
-)
 _ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
-_MEANT: Final = (
-    "i said",
-    "i meant",
-    "i mean",
-    "i asked",
-    "i wanted",
-    "i was wanting",
-    "i told you",
-    "that's not",
-    "not what i",
-    "i told",
-    " we're after",
-    " i'm after",
-    "i never said",
-)
 _ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that yes and no answer."""
 _SPEAKERS: Final = frozenset({"i", "we", "you", "he", "she", "they"})
@@ -123,7 +95,7 @@ _PAST: Final = frozenset(
 )
 _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
 _CALLS: Final = frozenset(
-    {"oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
+    {"whoa", "woah", "oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
 )
 _REPAIRING: Final = frozenset(
     {
@@ -149,6 +121,8 @@ _REPAIRING: Final = frozenset(
     }
 )
 """Words of which a correction has one; others need not be tried."""
+_PERHAPS: Final = ("perhaps ", "maybe ", "possibly ")
+_NO_DOING: Final = ("no turning", "no more", "no stopping", "no parking", "no u turn", "no overtaking", "no speeding")
 _FORBIDDING: Final = frozenset({"never", "don't", "dont", "please"})
 _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
@@ -185,7 +159,6 @@ _OWN_REPAIR: Final = re.compile(r"^(?!no\b|nope\b|i\b|not\b).+\bi (?:mean|meant)
 _RULED_OUT: Final = re.compile(r"\bwe (can|could)\b")
 """Words by which a speaker tells rather than orders that an errand is off."""
 _SIDE_ONLY: Final = re.compile(r"(just |over |there |up )*(on|to) (the|your|our|my) (left|right)([ -]hand side| side)?")
-_DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
 
 
 def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
@@ -202,8 +175,14 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
     answer = first_answer(parsed) or leading_answer(parsed) if after in _ANSWERED else None
     if answer is not None and move is not DialogueMove.CLARIFY:
         return answer
-    if after in _NEWS and _corrects(parsed):
+    if after in _NEWS and corrects(parsed):
         return DialogueMove.CLARIFY
+    if after is DialogueMove.QUERY_YN and move in _VAGUE and (short := short_answer(parsed)) is not None:
+        return short
+    if after is DialogueMove.CHECK and insists(parsed):
+        return DialogueMove.CLARIFY  # "first right, I told you"
+    if after in _ANSWERED and parsed.masked.startswith("not ") and parsed.parse is not None and parsed.plan:
+        return DialogueMove.REPLY_N  # "not the second, the third"
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
     if after is None and _refuses(parsed, move):
@@ -265,12 +244,13 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     named = parse is not None and parse.bare and any(step.action is StepAction.FOLLOW for step in parse.plan)
     news = not _NEWS_OF_TASKS.isdisjoint(parsed.statuses) and "can wait" not in parsed.text.lower()
     named = named and parse is not None and len(parse.plan.steps) < 2 and not requested
-    alone = move is DialogueMove.REPLY_N or (move is DialogueMove.REPLY_U and requested)
+    unsure = requested or (parsed.masked.startswith(_PERHAPS) and parse is not None and not parse.bare)
+    alone = move is DialogueMove.REPLY_N or (move is DialogueMove.REPLY_U and unsure)
     if after is None and alone and not parsed.question and not parsed.masked.startswith(_COMMA_ANSWERS):
         return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
-    if after is None and move in _SIGNS_FIRST and _runs_on(parsed):
+    if after is None and move in _SIGNS_FIRST and (_runs_on(parsed) or parsed.masked.startswith("please do not")):
         return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
     commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
     if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
@@ -280,7 +260,9 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
         offered = offered or (mine and not all(step.action in _FOR_PASSENGERS for step in parsed.plan))
         return move if offered else DialogueMove.INSTRUCT
-    told = move is DialogueMove.QUERY_W and parsed.masked.startswith(_WHAT_TO_DO)
+    told = move is DialogueMove.QUERY_W and (
+        parsed.masked.startswith(_WHAT_TO_DO) or (_ends_in_order(parse) and parsed.masked.startswith(_CONDITIONS))
+    )
     if (move is DialogueMove.CHECK or told) and not parsed.question:
         return DialogueMove.INSTRUCT
     if (
@@ -289,14 +271,22 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         and parsed.masked.startswith(("no #", "no lights", "no head"))
     ):
         return DialogueMove.INSTRUCT
-    if move is DialogueMove.ACKNOWLEDGE and parsed.masked.startswith(("sorry", "oops", "whoops")):
-        return DialogueMove.INSTRUCT  # "sorry, left"
+    leaving = requested and all(step.action is StepAction.STOP for step in parsed.plan) and after is None
+    if move is DialogueMove.ACKNOWLEDGE and (
+        leaving or parsed.masked.startswith(("sorry", "oops", "whoops", "whoa", "woah"))
+    ):
+        return DialogueMove.INSTRUCT  # "sorry, left"; "okay, that's me"
     if move is DialogueMove.CLARIFY and after is DialogueMove.QUERY_W:
         return DialogueMove.REPLY_W
     own = _OWN_REPAIR.search(parsed.masked) is not None or (parsed.parse is not None and parsed.parse.repaired)
     if move is DialogueMove.CLARIFY and own and after is None:
         return DialogueMove.INSTRUCT
     return move
+
+
+def _ends_in_order(parse: PlanParse | None) -> bool:
+    """Returns whether the last clause is an order, with a step."""
+    return parse is not None and bool(parse.plan.steps) and parse.moods[-1] in ORDERED
 
 
 def _acknowledges(parsed: ParsedText) -> bool:
@@ -319,19 +309,7 @@ def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:
     corrected = bool(parsed.plan.steps) and words[:3] == ["no", ",", "not"]
     repaired = corrected or (parsed.parse.repaired and bool(parsed.plan.steps))
     denied = bool(parsed.parse.denied) and (words[0] in _FORBIDDING or words[1:2] == ["#acting"])
-    return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(("no turning", "no more"))
-
-
-def _corrects(parsed: ParsedText) -> bool:
-    """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
-    if parsed.question:
-        return False
-    if any(phrase in parsed.masked for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
-        return True
-    if not (parsed.plan.steps or parsed.values) or parsed.masked.startswith(("no thanks", "no thank you")):
-        return False
-    words = parsed.masked.split()
-    return not _DENIALS.isdisjoint(words[:3]) or any(phrase in parsed.masked for phrase in _MEANT)
+    return (repaired and move is DialogueMove.REPLY_N) or denied or parsed.masked.startswith(_NO_DOING)
 
 
 def sign_of_hearing(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -> bool:
@@ -361,7 +339,8 @@ def in_context(
     goes_on = after is DialogueMove.QUERY_W and set(before) == {DialogueMove.REPLY_W}
     if move is DialogueMove.INSTRUCT and before and goes_on and ordered:
         move = DialogueMove.REPLY_W
-    return act if move is act.move else DialogueAct(move, act.slots)
+    stops = parsed.parse is not None and StepAction.STOP in parsed.parse.implied and ordered
+    return act if move is act.move else DialogueAct(move, act.slots | ({ActionValue.STOP} if stops else set()))
 
 
 def belong_together(head: str, rest: str) -> bool:
@@ -429,6 +408,6 @@ def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> 
     parse, rest = read_plan(segment), read_plan(following)
     if parse.waiting and not parse.described and rest.plan.steps and len(rest.plan) == 1:
         return True
-    corrects = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
-    denial = corrects and formula_move(words) is DialogueMove.REPLY_N
-    return denial and bool(rest.plan.steps or not _DENIALS.isdisjoint(split_words(following)))
+    reacts = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
+    denial = reacts and formula_move(words) is DialogueMove.REPLY_N
+    return denial and bool(rest.plan.steps or not DENIALS.isdisjoint(split_words(following)))

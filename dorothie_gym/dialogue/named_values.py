@@ -38,8 +38,10 @@ _INSIDE: Final = re.compile(
 )
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
-    r"\b(cars?|vehicles?|trucks?|lorry|vans?|bus|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?|motorbikes?"
-    r"|scooter|suv|pickup|ambulance|bicyclist|(?:much|heavy|any|oncoming|bunch of|lots of|lot of) traffic"
+    r"\b(cars?|vehicles?|trucks?|lorry|lorries|vans?|bus|buses|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?"
+    r"|motorbikes?|motorcyclists?|bikers?|mopeds?|scooter|suv|pickup|ambulance|bicyclist|wagon|artic|tanker|minibus|tram"
+    r"|tractor|trailer|caravan|jeep|hatchback|sedan|engine|rickshaw|slowpoke|slowcoach|hgv|semi|wheeler|ute|camper|rv"
+    r"|convertible|limo|sunday driver|(?:much|heavy|any|oncoming|bunch of|lots of|lot of) traffic"
     r"|traffic (?:jam|ahead|like)|the traffic (?:ahead|in front)|how's the traffic)\b"
 )
 _SOUGHT: Final = re.compile(
@@ -64,7 +66,17 @@ _KERB: Final = re.compile(r"^(?!.*\b(?:pavement|sidewalks?|side walk|path|see)\b
 _REMINDED: Final = re.compile(r"\b(?:don't|do not|never|mustn't|not) forget\b")
 """Reminder of an errand, which is not dropped."""
 
-_WITHDRAWN: Final = re.compile(r"(?:scratch|strike|forget|never mind|cancel) (?:that|it) ,")
+_WITHDRAWN: Final = re.compile(
+    r"(?:(?:actually|no|oh|sorry|wait|hang on|hold on|um|uh|nah|right|okay|well|you know what) ,? ?)*"
+    r"(?:scratch|strike|forget|never mind|cancel|scrap|ditch|drop|scrub|ignore|bin) (?:that|it|all that|the last one)"
+    r"(?: one| last one| last bit)?(?: ,|$)"
+)
+"""Words that take back the last order, rather than the errand named behind them."""
+_ONCE_DONE: Final = re.compile(
+    r"\b(?:when|once|after|as soon as) (?:\w+(?:'\w+)? ){1,4}(?:done|finished|sorted|through)\b"
+)
+"""Condition of the errand that comes next."""
+
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
     r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!\ba )\bleft(?= now| to do| then|$)"
@@ -126,6 +138,8 @@ def _with_status(
         found = [value for value in found if value is not GoalStatus.COMPLETE]  # "let's get the KFC done first"
     if landmarks and not parse.cancelled and _WITHDRAWN.match(spoken):
         found = [value for value in found if value is not GoalStatus.ABANDONED]  # "scratch that, make it the KFC"
+    if parse.plan.steps and _ONCE_DONE.search(spoken):
+        found = [value for value in found if value is not GoalStatus.COMPLETE]  # "when we're done at the KFC, go home"
     if driving and not landmarks:
         found = [value for value in found if value is not GoalStatus.PENDING]  # "later on a left"
     if landmarks and not actions and _LEFT_OVER.search(spoken) and GoalStatus.PENDING not in found:

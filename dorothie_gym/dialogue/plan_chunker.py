@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from dorothie_gym.dialogue.clause_moods import is_participle
 from dorothie_gym.dialogue.contingencies import find_contingency
 from dorothie_gym.dialogue.plan_directions import DirectionReader
 from dorothie_gym.dialogue.plan_items import (
@@ -26,7 +27,7 @@ from dorothie_gym.dialogue.plan_nouns import NounReader
 from dorothie_gym.dialogue.plan_quantities import QuantityReader
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
 from dorothie_gym.dialogue.routes import ConditionRelation
-from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
 
 _BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "got", "with", "see", "need", "want"})
 """Words behind which "no" says that there is none, and corrects nothing."""
@@ -52,6 +53,9 @@ _STATES: Final = frozenset(
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
+_RANKS: Final = {"first": "advance", "beforehand": "advance", "last": "defer"}
+"""Adverbs behind an errand that put it in front of, or behind the others."""
+_BEHIND_RANKS: Final = frozenset({"", ",", "?", "and", "then", "please", "though", "but"})
 _CHANCES: Final = frozenset({"chance", "moment", "minute", "second", "opportunity"})
 _COMPARED: Final = frozenset({"quicker", "faster", "slower", "quick", "fast", "slow"})
 _STATED: Final = frozenset({"it's", "that's", "is", "are", "was", "it'd", "gets", "looks", "there's"})
@@ -67,8 +71,24 @@ _IN_VIEW: Final = (
     "shows up",
     "in view",
     "in sight",
+    "comes up",
+    "comes along",
+    "comes on",
+    "turns up",
+    "pops into view",
+    "pops out",
+    "looms",
+    "is visible",
+    "becomes visible",
+    "is in sight",
+    "is in view",
+    "are in sight",
+    "is coming up",
+    "is ahead",
 )
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
+_LEAVING: Final = frozenset({*_WORDY, "until", "till", "til"})
+"""First words of a relation to an object that leaves: "wait until that truck's gone"."""
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
@@ -101,6 +121,7 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             self._contingency,
             self._cancelled,
             self._stop_noun,
+            self._ranked,
             self.read_direction,
             self.read_quantity,
             self._phrase,
@@ -134,6 +155,15 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         ) == "stop":
             return max(behind, place + 1) + 1
         return place
+
+    def _ranked(self, place: int) -> int:
+        """Reads that the errand named just before comes first or last: "the Shell and the KFC, the KFC first"."""
+        kind = _RANKS.get(self.words[place])
+        named = isinstance(self.names.get(place - 1), LandmarkName) and self.word_at(place + 1) in _BEHIND_RANKS
+        if kind is None or not named:
+            return place
+        self.items.append(ActionItem(kind, place, place + 1))
+        return place + 1
 
     def _comma(self, place: int) -> int:
         if self.words[place] not in (",", "?"):
@@ -178,10 +208,15 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
                 return end
-            if self.word_at(end) == "u":
-                self.items.append(NegationItem("forbid"))  # "no U-turns"
+            if self.word_at(end) == "u" or (is_participle(self.word_at(end)) and self._acts(end)):
+                self.items.append(NegationItem("forbid"))  # "no U-turns", "no stopping"
                 return end
         return place if self._is_part(match, place) else self._item(match, place)
+
+    def _acts(self, place: int) -> bool:
+        """Returns whether an action stands at a place."""
+        match = self.grammar.terminals.longest(self.words, place)
+        return match is not None and match.group == "actions"
 
     def _is_part(self, match: Match, place: int) -> bool:
         """Returns whether a phrase is a part of another one: "what's the hold up?", "that stop", "that's me sorted"."""
@@ -190,6 +225,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return self.word_at(end) not in _LAST
         noun = self.word_at(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
         noun = noun or (match.kind == "wait" and self.word_at(place - 1) in _WAITING)
+        if self.words[place] == "park" and self.word_at(place - 1) in ("car", "a", "the"):
+            return True
         return noun and (match.kind == "wait" or self.words[place] in ("stop", "stops"))
 
     def _item(self, match: Match, place: int) -> int:
@@ -214,6 +251,10 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return "speed"  # "the limit is thirty, stick to it"
         if match.kind == "lane" and self._visits(place, end):
             return "visit"  # "let's get over there"
+        if match.kind == "slower" and isinstance(self.names.get(end), StreetName):
+            if self.words[end - 1] == "down":
+                return "follow"  # "take us down Hubbard"
+            return "leave" if "off" in self.words[place:end] else match.kind  # "come off the highway"
         if match.kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
             return "stop"  # "that's where I get off", not "get off the highway"
         return f"lights_{match.kind}" if match.group == "lights" else match.kind
@@ -311,9 +352,10 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         rest = " ".join(self.words[behind : behind + 3])
         for phrase in _IN_VIEW:
             if rest.startswith(phrase):
-                relation, behind = ConditionRelation.SEEN, behind + len(phrase.split())
+                relation = relation if relation is ConditionRelation.UNTIL else ConditionRelation.SEEN
+                behind += len(phrase.split())
                 break
-        if self.words[place] in _WORDY and found.reference is not None and found.reference.object is not None:
+        if self.words[place] in _LEAVING and found.reference is not None and found.reference.object is not None:
             left = self.grammar.leaving.longest(self.words, behind) if self.word_at(behind) else None
             if left is not None:  # "when this lorry is gone"
                 relation, behind = ConditionRelation.AFTER, behind + left.length
@@ -343,6 +385,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         return ConditionRelation.PAST if match.kind == "across" else ConditionRelation(match.kind)
 
     def _noun(self, place: int) -> int:
+        if self.words[place] == "just" and place + 1 < len(self.words) and self._acts(place + 1):
+            return place  # "just turn back", no "just turn"
         found, behind = self.noun_phrase(place)
         if found is None:
             return place

@@ -85,12 +85,19 @@ class DirectionReader(TokenReader):
             return None
         several = self.word_at(place) in ("lefts", "rights")
         place += 1
-        while self.word_at(place) == self.word_at(place - 1) and self.word_at(place) in ("left", "right"):
-            place += 1  # "left left left"
+        place = self._behind_repetition(place)
         hand = self.word_at(place) in ("hand", "handed")
         place += hand
         place += self.word_at(place) == "most"
         return _Phrase(begin, place, preposition, direction, ordinal, several, hand)
+
+    def _behind_repetition(self, place: int) -> int:
+        """Returns the place behind a direction that is said again, "left left left", unless another one follows."""
+        end = place
+        while self.word_at(end) == self.word_at(place - 1) and self.word_at(end) in ("left", "right"):
+            end += 1
+        routed = self.word_at(end) in SIDES  # "right right left"
+        return place if routed else end
 
     def _lane(self, found: _Phrase) -> int | None:
         """Reads the side of a lane; returns the token behind it, or None if it is no lane."""

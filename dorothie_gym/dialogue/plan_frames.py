@@ -65,6 +65,7 @@ class Frame:
         deferred: whether it comes after the other errands.
         implied: whether its action is not named: "on the left, please".
         contingent: whether it depends on a condition of the world.
+        joint: kind of the border before it: "then", "and" or ",", or "" without any.
     """
 
     action: StepAction | None = None
@@ -90,6 +91,7 @@ class Frame:
     deferred: bool = False
     implied: bool = False
     contingent: bool = False
+    joint: str = ""
 
     @property
     def starts(self) -> bool:
@@ -133,6 +135,7 @@ class PlanState:
         self.moods: list[ClauseMood] = []
         self.mood = ClauseMood.COMMAND
         self.fresh = True  # whether a boundary stands behind the last item
+        self.joint = ""  # kind of the last border
         self.repairing = False  # whether the next item replaces the last one
         self.repaired = False
         self.negation: str | None = None
@@ -184,7 +187,8 @@ class PlanState:
     def open_step(self, action: StepAction | None) -> Frame:
         """Begins a step, which takes what has been waiting for one."""
         self.close()
-        frame = Frame(action=action, mood=self.mood, negated=self.negation in NEGATING)
+        frame = Frame(action=action, mood=self.mood, negated=self.negation in NEGATING, joint=self.joint)
+        self.joint = ""
         waiting, self.pending = self.pending, Frame()
         frame.forbidden, frame.contingent = self.negation == "forbid", self.contingent
         if action is StepAction.TURN and self.negation == "cancel":  # "skip the next left"
@@ -211,6 +215,8 @@ class PlanState:
             return None
         self.repairing = False
         for frame in reversed(self.frames):
+            if frame.action is StepAction.WAIT and actions and StepAction.WAIT not in actions and frame.at is None:
+                frame.action = None  # "the second, hang on, no, the third"
             if frame.action is not None:
                 if not actions or frame.action in actions:
                     self.repaired = True
@@ -234,6 +240,35 @@ class PlanState:
         errands = [frame for frame in acting if frame.action is StepAction.VISIT]
         for frame in (errands or acting)[-1:]:
             frame.deferred, frame.mood = True, ClauseMood.COMMAND
+
+    def advance_last(self) -> None:
+        """Puts the errand named last in front of the others: "the Shell and the KFC, the KFC first"."""
+        errands = [frame for frame in self.frames if frame.action is StepAction.VISIT]
+        if len(errands) < 2:
+            return
+        last = errands[-1]
+        for frame in errands[:-1]:
+            if frame.place == last.place:
+                frame.action = None  # it has been named before
+            frame.deferred = True
+        last.mood, last.deferred = errands[0].mood, False
+
+    def drop_repeated(self) -> None:
+        """Drops turns that are only said again, and an errand to the place of another step: "left there, go there"."""
+        turns = [frame for frame in self.frames if frame.action is not None and frame.mood is not ClauseMood.STATEMENT]
+        for before, frame in itertools.pairwise(turns):
+            same = frame.action is StepAction.TURN and before.action is StepAction.TURN and not before.negated
+            if same and frame.joint == "," and _says_again(before, frame):
+                frame.relation, frame.at = frame.relation or before.relation, frame.at or before.at
+                frame.ordinal, frame.distance = frame.ordinal or before.ordinal, frame.distance or before.distance
+                before.action = None
+        sides = {frame.direction for frame in turns if frame.action is StepAction.TURN}
+        if len(sides) > 1:
+            return
+        for frame in turns[1:]:
+            there = frame.place is not None and frame.place.reference is Anaphor.THERE
+            if frame.action is StepAction.VISIT and there:
+                frame.action = None
 
     def open_action(self, frame: Frame) -> None:
         """Sets what the words in front of an action say of it: whether it waits, and whether it is told."""
@@ -296,6 +331,9 @@ class PlanState:
         if self._avoids(frame):
             return True
         self.denied |= {frame.action} if frame.action is not None else set()
+        if frame.action is StepAction.STOP and frame.relation is ConditionRelation.UNTIL and frame.at is not None:
+            frame.relation = ConditionRelation.AT  # "don't stop until you are at the KFC"
+            return True
         if frame.action is StepAction.STOP and frame.at is not None and frame.at.reference is None:
             frame.at = None  # "never stop on a bridge" says nothing of where to go on
         if frame.action in (StepAction.FOLLOW, StepAction.VISIT) and frame.place is not None:
@@ -314,6 +352,14 @@ class PlanState:
         if frame.action is StepAction.LIGHTS:
             frame.change = StepChange.OFF if frame.change is StepChange.ON else StepChange.ON
         return frame.action in (StepAction.SPEED, StepAction.LIGHTS)
+
+
+def _says_again(before: Frame, frame: Frame) -> bool:
+    """Returns whether a turn behind a comma is the one before it, with the same or with more detail."""
+    if before.direction is not frame.direction or frame.direction is None or frame.verb or frame.word:
+        return False
+    pairs = ((before.ordinal, frame.ordinal), (before.at, frame.at), (before.distance, frame.distance))
+    return all(old is None or new is None or old == new for old, new in pairs) and all(old is None for old, _ in pairs)
 
 
 def _other_errand(frame: Frame) -> PlanStep | None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader
-from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, append_step
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
@@ -28,6 +27,7 @@ from dorothie_gym.dialogue.plan_items import (
     WordItem,
 )
 from dorothie_gym.dialogue.plan_places import FETCHING, PlaceReader
+from dorothie_gym.dialogue.plan_speeds import SpeedReader
 from dorothie_gym.dialogue.plan_turns import TurnReader
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import (
@@ -108,9 +108,6 @@ _CHANGES: Final = {
     "lights_on": StepChange.ON,
     "lights_off": StepChange.OFF,
 }
-_OPPOSITE: Final = {StepChange.FASTER: StepChange.SLOWER, StepChange.SLOWER: StepChange.FASTER}
-_AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
-_DEGREES: Final = frozenset({"too", "less"})
 _HERE: Final = frozenset({"here", "here's"})
 _TAKING: Final = frozenset({"take", "make", "turn"})
 _AFTERWARDS: Final = frozenset({"after", "once"})
@@ -118,6 +115,10 @@ _IT: Final = frozenset({"it", "that", "them", "those"})
 _TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "straight"})
 _WAYS: Final = frozenset({"to", "down", "up", "on", "over", "along", "straight"})
 _PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
+_RANKING: Final = frozenset({"accept", "defer", "advance"})
+"""Kinds of actions that order what has been named."""
+_NEAR: Final = frozenset({ConditionRelation.OPPOSITE, ConditionRelation.BESIDE})
+"""Relations by which a place alone tells where to stop."""
 _FEW: Final = 6
 """Words of a sentence that names nothing but a place to pass."""
 _WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
@@ -136,13 +137,11 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(TurnReader, PlaceReader):
+class _Builder(TurnReader, PlaceReader, SpeedReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
-        self.last_speed: int | None = None  # speed named last [km/h]
         self.turned = False  # whether anything names a turn
         self.sided = False  # whether anything names a lane or a side
         self._rules: dict[type, Callable[[Any], None]] = {
@@ -154,12 +153,12 @@ class _Builder(TurnReader, PlaceReader):
             ConditionItem: self.read_condition,
             ContingencyItem: self._contingency,
             NounPhrase: self.read_place,
-            DistanceItem: self._distance,
-            SpeedItem: self._speed,
+            DistanceItem: self.read_distance,
+            SpeedItem: self.read_speed,
             BoundaryItem: self._boundary,
             RepairItem: self._repair,
             NegationItem: self._negate,
-            UnitItem: self._unit,
+            UnitItem: self.read_unit,
             WordItem: self._word,
         }
 
@@ -167,7 +166,7 @@ class _Builder(TurnReader, PlaceReader):
         """Reads a sentence; it begins a clause."""
         self.clauses = sentence.clauses
         self.close()
-        self.begun = len(self.frames)
+        self.begun, self.joint = len(self.frames), ","
         self.negation, self.correcting, self.contingent = None, False, False
         self._clause(0, new=True)
         self.turned = self.turned or not _TURNS.isdisjoint(sentence.clauses.words)
@@ -189,7 +188,9 @@ class _Builder(TurnReader, PlaceReader):
         waiting = (pending.at, pending.ordinal, pending.distance) != (None, None, None)
         last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
         if last is not None and last.mood in ORDERED:
-            self.stop_between()
+            stops = last.action in (StepAction.STOP, StepAction.WAIT) and last.at is None and last is self.frames[-1]
+            if not (stops and self.joint in ("", ",")):  # not in "stop on the right, at the KFC"
+                self.stop_between()
             if last.at is None and pending.at is not None:
                 self.attach(last, pending.relation or ConditionRelation.AT, pending.at)
             last.distance = last.distance or pending.distance
@@ -198,12 +199,14 @@ class _Builder(TurnReader, PlaceReader):
         ordered: list[PlanStep] = []
         contingent: list[PlanStep] = []
         self._drop_interjection()
+        self.drop_repeated()
         self.inherit_directions()
         for frame in sorted(self.frames, key=lambda frame: frame.deferred):
             for step in self.steps_of(frame):
                 described.append(step)
                 if frame.mood in ORDERED:
                     named = bool(frame.word or frame.verb in _TAKING) and step.action is StepAction.TURN
+                    named = named or frame.joint == "then"
                     append_step(contingent if frame.contingent else ordered, step, named=named)
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
@@ -268,6 +271,8 @@ class _Builder(TurnReader, PlaceReader):
             self.open_step(StepAction.STOP).implied = True
         elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
             self.open_step(StepAction.SPEED)
+        elif self.pending.at and self.pending.at.landmark and self.pending.relation in _NEAR:
+            self.open_step(StepAction.STOP).implied = True  # "next to the Shell, please"
         elif self.pending.at and self.pending.relation in _PASSED and len(self.clauses.words) <= _FEW:
             self._go_past(self.pending.at)
         elif self.pending.relation is ConditionRelation.AT and self.pending.at and self.pending.at.landmark:
@@ -292,8 +297,10 @@ class _Builder(TurnReader, PlaceReader):
 
     def _boundary(self, item: BoundaryItem) -> None:
         self.fresh = True
+        self.joint = item.kind if self.joint in ("", ",") else self.joint
         self.negation, self.preceded = None, False
         if item.kind == "then":
+            self.stop_between()
             self.close()
         self._clause(item.place, new=False)
 
@@ -321,6 +328,9 @@ class _Builder(TurnReader, PlaceReader):
         self.negation = item.kind
 
     def _verb(self, item: VerbItem) -> None:
+        said = self.frame is not None and not self.fresh and self.frame.action is StepAction.VISIT
+        if said and self.frame is not None and self.frame.place is not None and self._ends(item.end):
+            return  # "off to the Shell we go"
         if self.frame is None or self.fresh or self.frame.action is not None:
             frame = self.open_step(None)
             frame.verb = item.word
@@ -330,8 +340,8 @@ class _Builder(TurnReader, PlaceReader):
             self.frame.verb = item.word
 
     def _action(self, item: ActionItem) -> None:
-        if item.kind in ("accept", "defer"):
-            (self._accept if item.kind == "accept" else self.defer_last)()
+        if item.kind in _RANKING:
+            self._rank(item.kind, self.clauses.words[item.place : item.end])
             return
         if item.kind == "after_that" or self._follows_errand(item):
             self.defer_last()
@@ -341,11 +351,14 @@ class _Builder(TurnReader, PlaceReader):
             self._verb(VerbItem("go", item.end))  # "let's go round the block"
             return
         if action is StepAction.SPEED and change is not None:
-            self._change(change, item)
+            self.read_change(change, item)
             return
         named = self.frame is not None and self.frame.bare and not self.fresh
         if self._goes_on_to(action, item) or (action is StepAction.GO and named):
             return
+        if action is StepAction.AVOID and named and self.frame is not None and self.frame.place is not None:
+            self.frame.action, self.frame.mood, self.frame.bare = action, ClauseMood.COMMAND, False
+            return  # "Hubbard is best avoided"
         if self.repairing:
             self.drop_last()
         frame = self.frame
@@ -355,13 +368,25 @@ class _Builder(TurnReader, PlaceReader):
             action = frame.action if frame.action is not None and frame.word != "to" else action
         self._begin(frame, action, item)
 
+    def _rank(self, kind: str, words: Sequence[str]) -> None:
+        """Accepts what has been named, or puts it first or last."""
+        if kind == "accept":
+            self._accept()
+            if words[-1] in ("us", "me") and not any(frame.action is StepAction.STOP for frame in self.frames):
+                self.open_step(StepAction.STOP)  # "second on the right and that's us"
+        elif kind == "defer":
+            self.defer_last()
+        else:
+            self.advance_last()
+
     def _begin(self, frame: Frame, action: StepAction, item: ActionItem) -> None:
         """Gives a step its action, with what the words of the action tell beside it."""
         frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
         here = not _HERE.isdisjoint(said) or said[0] in ("this", "this'll")
-        if action is StepAction.STOP and frame.at is None and here:
+        stays = action is StepAction.STOP or (action is StepAction.WAIT and "here" in said)
+        if stays and frame.at is None and here:
             frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
         if self.negation in NEGATING:
             frame.negated, frame.forbidden = True, self.negation == "forbid"
@@ -421,44 +446,6 @@ class _Builder(TurnReader, PlaceReader):
         errands = (frame for frame in self.frames[self.begun :] if frame.action is StepAction.VISIT)
         return before not in ("then", "and") and any(frame.place is not None for frame in errands)
 
-    def _change(self, change: StepChange, item: ActionItem) -> None:
-        before = self.clauses.words[item.place - 1] if item.place else ""
-        if self.negation in ("not", "forbid") or before in _DEGREES or self.clauses.words[item.place] == "too":
-            change = _OPPOSITE[change]
-        frame = self.frame
-        if frame is not None and not self.fresh and frame.action is not None:
-            if frame.action is StepAction.SPEED:
-                frame.change = frame.change or change
-                if before.isdecimal() or before in NUMBER_WORDS:
-                    frame.speed = frame.bare_number = None  # "go ten faster"
-                return
-            if frame.action is StepAction.STRAIGHT and before in _AMOUNTS:
-                frame.action, frame.change = StepAction.SPEED, change  # "go a bit quicker"
-                return
-            if frame.action not in NEEDING_PLACE or frame.place is not None:
-                frame.change = change
-                return
-        if frame is None or self.fresh or frame.action is not None:
-            frame = self.open_step(StepAction.SPEED)
-        frame.action, frame.change, frame.negated = StepAction.SPEED, change, False
-
-    def _distance(self, item: DistanceItem) -> None:
-        frame = self.replaced()
-        if frame is None:
-            frame = self.frame if self.frame is not None and not self.fresh else None
-        if frame is not None and (frame.action is not None or frame.verb):
-            frame.distance = item.metres
-        else:
-            self.pending.distance = item.metres
-
-    def _unit(self, item: UnitItem) -> None:
-        """Reads a unit that follows its number with a pause: "thirty, miles"."""
-        last = self.frames[-1] if self.frames else None
-        if self.pending.bare_number is not None:
-            self.pending.bare_number = round(self.pending.bare_number * item.factor)
-        elif last is not None and last.action is StepAction.SPEED and last.bare_number is not None:
-            last.speed = round(last.bare_number * item.factor)
-
     def _word(self, item: WordItem) -> None:
         """Reads an unknown word; behind a bare place it makes a statement of it: "the KFC shut ages ago"."""
         self.preceded = self.preceded or item.word == "before"
@@ -483,18 +470,3 @@ class _Builder(TurnReader, PlaceReader):
         if frame is not None and frame.bare and not self.fresh and frame is self.frames[-1]:
             if item.word in route_grammar().finite or item.word in _PAST or item.word.endswith(("ed", "'s")):
                 frame.mood, frame.bare = ClauseMood.STATEMENT, False
-
-    def _speed(self, item: SpeedItem) -> None:
-        self.last_speed = item.speed
-        frame = self.replaced(StepAction.SPEED)
-        if frame is None:
-            frame = self.frame if self.frame is not None and not self.fresh else None
-        if frame is not None and frame.action is not None and frame.action not in NEEDING_PLACE:
-            if item.unit or frame.action is StepAction.SPEED:
-                frame.speed = item.speed
-                frame.bare_number = None if item.unit else item.speed
-        elif item.unit or (frame is not None and frame.verb in ("do", "go", "drive", "make", "keep", "take")):
-            opened = frame if frame is not None and frame.action is None else self.open_step(StepAction.SPEED)
-            opened.action, opened.speed = StepAction.SPEED, item.speed
-        else:
-            self.pending.bare_number = item.speed

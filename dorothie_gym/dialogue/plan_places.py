@@ -38,8 +38,14 @@ FETCHING: Final = frozenset(
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
 """Relations of an errand to another place than its own."""
 
+_PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
+"""Relations to places that are driven by."""
+
 _ALONG: Final = frozenset({"on", "along", "up", "down"})
 """Last words of an order to go on behind which a street is the one to go along."""
+
+_ROUND: Final = frozenset({"round", "around", "past", "by"})
+"""Last words of an order to get past another vehicle."""
 
 _HAVING: Final = frozenset({"be", "have", "get", "want", "need"})
 """Verbs by which a place becomes an errand: "have a bite at the Panera"."""
@@ -61,6 +67,8 @@ class PlaceReader(PlanState):
         place = item.place.reference if item.place is not None else self.last_place
         if place is not None and place.reference is Anaphor.THERE and self.last_place is not None:
             place = self.last_place
+        if item.place is None and self._is_about(place):
+            return
         if item.place is None and self.pending.at is not None and item.relation is ConditionRelation.AT:
             return  # "just past the KFC, that's where you stop"
         if place is None:
@@ -78,12 +86,31 @@ class PlaceReader(PlanState):
             self.negation = None
             return
         frame = self.frame
-        direct = frame is not None and (frame.at is None or frame.borrowed)
+        vague = frame is not None and frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
+        direct = frame is not None and (frame.at is None or frame.borrowed or (vague and place.reference is None))
         if frame is not None and not self.fresh and direct and (frame.action is not None or frame.verb):
             self.attach(frame, item.relation, place)
         elif self.mood is not ClauseMood.STATEMENT:
             self.stop_between()
+            self._pass_between(item.relation)
             self.pending.relation, self.pending.at = item.relation, place
+
+    def _is_about(self, place: PlaceReference | None) -> bool:
+        """Makes the place of the next step of one that has been named for it: "the KFC is where you turn right"."""
+        last = self.frames[-1] if self.frames else None
+        if last is None or not last.bare or last.place is None or last.place != place:
+            return False
+        self.frames.pop()
+        self.frame, self.fresh = None, True
+        self.pending.relation, self.pending.at = ConditionRelation.AT, place
+        return True
+
+    def _pass_between(self, relation: ConditionRelation) -> None:
+        """Makes a step of a place that is passed before another one: "past the KFC, over the bridge, then left"."""
+        waits = self.pending.at is not None and self.pending.relation in _PASSED
+        if waits and self.fresh and relation in _PASSED and self.mood in ORDERED:
+            self.open_step(StepAction.STRAIGHT)
+            self.frame, self.fresh = None, True
 
     def _describes(self, place: PlaceReference) -> bool:
         """Returns whether a place only tells where another one is: "the house after the bridge"."""
@@ -135,6 +162,8 @@ class PlaceReader(PlanState):
             and not place.landmark
         ):
             frame.place = place
+        elif frame.action is None and frame.verb == "be" and _names_only_street(place):
+            frame.action, frame.place = StepAction.FOLLOW, place  # "you need to be on Division"
         elif frame.action is None and frame.verb == "be" and place.landmark is not None:
             frame.action, frame.place = StepAction.VISIT, place
         elif frame.action is None and frame.verb in ("have", "get", "want", "need") and place.landmark is not None:
@@ -190,6 +219,10 @@ class PlaceReader(PlanState):
             self._target(frame, place)
         elif frame.action is None:
             self._object_of_verb(frame, place)
+        elif frame.action is StepAction.LANE and place.object is ObjectClass.VEHICLES:
+            pass  # "overtake that lorry"
+        elif frame.action is StepAction.LIGHTS and place.reference is not None:
+            pass  # "it's dark out there"
         elif frame.at is None and frame.action is not StepAction.SPEED:
             self._object_of_action(frame, place)
 
@@ -237,6 +270,8 @@ class PlaceReader(PlanState):
             frame.action, frame.place = StepAction.FOLLOW, place
         elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
+        elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
+            frame.action = StepAction.LANE  # "go round this bus"
         elif frame.action is StepAction.VISIT and place.object is not None and frame.word in ("stop", "stopping"):
             frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
@@ -279,6 +314,8 @@ class PlaceReader(PlanState):
             elif place.reference is not None:
                 self.pending.relation, self.pending.at = ConditionRelation.AT, self._resolved(place)
             return
+        if place.landmark is not None and self._passes_on(place):
+            return
         if place.landmark is not None:
             frame = self.open_step(StepAction.VISIT)
             frame.place, frame.bare = place, True
@@ -287,6 +324,16 @@ class PlaceReader(PlanState):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _passes_on(self, place: PlaceReference) -> bool:
+        """Goes on past a second place: "past the Burger King and the Shell"."""
+        frame = self.frame
+        if frame is None or frame.action is not StepAction.STRAIGHT or self.joint != "and":
+            return False
+        if frame.relation not in _PASSED or frame.at is None or frame.at.landmark is None:
+            return False
+        frame.at, self.fresh = place, False
+        return True
 
     def _adds_street(self, place: PlaceReference) -> bool:
         """Gives the visited place right before it a street without a preposition: "take me to the house, um, Beal"."""

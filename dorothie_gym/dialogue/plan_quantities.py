@@ -35,6 +35,7 @@ _LEAST_SPEED: Final = 5
 _THOUSANDS: Final = frozenset({"k", "ks", "k's"})
 """Units of distance that are short for kilometres an hour behind an order of speed."""
 
+_KILOMETRE: Final = 1000.0
 _LIMITING: Final = frozenset({"over", "under", "above", "below"})
 
 
@@ -65,6 +66,9 @@ class QuantityReader(TokenReader):
                 return behind
             if self.word_at(end + 1) == "and" and self.word_at(end + 3) == "half":  # a mile and a half
                 number, end = number + 0.5, end + 3
+            if metres >= _KILOMETRE and self._limits_speed():
+                self._speed(number * metres / _KILOMETRE, unit=True)  # "maximum sixty kilometres"
+                return end + 1
             self.items.append(DistanceItem(max(1, round(number * metres))))
             return end + 1
         if number >= _LEAST_SPEED and may_be_speed(self.word_at(place - 1), self.word_at(end)):
@@ -85,6 +89,11 @@ class QuantityReader(TokenReader):
         """Returns whether the last item is an order to drive faster or slower."""
         last = self.items[-1] if self.items else None
         return isinstance(last, ActionItem) and last.kind in ("slower", "faster", "speed")
+
+    def _limits_speed(self) -> bool:
+        """Returns whether the last item names a speed to keep: "maximum sixty kilometres"."""
+        last = self.items[-1] if self.items else None
+        return isinstance(last, ActionItem) and last.kind == "speed"
 
     def _speed(self, speed: float, *, unit: bool) -> None:
         self.items.append(SpeedItem(max(1, round(speed)), unit))

@@ -26,6 +26,8 @@ _AT_ONCE = frozenset({"turn", "left", "right", "go", "then"})
 """Words behind which lights at the beginning are those of a junction."""
 _APART = frozenset({",", "?", "and", "it", "the_pace", "speed", "pace", "up"})
 """Words that do not stand between such a verb and its particle."""
+_REACHING = (["you"], ["we"], ["i"], ["you'll"], ["we'll"], ["to"])
+"""Words behind which one hits the lights of a junction, rather than a switch."""
 _LIGHTS = frozenset({"light", "lights"})
 _NONE: frozenset[str] = frozenset()
 _COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
@@ -40,7 +42,8 @@ def with_plain_lights(words: Sequence[str]) -> list[str]:
     grammar = route_grammar()
     for place in range(len(found)):
         match = grammar.lights.longest(found, place)
-        if match is not None and not _is_at_junction(found, place, _NONE):
+        reached = found[place] == "hit" and found[place - 1 : place] in _REACHING
+        if match is not None and not reached and not _is_at_junction(found, place, _NONE):
             for number in range(place, place + match.length):
                 if found[number] in _LIGHTS:
                     found[number] = "headlights"
@@ -62,7 +65,8 @@ def _is_at_junction(words: Sequence[str], place: int, compounds: frozenset[str] 
         if words[place] in ("your", "my", "our"):
             return False
         place -= 1
-    return place >= 0 and words[place] in grammar.junction_words
+    reached = place > 0 and words[place] == "hit" and [words[place - 1]] in _REACHING
+    return place >= 0 and (words[place] in grammar.junction_words or reached)
 
 
 @functools.lru_cache(maxsize=2048)

@@ -327,11 +327,16 @@ def search_on(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Adopts the place of a goal that is not on the map when the camera shows it nearby, and no other of its name."""
+    """Adopts the place of a goal that is not on the map when the camera shows it nearby, and no other of its name.
+
+    Of places that a town may have several of, only one on a street that the participant has named counts, if any was.
+    """
     goal, shown = state.beliefs.goal, landmarks_in_view(view.raw, view.landmarks)
     if goal is None or state.beliefs.exact or state.intentions.arrived or not shown:
         return
     known = [mark for mark in view.landmarks if mark.name is goal and mark.place not in state.beliefs.ruled_out]
+    if goal in COMMON and state.beliefs.streets:
+        known = [mark for mark in known if mark.street in state.beliefs.streets]
     if len(known) == 1 and nearest_landmark(view.raw, known, *view.position) is not None:
         aim(state, view, known[0])
 
