@@ -221,7 +221,7 @@ class _Sentence:
             marker = markers.get((kind, self._voice, move)) or markers.get(("opener", self._voice, move))
             if marker is not None and realizer.random() < marker.rate * style.chattiness:
                 front = marker.phrase.say(realizer)
-        if front and (_repeats(front, body) or (scene.joined is not None and _PARTICIPLE.match(body))):
+        if front and (_repeats(front, body) or "now" in {*_words(front)} & {*_words(body)} or (scene.joined is not None and _PARTICIPLE.match(body))):
             front = None  # nor "my camera is out, and slowing down"
         realizer.fronted = bool(front)
         if front:

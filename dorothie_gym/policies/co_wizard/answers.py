@@ -26,6 +26,7 @@ from dorothie_gym.policies.co_wizard.proposition_truth import (
     reason_to_turn_round,
     seconds_to_goal,
     sees_far,
+    street_here,
 )
 from dorothie_gym.policies.notable_conditions import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
@@ -284,8 +285,10 @@ def _name_objects(state: CoWizardState, view: CoWizardView) -> None:
     things = tuple(dict.fromkeys(thing.kind for thing in view.objects))[:2]
     if not things:
         state.say(intend(Function.ANSWER, Proposition.of(Predicate.SEES, object=ObjectClass.ROAD)))
+    wording = Wording(topic="sees_only") if len(things) == 1 else None
     for number, thing in enumerate(things):
-        state.say(intend(Function.ANSWER, Proposition.of(Predicate.SEES, object=thing), joined=number > 0))
+        seen = Proposition.of(Predicate.SEES, object=thing)
+        state.say(intend(Function.ANSWER, seen, wording=wording, joined=number > 0))
 
 
 def _name_way(state: CoWizardState, view: CoWizardView) -> None:
@@ -330,7 +333,7 @@ def _next_turns(state: CoWizardState, view: CoWizardView) -> tuple[Proposition, 
 
 
 def _name_street(state: CoWizardState, view: CoWizardView) -> None:
-    street = street_of(view.raw, state.town, view.lane)
+    street = street_here(state.town, view)
     if street is StreetName.UNKNOWN:
         state.say(intend(Function.UNCERTAIN_ANSWER))
     else:

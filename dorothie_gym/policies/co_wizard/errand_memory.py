@@ -32,7 +32,8 @@ _OWNER = re.compile(
     r"(?:house|home|place)\b"
 )
 _FRIEND = re.compile(
-    r"\b(?:my friend|our passenger) (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle )?[A-Z][\w-]+)(?!\w|'s)"
+    r"\b(?:my friend|our passenger|pick up|picking up|[Pp]ick up)"
+    r" (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle |Grandpa |Grandma )?[A-Z][\w-]+)(?!\w|'s)"
 )
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
@@ -66,7 +67,10 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
     if found is not None:
         first, _, rest = found["owner"].partition(" ")
         name = rest if rest and first.lower() in _BEFORE_NAMES else found["owner"]
-        state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", name))
+        owner = _OF_SPEAKER.sub("your ", name)
+        if state.beliefs.owner is not None and owner != state.beliefs.owner:
+            state.beliefs = state.beliefs.without_look()
+        state.beliefs = state.beliefs.with_owner(owner)
     elif done or state.beliefs.goal is not LandmarkName.HOUSE:
         state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
 
@@ -78,6 +82,8 @@ def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:
         return
     found = _FRIEND.search(heard.words.text)
     if found is not None:
+        if state.beliefs.friend is not None and found["friend"] != state.beliefs.friend:
+            state.beliefs = state.beliefs.without_look()
         state.beliefs = state.beliefs.with_friend(found["friend"])
     elif any(_OVER & act.slots for act in heard.acts) or state.beliefs.goal is not LandmarkName.PERSON:
         state.beliefs = state.beliefs.with_friend(None)  # somebody else than the last one

@@ -27,11 +27,12 @@ from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utteranc
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn
-from dorothie_gym.policies.participant.goals import announcement, describe
+from dorothie_gym.policies.participant.goals import announcement, describe, pick_up_wording
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere, is_near_by
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
+from dorothie_gym.policies.participant.route_steps import route_step
 from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
 from dorothie_gym.policies.participant.yes_no_answers import (
     addition,
@@ -54,6 +55,11 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.view import ParticipantView
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+
+_ORDERS = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+
+_TAKEN_UP = 8.0
+"""Time within which the car takes up an order [s]."""
 
 _REPLIES = frozenset(
     {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
@@ -122,6 +128,8 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
             answer(state, view, act, heard.words, rng)
     if state.speech is before and _answers_question(state, heard):
         _thank(state, view, rng)
+    elif state.speech is before and _takes_up_order(state, view, heard):
+        return  # "making a U-turn"
     elif state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
         # an utterance that takes up an instruction needs no acknowledgement of its own
         alone = heard.acts[0].move not in _ACKNOWLEDGEMENTS
@@ -142,10 +150,10 @@ def _open_question(
     elif _correct(state, view, act, words):
         return
     elif GoalStatus.QUERIED in act.values(Slot.STATUS):
-        _name_target(state, view, rng)
+        if not _is_just_announced(state, view):
+            _name_target(state, view, rng)
     elif landmarks == (LandmarkName.QUERIED,):
-        named_lately = view.time - state.task.announced_at < state.config.just_said
-        if not named_lately and not _was_just_named(state, view):
+        if not _is_just_announced(state, view) and not _was_just_named(state, view):
             _name_target(state, view, rng, *addition(state, view, rng))
     elif actions:
         if not _was_just_named(state, view):
@@ -153,10 +161,17 @@ def _open_question(
             _name_step(state, view, DialogueMove.REPLY_W, rng)
     elif landmarks or act.values(Slot.STREET) or words.asked is not None:
         describe(state, view, Function.ANSWER, rng, asks_street=bool(act.values(Slot.STREET)))
+    elif _is_just_announced(state, view):
+        return  # it was asked while the answer was being given
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
         ask_back(state, view, words, rng)
+
+
+def _is_just_announced(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the destination is being named, or was a moment ago, so that a question for it is settled."""
+    return view.time - state.task.announced_at < state.config.just_said
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
@@ -166,7 +181,7 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
     street = announced.get("street")
     place = act_builders.first_name([announced.get("place")])
     wanted = act_builders.destination(place, street if isinstance(street, StreetName) else None)
-    answer = intend(Function.ANSWER, wanted)
+    answer = intend(Function.ANSWER, wanted, wording=pick_up_wording(state, view))
     state.say_only(answer, *more)
 
 
@@ -246,10 +261,22 @@ def _explanation(
         else:
             deny_arrival(state)
         return
+    if ActionValue.U_TURN in act.values(Slot.ACTION):
+        _let_turn_round(state, view)
     if act.values(Slot.OBJECT):
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(state, view, near=True)
+
+
+def _let_turn_round(state: ParticipantState, view: ParticipantView) -> None:
+    """Does not order a U-turn that the car has just announced by itself."""
+    step = route_step(state, view)
+    if step is not None and step.key[0] == "round" and state.guidance.guiding:
+        note_step(state, view, step.key)
+        first = state.speech.first
+        if first is not None and ActionValue.U_TURN in first.act.values(Slot.ACTION):
+            state.speech = state.speech.cleared()
 
 
 def _has_another_goal(state: ParticipantState, act: DialogueAct, words: ParsedText) -> bool:
@@ -296,6 +323,14 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
     reason = objects and not visible and (view.standing or ActionValue.STOP in said)
     topic = "why" if reason else "seen" if visible or objects else None
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
+
+
+def _takes_up_order(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
+    """Returns whether the car only says that it does what it was just told to do."""
+    last = state.speech.last
+    if last is None or last.act.move not in _ORDERS or not state.speech.has_just_spoken(view.time, _TAKEN_UP):
+        return False
+    return any(set(act.values(Slot.ACTION)) & set(last.act.values(Slot.ACTION)) for act in heard.acts)
 
 
 def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:

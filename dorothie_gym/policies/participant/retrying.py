@@ -11,7 +11,7 @@ from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.given_orders import is_about_to_turn_round, rounds_told, times_told
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.orders import of_place, order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.route_state import section
@@ -56,7 +56,7 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
         return
     if passed and passes >= IN_VAIN:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
-        elided, wording = ("place", "times"), Wording(topic="passed_again")
+        elided, wording = ("place", "times"), Wording(topic=of_place("passed_again", goal.name))
         reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
     else:
         here = section(state.town, view.lane)
@@ -71,7 +71,7 @@ def _just_passed(state: ParticipantState, view: ParticipantView) -> tuple[Remark
     if state.task.goal is None or not state.guidance.passes:
         return ()
     passed = Proposition.of(Predicate.PASSED, place=state.task.goal.name)
-    wording = Wording(topic="passed_just")
+    wording = Wording(topic=of_place("passed_just", state.task.goal.name))
     return (intend(CommunicativeFunction.INFORM, passed, elided=("place",), wording=wording, expires=_soon(view)),)
 
 

@@ -57,6 +57,7 @@ def check(
         return
     if landmarks:
         state.set_guiding(False)  # the car knows the place
+        state.task = state.task.after_announcement(view.time)
     wanted = checked(state, act, words)
     state.say_first(_short(Function.CONFIRM, wanted), *addition(state, view, rng))
 
@@ -97,6 +98,8 @@ def _fits(
     if instructed is not None and lately and actions & set(instructed.act.slots):
         return words.direction is None or instructed.wording.direction in (None, words.direction)
     meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
+    if ActionValue.U_TURN in meant and actions == {ActionValue.J_TURN} and words.direction is None:
+        return True  # "shall I turn?"
     if wanted is Direction.STRAIGHT:
         return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
     return bool(actions & meant) and (wanted is None or words.direction is wanted)
@@ -138,7 +141,7 @@ def answer_yes_no(
     elif offered is not None:
         _answer_offer(state, view, offered)
     elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
-        _answer_street(state, view, act)
+        _answer_street(state, view, act, rng)
     elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
         sight = Proposition.of(Predicate.SEES, object=objects[0])
@@ -211,8 +214,14 @@ def go_first(name: LandmarkName) -> Remark:
     return intend(Function.REQUEST, act_builders.destination(name), wording=Wording(topic="first"), joined=True)
 
 
-def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
+def _answer_street(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, rng: np.random.Generator
+) -> None:
     """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
+    if not state.task.announced and state.task.goal is not None:
+        state.task = state.task.after_announcement(view.time)
+        state.say_only(announcement(state, view, rng))  # it cannot be about the way to a place that it does not know
+        return
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     named = {street for item in state.speech.said for street in item.act.values(Slot.STREET)}

@@ -1,0 +1,39 @@
+"""Remarks of the participant about the trip that need no "okay": how it goes, and how far it is."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final
+
+from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.policies.co_wizard.state import CoWizardState
+
+_PLEASED: Final = re.compile(
+    r"\b(so far so good|going (well|smoothly|great|fine)|getting on nicely|doing (great|well|fine)|(great|nice|good),? we)\b"
+)
+_IN_PASSING: Final = re.compile(
+    r"\b(took (a while|its time|forever)|off again|(one|stop) more (to go )?after|last (one|stop)|the right way|nearly there"
+    r"|almost there|getting close|all day|losing my patience|taking forever|wasting time|let me (see|check)|my (map|list))\b"
+)
+_ANSWERED: Final = 0.5  # probability that praise is answered
+
+
+def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generator) -> bool:
+    """Returns whether a statement is a remark in passing; answers praise, with some probability.
+
+    Args:
+        state: working copy of the state.
+        words: the statement.
+        rng: random generator of the decision.
+    """
+    text = words.text.lower()
+    if _PLEASED.search(text) is not None:
+        if rng.random() < _ANSWERED:
+            state.say(sign_of_hearing("praise"))
+        return True
+    return _IN_PASSING.search(text) is not None
