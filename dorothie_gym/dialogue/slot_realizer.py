@@ -301,7 +301,7 @@ class SlotRealizer:
         elsewhere = not _ELSEWHERE.isdisjoint(self.values.get(Slot.STATUS, ()))
         if not (owner or friend or passenger) or elsewhere:
             return None
-        if not self._naming and self.random() >= _NAMES_PERSON:
+        if owner and not self._naming and self.random() >= _NAMES_OWNER:
             return None
         if owner:
             return f"{owner}'s house"
@@ -314,7 +314,7 @@ class SlotRealizer:
 
 _NAMING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _MOST_LENGTHS = 4  # number of car lengths from which on metres are said
-_NAMES_PERSON = 0.8  # probability that a house or a person is called by name
+_NAMES_OWNER = 0.93  # probability that a house is called by its owner
 _ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE})  # of other errands
 _INDEFINITE = re.compile(r"^(an?|some|another|the) ")
 _POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")

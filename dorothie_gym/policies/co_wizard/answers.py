@@ -148,18 +148,19 @@ def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.
     """Returns, with some probability, an addition to an answer: why something is not seen, or the time to the goal."""
     unseen = asked.predicate is Predicate.SEES and not believes(state.knowledge, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
-        return _poor_view(view, rng)
+        return _poor_view(state, view, rng)
     if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
         return plan_remark(state, view, rng, joined=True)
     return ()
 
 
-def _poor_view(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _poor_view(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns, with some probability, a remark about a limited view."""
     limit, fault = limit_of(view.raw), camera_fault(view.raw)
     if limit is None or rng.random() < 0.3:
         return ()
     if fault is not None:
+        state.dialogue = state.dialogue.with_view_fault(fault)  # need not be reported any more
         return (fault_remark(fault, joined=True),)
     return (replace(view_remark(limit, sight(view.raw), rng), joined=True),)
 

@@ -53,6 +53,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     expects_stop,
     hear_wrong_way,
     is_garbled,
+    is_settled,
     is_unclear,
     is_unclear_reply,
     names_unknown_place,
@@ -355,7 +356,7 @@ def _statement(
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
-    elif not act.slots and passes_over(state, words, rng):
+    elif not act.values(Slot.OBJECT) and passes_over(state, words, rng):
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
         sees = words.told is not None and camera_fault(view.raw) is None
@@ -460,6 +461,8 @@ def _confusion(
 ) -> None:
     """Repeats a remark that was not understood; another time, expresses it differently."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
+    if is_settled(state, view, words):
+        return
     if state.speech.has_just_asked_back or state.speech.turns_of_repair(view.time):
         explain_differently(state, view, words, rng)
     else:

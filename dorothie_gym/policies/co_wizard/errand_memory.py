@@ -35,6 +35,12 @@ _FRIEND = re.compile(
     r"\b(?:my friend|our passenger|pick up|picking up|[Pp]ick up)"
     r" (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle |Grandpa |Grandma )?[A-Z][\w-]+)(?!\w|'s)"
 )
+_BUSINESS = re.compile(
+    r"(buy|get|collect|fetch|drop off|deliver|unload|return|borrow|leave) (a|an|the|some|my|his|her|two|three|four)\b"
+)
+"""What somebody does at a place, and no driver."""
+
+_CUT_OFF = re.compile(r"\b(of|for|to|and|a|an|the|with|some|his|her|their)$")
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
@@ -92,8 +98,8 @@ def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:
 def without_purposes(heard: HeardUtterance) -> HeardUtterance:
     """Returns an utterance without the steps that a purpose seems to ask for: "I have to collect Mila"."""
     tells = any(act.move is DialogueMove.EXPLAIN and not act.slots for act in heard.acts)
-    clause = _CLAUSE.search(heard.words.text) if tells and heard.words.plan else None
-    if clause is None:
+    clause = _CLAUSE.search(heard.words.text) if heard.words.plan else None
+    if clause is None or not (tells or _BUSINESS.match(clause["errand"])):
         return heard
     rest = f"{heard.words.text[: clause.start()]} {heard.words.text[clause.end() :]}"
     return replace(heard, words=replace(heard.words, plan=understand(rest.strip(" ,.")).plan))
@@ -110,6 +116,8 @@ def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
         return None  # "I need you to take the next right" does not describe an errand
     purpose = read_purpose(clause["errand"])
     item = _OF_SPEAKER.sub("your ", purpose.items[0]) if purpose.items else None
+    if item is not None and _CUT_OFF.search(item) is not None:
+        item = None  # its end was not heard
     person = None if purpose.person is None else _OF_SPEAKER.sub("your ", purpose.person)
     return None if item is person is None else Proposition.of(Predicate.PURPOSE, place=place, item=item, person=person)
 

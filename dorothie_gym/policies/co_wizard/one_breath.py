@@ -68,6 +68,7 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     only answered where there is nothing else. Plans come last.
     """
     answers = [item for item in answers if item.act.move is not DialogueMove.IRRELEVANT] or answers
+    answers = [item for k, item in enumerate(answers) if not any(_says_same(item, other) for other in answers[:k])]
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
     plans = [k for k, item in enumerate(answers) if _tells_plan(item)]
@@ -76,6 +77,11 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     leads = [following.joined for following in answers[1:]]
     kept = [item for k, item in enumerate(answers) if not plain[k] or (k == 0 and (all(plain) or leads[0]))]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _says_same(item: Remark, other: Remark) -> bool:
+    """Returns whether two remarks have the same contents, and some at all."""
+    return bool(item.act.slots) and item.act == other.act and item.wording.direction is other.wording.direction
 
 
 def is_plain_sign(item: Remark) -> bool:

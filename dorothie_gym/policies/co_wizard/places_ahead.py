@@ -15,7 +15,7 @@ NEAR: Final = 100
 JUST_AHEAD: Final = 45.0
 """Distance at which a place is taken to be that is "just ahead" [m]."""
 
-_AHEAD: Final = re.compile(r"\b((just|right|straight) (up )?ahead|(is|'s) (coming up|up ahead)|see \w.* (just|right) (up )?ahead)\b")
+_AHEAD: Final = re.compile(r"\b((just|right|straight) (up )?ahead|(is|'s) (coming up|up ahead))\b")
 """Words that say that a place is close ahead."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.conversation import is_partly_inaudible
+from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
@@ -93,6 +93,19 @@ def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) ->
     """Returns whether meaningless words are probably a request to stop: the car is guided to a place that is near."""
     guided = state.beliefs.goal is not None and not state.beliefs.exact and state.route.progress is None
     return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
+
+
+def is_settled(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether what the participant has not understood needs no repetition.
+
+    The car has said something else meanwhile, or has asked where to go and knows it by now.
+    """
+    last = state.speech.last_content
+    if last is None:
+        return False
+    asks_goal = last.act.move is DialogueMove.QUERY_W and LandmarkName.QUERIED in last.act.values(Slot.LANDMARK)
+    spoke_meanwhile = state.speech.last_end > view.time - 0.5 * speech_seconds(words.text)
+    return spoke_meanwhile or (asks_goal and state.beliefs.goal is not None and not state.intentions.arrived)
 
 
 def repeat_last(state: CoWizardState) -> None:

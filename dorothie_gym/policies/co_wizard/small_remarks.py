@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
 
 _PLEASED: Final = re.compile(
-    r"\b(so far so good|going (well|smoothly|great|fine)|getting on nicely|doing (great|well|fine)|(great|nice|good),? we)\b"
+    r"\b(so far so good|going (well|smoothly|great|fine)|getting on nicely|doing (great|well|fine)"
+    r"|(great|nice|good),? we)\b"
 )
 _IN_PASSING: Final = re.compile(
-    r"\b(took (a while|its time|forever)|off again|(one|stop) more (to go )?after|last (one|stop)|the right way|nearly there"
-    r"|almost there|getting close|all day|losing my patience|taking forever|wasting time|let me (see|check)|my (map|list))\b"
+    r"\b(took (a while|its time|forever)|off again|(one|stop) more (to go )?after|last (one|stop)|the right way"
+    r"|nearly there|almost there|getting close|all day|losing my patience|taking forever|wasting time"
+    r"|let me (see|check)|my (map|list))\b"
 )
 _ANSWERED: Final = 0.5  # probability that praise is answered
 
@@ -32,8 +34,9 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
         rng: random generator of the decision.
     """
     text = words.text.lower()
-    if _PLEASED.search(text) is not None:
-        if rng.random() < _ANSWERED:
-            state.say(sign_of_hearing("praise"))
+    if _IN_PASSING.search(text) is not None:
         return True
-    return _IN_PASSING.search(text) is not None
+    praises = _PLEASED.search(text) is not None
+    if praises and rng.random() < _ANSWERED:
+        state.say(sign_of_hearing("praise"))
+    return praises

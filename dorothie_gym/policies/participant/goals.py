@@ -17,7 +17,13 @@ from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
 from dorothie_gym.policies.participant.messages import message_remark, seconds_to_take_in
-from dorothie_gym.policies.participant.stories import as_afterthought, picks_up, purpose_of, purpose_of_target, story_remark
+from dorothie_gym.policies.participant.stories import (
+    as_afterthought,
+    picks_up,
+    purpose_of,
+    purpose_of_target,
+    story_remark,
+)
 from dorothie_gym.policies.participant.trip_talk import recollection
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress

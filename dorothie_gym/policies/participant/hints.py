@@ -187,15 +187,22 @@ def _side(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) ->
     return Direction.RIGHT if is_on_right(state.town, goal.lane, goal.x, goal.y) else Direction.LEFT
 
 
+def _is_nearly_there(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car comes close to the target for the first time."""
+    progress = state.route.progress
+    missed = state.route.misses or state.guidance.passes
+    return progress is not None and progress.left(view.station) < _CLOSE and not (progress.astray or missed)
+
+
 def _feeling(state: ParticipantState, view: ParticipantView) -> Proposition | None:
     """Returns the participant's current feeling, and its reason; None if there is none, or if it was stated before."""
-    goal, progress, motion = state.task.goal, state.route.progress, state.motion
+    goal, motion = state.task.goal, state.motion
     if motion.standstill(view.time) > state.style.patience and view.time >= motion.excused_until:
         felt = Proposition.of(Predicate.FEELS, feeling="impatient", cause=Proposition.of(Predicate.STANDS))
     elif sight(view.raw) < DENSE:
         poor = Proposition.of(Predicate.VISIBILITY, negated=True)
         felt = Proposition.of(Predicate.FEELS, feeling="nervous", cause=poor)
-    elif goal is not None and progress is not None and progress.left(view.station) < _CLOSE and not progress.astray:
+    elif goal is not None and _is_nearly_there(state, view):
         close = Proposition.of(Predicate.CLOSE, place=goal.name)
         felt = Proposition.of(Predicate.FEELS, feeling="pleased", cause=close)
     else:

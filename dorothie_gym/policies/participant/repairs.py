@@ -33,6 +33,11 @@ _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueM
 
 _SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
 
+_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+"""Moves that need not be understood word for word."""
+
+_ABOUT_TALK = frozenset({DialogueMove.CONFUSE, DialogueMove.ALIGN})
+
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
 """Actions that are wanted immediately and are not steps of the route."""
 
@@ -48,11 +53,15 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
         heard: utterance of the car.
         rng: random generator of the decision.
     """
-    if is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
+    sign = heard.acts[0].move in _SIGNS
+    if not sign and is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
         return True
     if heard.acts[0].move is DialogueMove.CLARIFY or not state.speech.may_ask_back(view.time):
         return False
+    last, told = state.speech.last, heard.words.told
+    if told is not None and last is not None and any(said.contains(told) for said in last.meaning):
+        return False  # both say the same
     spoke_meanwhile = state.speech.last_end > view.time - speech_seconds(heard.words.text)
     matters = any(act.move in _WORTH_REPEATING and _has_named_slot(act) for act in heard.acts)
     if not (spoke_meanwhile and matters and state.speech.idle and rng.random() < state.style.puzzled):
@@ -114,7 +123,7 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         view: observation.
         rng: random generator of the decision.
     """
-    last, goal = state.speech.last_content, state.task.goal
+    last, goal = _last_worth_repeating(state), state.task.goal
     turns = state.speech.turns_of_repair(view.time)
     if turns > 1:
         return
@@ -128,7 +137,7 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         return  # the purpose came with the destination, which has to be understood
     if last is not None and lately and (not ordered or _is_of_the_moment(last)):
         again = ordered and max(times_told(state, action) for action in _actions(last)) >= IN_VAIN
-        said = repeated(last, CommunicativeFunction.CORRECTION) if again else replace(last, text="", joined=False)
+        said = repeated(last, CommunicativeFunction.CORRECTION) if again else _again(last)
         state.say_first(said)
         return
     step = next_step(state, view, DialogueMove.CLARIFY, rng) if state.guidance.step is not None else None
@@ -140,6 +149,17 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         state.say_first(intend(CommunicativeFunction.CORRECTION, act_builders.destination(goal.name)))
     elif last is not None:
         state.say_first(repeated(last, CommunicativeFunction.CORRECTION))
+
+
+def _again(last: Remark) -> Remark:
+    """Returns a remark to be said again: in the same words if it is about an object, which has several names."""
+    keeps = last.act.move in act_builders.QUESTIONS and bool(last.act.values(Slot.OBJECT)) and not last.joined
+    return last if keeps else replace(last, text="", joined=False)
+
+
+def _last_worth_repeating(state: ParticipantState) -> Remark | None:
+    """Returns the last remark that is neither a request to repeat nor the question whether one was understood."""
+    return next((item for item in reversed(state.speech.said) if item.act.move not in _ABOUT_TALK), None)
 
 
 def _explain_differently(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:

@@ -56,6 +56,8 @@ if TYPE_CHECKING:
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
+_YES_NO = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
+
 _ORDERS = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 
 _TAKEN_UP = 8.0
@@ -103,7 +105,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         return
     state.conversation = state.conversation.after_hearing(view.time)
     state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
-    if heard.acts and has_missed(state, view, heard, rng):
+    if _asks_what_is_being_said(state, view, heard) or (heard.acts and has_missed(state, view, heard, rng)):
         return
     puzzled_by = state.conversation.puzzled_by
     if puzzled_by is not None:
@@ -126,11 +128,12 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
             continue  # the question that follows is answered instead
         if answer is not None:
             answer(state, view, act, heard.words, rng)
-    if state.speech is before and _answers_question(state, heard):
+    again = _misheard_question(state, heard) if state.speech is before else None
+    if again is not None:
+        state.say_first(again)
+    elif state.speech is before and _answers_question(state, heard):
         _thank(state, view, rng)
-    elif state.speech is before and _takes_up_order(state, view, heard):
-        return  # "making a U-turn"
-    elif state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
+    elif state.speech is before and _needs_nod(state, view, heard):
         # an utterance that takes up an instruction needs no acknowledgement of its own
         alone = heard.acts[0].move not in _ACKNOWLEDGEMENTS
         _nod(state, view, rng, _nod_to(view, heard), heard.words.told, alone=alone)
@@ -150,23 +153,27 @@ def _open_question(
     elif _correct(state, view, act, words):
         return
     elif GoalStatus.QUERIED in act.values(Slot.STATUS):
-        if not _is_just_announced(state, view):
-            _name_target(state, view, rng)
+        _name_target(state, view, rng)
     elif landmarks == (LandmarkName.QUERIED,):
-        if not _is_just_announced(state, view) and not _was_just_named(state, view):
-            _name_target(state, view, rng, *addition(state, view, rng))
+        _name_target(state, view, rng, *addition(state, view, rng))
     elif actions:
         if not _was_just_named(state, view):
             state.set_guiding(True)
             _name_step(state, view, DialogueMove.REPLY_W, rng)
     elif landmarks or act.values(Slot.STREET) or words.asked is not None:
         describe(state, view, Function.ANSWER, rng, asks_street=bool(act.values(Slot.STREET)))
-    elif _is_just_announced(state, view):
-        return  # it was asked while the answer was being given
     elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
         _name_target(state, view, rng)  # most probably
     else:
         ask_back(state, view, words, rng)
+
+
+def _asks_what_is_being_said(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
+    """Returns whether the car has asked where to go, or something inaudible, while it was being told."""
+    asks = bool(heard.acts) and all(
+        act.move is DialogueMove.QUERY_W and not act.values(Slot.ACTION) for act in heard.acts
+    )
+    return asks and (_is_just_announced(state, view) or _was_just_named(state, view))
 
 
 def _is_just_announced(state: ParticipantState, view: ParticipantView) -> bool:
@@ -325,6 +332,15 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 
+def _needs_nod(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
+    """Returns whether an utterance states something, asks for nothing, and does not only take up an order."""
+    moves = {act.move for act in heard.acts}
+    unasked = not state.speech.has_just_spoken(view.time, _TAKEN_UP)
+    told = unasked or heard.words.told is not None or any(act.slots for act in heard.acts)
+    explains = told and DialogueMove.EXPLAIN in moves and moves.isdisjoint(act_builders.QUESTIONS)
+    return explains and not _takes_up_order(state, view, heard)
+
+
 def _takes_up_order(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
     """Returns whether the car only says that it does what it was just told to do."""
     last = state.speech.last
@@ -337,6 +353,14 @@ def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
     """Returns whether the car has answered the last question."""
     last = state.speech.last
     return last is not None and last.act.move in act_builders.QUESTIONS and heard.acts[0].move in _REPLIES
+
+
+def _misheard_question(state: ParticipantState, heard: HeardUtterance) -> Remark | None:
+    """Returns the open question to be asked once more, because the car has answered it with a yes or a no."""
+    last, before = state.speech.last, state.speech.said[-2:-1]
+    if last is None or last.act.move is not DialogueMove.QUERY_W or heard.acts[0].move not in _YES_NO:
+        return None
+    return None if before and before[0].act == last.act else replace(last, text="", joined=False)
 
 
 def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -437,6 +461,7 @@ _ANSWERS: dict[
     DialogueMove.QUERY_YN: answer_yes_no,
     DialogueMove.QUERY_W: _open_question,
     DialogueMove.EXPLAIN: _explanation,
+    DialogueMove.CLARIFY: _explanation,
     DialogueMove.CONFUSE: _confusion,
     DialogueMove.ALIGN: _alignment,
     DialogueMove.INSTRUCT: _request,

@@ -54,9 +54,10 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
             if just or slower:
                 state.say_only(*just, *slower)
         return
-    if passed and passes >= IN_VAIN:
+    if passed and passes:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
-        elided, wording = ("place", "times"), Wording(topic=of_place("passed_again", goal.name))
+        topic = "passed_again" if passes >= IN_VAIN else "passed_just"
+        elided, wording = ("place", "times"), Wording(topic=of_place(topic, goal.name))
         reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
     else:
         here = section(state.town, view.lane)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from dorothie_gym.policies.participant.goals import announcement, route_length, 
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
-from dorothie_gym.policies.participant.repairs import ask_back
+from dorothie_gym.policies.participant.repairs import ask_back, name_step_or_place
 from dorothie_gym.policies.participant.stories import story_remark
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
 """Actions that determine the route."""
+
+_ASKS_WHERE = re.compile(r"\b(where|which|tell me|what)\b")
+"""Words of an open question for the way, of which a part was misheard."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
@@ -111,7 +115,7 @@ def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         return ()
     if state.guidance.guiding or not is_in_mind(state, view) or rng.random() < 0.5:
         return hint(state, view, rng)
-    return story_remark(state, view, rng)
+    return tuple(item for item in story_remark(state, view, rng) if item.wording.topic != "reason")
 
 
 def _refuse_with_step(
@@ -214,9 +218,7 @@ def go_first(name: LandmarkName) -> Remark:
     return intend(Function.REQUEST, act_builders.destination(name), wording=Wording(topic="first"), joined=True)
 
 
-def _answer_street(
-    state: ParticipantState, view: ParticipantView, act: DialogueAct, rng: np.random.Generator
-) -> None:
+def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct, rng: np.random.Generator) -> None:
     """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
     if not state.task.announced and state.task.goal is not None:
         state.task = state.task.after_announcement(view.time)
@@ -236,6 +238,9 @@ def _answer_proposal(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Confirms the right way, or else names it."""
+    if words.direction is None and _ASKS_WHERE.search(words.text.lower()):
+        name_step_or_place(state, view, rng)  # "please tell me where turn"
+        return
     if not _fits(state, view, act, words, rng):
         _refuse_with_step(state, view, act, words, rng)
         return
