@@ -150,7 +150,8 @@ def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(state, view, rng)
     if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
-        return plan_remark(state, view, rng, joined=True)
+        holds = believes(state.knowledge, view, asked)
+        return plan_remark(state, view, rng, joined=True) if holds else ()
     return ()
 
 

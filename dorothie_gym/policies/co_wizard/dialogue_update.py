@@ -14,7 +14,6 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
-from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import STEERING_AWAY, acknowledge, sign_of_hearing, what_keeps
 from dorothie_gym.policies.co_wizard.answers import (
@@ -53,6 +52,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     expects_stop,
     hear_wrong_way,
     is_garbled,
+    is_murmur,
     is_settled,
     is_unclear,
     is_unclear_reply,
@@ -61,7 +61,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.small_remarks import passes_over
+from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.policy import replace
@@ -102,6 +102,9 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     state.speech = state.speech.without_told(heard.words.told)
     before, behind = ((), ()) if done else still_due(state, heard.acts)
     state.speech = state.speech.cleared()
+    if is_murmur(state, view, heard):
+        state.say(*before, *behind)
+        return
     unclear = is_unclear(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
@@ -351,7 +354,7 @@ def _statement(
     if "wrong" in words.text.lower():
         state.feel(Happening.WRONG_WAY, view.time)
         hear_wrong_way(state, view)
-    elif _is_called_dark(words) and not view.lights:
+    elif is_called_dark(words) and not view.lights:
         switch_lights_on(state)
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
@@ -359,15 +362,8 @@ def _statement(
     elif not act.values(Slot.OBJECT) and passes_over(state, words, rng):
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
-        sees = words.told is not None and camera_fault(view.raw) is None
+        sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None
         state.say(sign_of_hearing("seen" if sees else "told"))
-
-
-def _is_called_dark(words: ParsedText) -> bool:
-    """Returns whether a statement says that it is dark."""
-    told = words.told
-    dark = told is not None and told.get("parameter") is WeatherParameter.SUN_ALTITUDE_ANGLE
-    return dark and told is not None and told.get("high") is True
 
 
 def _reply(
@@ -400,6 +396,8 @@ def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct
         set_goal(state, view, landmarks[0], streets, rng, corrected=True)
     elif (goal is None or state.intentions.arrived) and landmarks:
         set_goal(state, view, landmarks[0], streets, rng)
+    elif act.move is DialogueMove.CLARIFY and landmarks and state.beliefs.exact:
+        state.say(intend(Function.ACCEPT, act_builders.destination(landmarks[0]), wording=Wording(topic="taken")))
     else:
         hear_description(state, view, streets, landmarks, rng)
 
@@ -474,7 +472,7 @@ def _small_talk(
 ) -> None:
     awaited = not state.beliefs.statuses or view.time - state.dialogue.asked_at < state.config.answer_time
     expected = awaited and state.beliefs.goal is None and state.intentions.directive is None
-    if _senseless(state, view, act, words, asks=expected or is_garbled(words)):
+    if _senseless(state, view, act, words, asks=expected):
         return
     if rng.random() < state.style.chats:
         replies = intend(Function.OTHER, wording=Wording(topic="reply"))

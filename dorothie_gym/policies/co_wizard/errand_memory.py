@@ -35,10 +35,11 @@ _FRIEND = re.compile(
     r"\b(?:my friend|our passenger|pick up|picking up|[Pp]ick up)"
     r" (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle |Grandpa |Grandma )?[A-Z][\w-]+)(?!\w|'s)"
 )
-_BUSINESS = re.compile(
-    r"(buy|get|collect|fetch|drop off|deliver|unload|return|borrow|leave) (a|an|the|some|my|his|her|two|three|four)\b"
+_DRIVES = re.compile(
+    r"(turn|stop|go|get|be|drive|head|pull|park|take (me|us|the|a|that|this)|bring (me|us)|switch|change|slow|speed"
+    r"|keep|make|move|merge|follow|stay|continue|wait|find|swing|flip|double)\b"
 )
-"""What somebody does at a place, and no driver."""
+"""What a passenger needs from the driver; other business is the passenger's own."""
 
 _CUT_OFF = re.compile(r"\b(of|for|to|and|a|an|the|with|some|his|her|their)$")
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
@@ -99,7 +100,7 @@ def without_purposes(heard: HeardUtterance) -> HeardUtterance:
     """Returns an utterance without the steps that a purpose seems to ask for: "I have to collect Mila"."""
     tells = any(act.move is DialogueMove.EXPLAIN and not act.slots for act in heard.acts)
     clause = _CLAUSE.search(heard.words.text) if heard.words.plan else None
-    if clause is None or not (tells or _BUSINESS.match(clause["errand"])):
+    if clause is None or (not tells and _DRIVES.match(clause["errand"]) is not None):
         return heard
     rest = f"{heard.words.text[: clause.start()]} {heard.words.text[clause.end() :]}"
     return replace(heard, words=replace(heard.words, plan=understand(rest.strip(" ,.")).plan))

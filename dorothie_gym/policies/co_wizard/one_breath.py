@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
 _ORDERING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+_YES = DialogueMove.REPLY_Y
+_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _ANSWERS = MoveGroup.REPLY.moves
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 
@@ -69,6 +71,10 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """
     answers = [item for item in answers if item.act.move is not DialogueMove.IRRELEVANT] or answers
     answers = [item for k, item in enumerate(answers) if not any(_says_same(item, other) for other in answers[:k])]
+    if any(said.predicate is Predicate.KNOWS for item in answers if item.act.move is _YES for said in item.meaning):
+        answers = [item for item in answers if item.act.move is not DialogueMove.CHECK]
+    checked = [item.act.values(Slot.LANDMARK) for item in answers if item.act.move is DialogueMove.CHECK]
+    answers = [item for item in answers if item.act.move not in _SIGNS or item.act.values(Slot.LANDMARK) not in checked]
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
     plans = [k for k, item in enumerate(answers) if _tells_plan(item)]

@@ -44,6 +44,10 @@ _WITHOUT_CONTENT = frozenset(
 )
 """Moves that may be said without any content."""
 
+_WANTS_REPLY = act_builders.QUESTIONS | {DialogueMove.INSTRUCT, DialogueMove.CONFUSE, DialogueMove.ALIGN}
+_EMPTY = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.EXPLAIN})
+_NO_MORE: Final = 6.0  # time after a remark within which a murmur is a reaction to it [s]
+
 _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
 """Moves that are repeated as "I said ..."; other statements are repeated unchanged."""
 
@@ -68,6 +72,16 @@ def ask_for_known_place(state: CoWizardState, view: CoWizardView) -> None:
         intend(Function.SET_QUESTION, where, joined=True),
     )
     state.dialogue = state.dialogue.after_asking(view.time)
+
+
+def is_murmur(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
+    """Returns whether a few words without content follow a remark that needs no answer: "okay, mate", half heard."""
+    last, words = state.speech.last, heard.words
+    asked = last is None or last.act.move in _WANTS_REPLY or not state.speech.has_just_spoken(view.time, _NO_MORE)
+    content = (
+        words.plan or words.question or words.told or any(act.slots or act.move not in _EMPTY for act in heard.acts)
+    )
+    return not (asked or content or expects_stop(state, view, words)) and is_garbled(words)
 
 
 def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:

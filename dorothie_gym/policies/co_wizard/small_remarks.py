@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
 
 if TYPE_CHECKING:
@@ -22,6 +24,11 @@ _IN_PASSING: Final = re.compile(
     r"|nearly there|almost there|getting close|all day|losing my patience|taking forever|wasting time"
     r"|let me (see|check)|my (map|list))\b"
 )
+IN_SIGHT: Final = frozenset(
+    {Predicate.WEATHER, Predicate.CROWDED, Predicate.SEES, Predicate.BLOCKED, Predicate.VISIBILITY, Predicate.LIGHTS_ON}
+)
+"""Remarks on something that the car sees as well."""
+
 _ANSWERED: Final = 0.5  # probability that praise is answered
 
 
@@ -40,3 +47,10 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
     if praises and rng.random() < _ANSWERED:
         state.say(sign_of_hearing("praise"))
     return praises
+
+
+def is_called_dark(words: ParsedText) -> bool:
+    """Returns whether a statement says that it is dark."""
+    told = words.told
+    dark = told is not None and told.get("parameter") is WeatherParameter.SUN_ALTITUDE_ANGLE
+    return dark and told is not None and told.get("high") is True

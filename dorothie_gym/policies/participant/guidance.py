@@ -21,7 +21,12 @@ from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach, repeat_stop
-from dorothie_gym.policies.participant.given_orders import is_about_to_turn_round, last_given, turned_round_lately
+from dorothie_gym.policies.participant.given_orders import (
+    has_turned_since,
+    is_about_to_turn_round,
+    last_given,
+    turned_round_lately,
+)
 from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
@@ -57,6 +62,9 @@ ANNOUNCING_TIME = 1.5
 
 U_TURN_WAIT = 4.0
 """Standstill on the lane of a U-turn after which the U-turn is announced although it is not near [s]."""
+
+SENT_ON = 12.0
+"""Time for which "straight on" need not be said again [s]."""
 
 OBEYING = 3.0
 """Time after an order before which its failure is none of the guidance [s]."""
@@ -196,7 +204,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if not near and stuck:
         key, words = ("on", view.lane, 0), order(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
-    if stuck and state.guidance.step == key and state.guidance.repeats + 1 >= IN_VAIN:
+    if stuck and state.guidance.step == key and state.guidance.repeats + 1 >= IN_VAIN and not _told_to_stop(state):
         note_step(state, view, ("why", view.lane, 0))
         state.say(why_standing(state, view))
         return
@@ -208,6 +216,19 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     again = state.guidance.step == key
     if near and (not again or overdue):
         _announce(state, view, step=(key, distance, words), again=again, rng=rng)
+
+
+def _told_to_stop(state: ParticipantState) -> bool:
+    """Returns whether the car stands because that was the last order."""
+    last = last_given(state)
+    return last is not None and ActionValue.STOP in last.act.slots
+
+
+def _has_just_sent_on(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car was told a moment ago to go straight on, and has not turned since."""
+    last = last_given(state)
+    sent = last is not None and ActionValue.LANE_FOLLOW in last.act.slots and view.time - last.time < SENT_ON
+    return sent and last is not None and not has_turned_since(view, last)
 
 
 def _has_told_way(
@@ -297,6 +318,8 @@ def _is_left_to_ask(
     rng: np.random.Generator,
 ) -> bool:
     """Returns whether a turn is announced only if the car asks; driving straight on needs no announcement."""
+    if goes_straight and not view.standing and _has_just_sent_on(state, view):
+        return True
     if key[0] != "turn" or state.guidance.step == key:
         return False
     if key[1] in turn_lanes(state.town) and (goes_straight or view.lane == key[1]):
