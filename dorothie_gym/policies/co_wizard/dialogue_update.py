@@ -359,7 +359,7 @@ def _statement(
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
-    elif not act.values(Slot.OBJECT) and passes_over(state, words, rng):
+    elif passes_over(state, words, rng):
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
         sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None

@@ -87,7 +87,9 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
 
 def _says_same(item: Remark, other: Remark) -> bool:
     """Returns whether two remarks have the same contents, and some at all."""
-    return bool(item.act.slots) and item.act == other.act and item.wording.direction is other.wording.direction
+    alike = item.act.move is other.act.move or {item.act.move, other.act.move} <= _SIGNS
+    same = item.act.slots == other.act.slots and item.wording.direction is other.wording.direction
+    return bool(item.act.slots) and alike and same
 
 
 def is_plain_sign(item: Remark) -> bool:

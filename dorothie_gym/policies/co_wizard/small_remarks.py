@@ -40,7 +40,9 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
         words: the statement.
         rng: random generator of the decision.
     """
-    text = words.text.lower()
+    text, last = words.text.lower(), state.speech.last
+    if words.told is not None and last is not None and any(said.contains(words.told) for said in last.meaning):
+        return True  # both have said the same
     if _IN_PASSING.search(text) is not None:
         return True
     praises = _PLEASED.search(text) is not None

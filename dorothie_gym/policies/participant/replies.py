@@ -152,7 +152,7 @@ def _open_question(
         _name_order(state, landmarks, rng)
     elif _correct(state, view, act, words):
         return
-    elif GoalStatus.QUERIED in act.values(Slot.STATUS):
+    elif GoalStatus.QUERIED in act.values(Slot.STATUS) or not state.task.announced:
         _name_target(state, view, rng)
     elif landmarks == (LandmarkName.QUERIED,):
         _name_target(state, view, rng, *addition(state, view, rng))
