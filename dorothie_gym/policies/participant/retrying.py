@@ -30,6 +30,9 @@ SOON_AGAIN = 250.0
 LARGER = 0.25
 """Growth of the detour that is accepted to avoid a manoeuvre, with each attempt."""
 
+MOST_RETRIES = 12
+"""Number of attempts up to which it grows."""
+
 _ANSWERS = MoveGroup.REPLY.moves
 
 REMARK_EXPIRES = 8.0
@@ -137,7 +140,7 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
 def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
     """Plans a route that avoids manoeuvres, each time at a larger detour, and says why."""
     progress = state.route.to_goal
-    cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, IN_VAIN))
+    cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, MOST_RETRIES))
     state.guidance = replace(state.guidance, retries=state.guidance.retries + 1)
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
     state.route = state.route.with_progress(progress).sparing_worn(state.town, view.place)
