@@ -120,6 +120,8 @@ def word_acts(
         # Each remaining act gets an equal share of the remaining characters.
         limit = room // (len(acts) - number) - 1
         text = _word(act, speaker, rng, wording, style, scene, limit)
+        if style is not None and style.address and style.address in text.lower():
+            style = replace(style, addressing=0.0)  # once is enough
         if texts:
             texts[-1] = _linked(texts[-1], text)
         texts.append(text)
@@ -257,9 +259,12 @@ def _words(text: str) -> list[str]:
 
 
 def _repeats(front: str, body: str) -> bool:
-    """Returns whether the body begins with a word of the discourse marker ("so so"), or with a marker of its own."""
-    start = _words(body)
-    return not start or start[0] in _words(front) or start[0] == "because"
+    """Returns whether the body begins with a word of the discourse marker ("so so"), or with a marker of its own.
+
+    A second "now" is a repetition as well: "now slow down now".
+    """
+    start, lead = _words(body), _words(front)
+    return not start or start[0] in lead or start[0] == "because" or ("now" in lead and "now" in start)
 
 
 @functools.lru_cache(maxsize=8192)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+CAR_LENGTH: Final = 4.5
+"""Length of a car, as a measure of short distances [m]."""
+
 _ONES = [
     "zero",
     "one",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.numerals import may_be_speed, read_cardinals
+from dorothie_gym.dialogue.numerals import CAR_LENGTH, may_be_speed, read_cardinals
 from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, SpeedItem, TokenReader
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ _BEHIND_SPEED: Final = frozenset(
 )
 """Words behind a number that is a speed."""
 _LEAST_SPEED: Final = 5
+_LENGTHS: Final = frozenset({"length", "lengths"})
 _THOUSANDS: Final = frozenset({"k", "ks", "k's"})
 """Units of distance that are short for kilometres an hour behind an order of speed."""
 
@@ -58,6 +59,10 @@ class QuantityReader(TokenReader):
         if self.word_at(end) in _THOUSANDS and (aimed or self._changes_speed()):
             self._speed(number, unit=True)  # "not over fifty k"
             return end + 1
+        if self.word_at(end) == "car" and self.word_at(end + 1) in _LENGTHS:
+            more = self.word_at(end + 2) == "or" and self.word_at(end + 3) == "two"  # a car length or two
+            self.items.append(DistanceItem(round(CAR_LENGTH * (number + 0.5 * more))))
+            return end + 2 + 2 * more
         metres = self.grammar.metres.get(self.word_at(end))
         if metres is not None:
             hours, behind = self._per_hour(end + 1)
@@ -122,7 +127,7 @@ class QuantityReader(TokenReader):
             return None, start
         if word == "hundred":
             number, place = 100.0, place + 1
-        elif place > start and word in self.grammar.metres:
+        elif place > start and (word in self.grammar.metres or (word == "car" and self.word_at(place + 1) in _LENGTHS)):
             return 1.0, place
         else:
             length = self._run(place)

@@ -7,10 +7,12 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.dialogue.numerals import cardinal, ordinal
-from dorothie_gym.dialogue.routes import PlaceReference, PlanStep, StepAction, StepChange
+from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, PlanStep, StepAction, StepChange
 
 MAX_WORDS: Final = 24
 """Number of words after which the rest of a plan is summed up."""
+
+_PAST: Final = ConditionRelation.PAST
 
 REST: Final = "and so on as you said"
 
@@ -33,7 +35,9 @@ def spoken_step(step: PlanStep) -> str:
         words.append(f"at {cardinal(step.speed)}")
     elif step.change is not None and step.action not in (StepAction.SPEED, StepAction.LIGHTS):
         words.append("slowly" if step.change is StepChange.SLOWER else "quickly")
-    if step.condition is not None:
+    if step.condition is not None and step.action is StepAction.STRAIGHT and step.condition.relation is _PAST:
+        words.append(f"past {step.condition.place.describe()}")
+    elif step.condition is not None:
         words.append(step.condition.describe())
     if step.distance is not None:
         lasting = step.action in (StepAction.STRAIGHT, StepAction.FOLLOW, StepAction.GO)

@@ -13,7 +13,7 @@ import numpy as np
 
 from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, load_grammar
 from dorothie_gym.dialogue.lexicon import load_lexicon
-from dorothie_gym.dialogue.numerals import cardinal, duration, ordinal
+from dorothie_gym.dialogue.numerals import CAR_LENGTH, cardinal, duration, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext, enumeration
@@ -185,8 +185,12 @@ class SlotRealizer:
         return cardinal(round(self._wording.speed or 0))
 
     def distance(self) -> str:
-        """Returns the distance in words: in tens of metres, or in metres below ten."""
-        return self._length(self._wording.distance or 0)
+        """Returns the distance in words: car lengths for the way of a few of them, otherwise tens of metres."""
+        metres = self._wording.distance or 0
+        lengths = max(1, round(metres / CAR_LENGTH))
+        if lengths > _MOST_LENGTHS:
+            return self._length(metres)
+        return "a car length" if lengths == 1 else f"{cardinal(lengths)} car lengths"
 
     def metres(self) -> str:
         """Returns the distance of the content in words."""
@@ -297,17 +301,20 @@ class SlotRealizer:
         elsewhere = not _ELSEWHERE.isdisjoint(self.values.get(Slot.STATUS, ()))
         if not (owner or friend or passenger) or elsewhere:
             return None
-        if not self._naming and self.random() >= _NAMES_PERSON:
+        if owner and not self._naming and self.random() >= _NAMES_OWNER:
             return None
         if owner:
             return f"{owner}'s house"
-        as_passenger = passenger and (not friend or self.random() < _AS_PASSENGER)
-        return f"our passenger {passenger}" if as_passenger else f"my friend {friend}"
+        if passenger and self._wording.topic == "pick_up":
+            return str(passenger)
+        if not self._naming:
+            return str(friend or passenger)  # it is clear by now who that is
+        return f"my friend {friend}" if friend else f"our passenger {passenger}"
 
 
 _NAMING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
-_AS_PASSENGER = 0.4  # probability that a person to be picked up is called a passenger rather than a friend
-_NAMES_PERSON = 0.8  # probability that a house or a person is called by name
+_MOST_LENGTHS = 4  # number of car lengths from which on metres are said
+_NAMES_OWNER = 0.93  # probability that a house is called by its owner
 _ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE})  # of other errands
 _INDEFINITE = re.compile(r"^(an?|some|another|the) ")
 _POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")

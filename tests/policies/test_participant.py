@@ -10,8 +10,8 @@ from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces import ParticipantAction
 from tests.policies.walk import play
 
-BY_GOALS = ParticipantStyle(guides=0.0, names_goal=1.0, names_street=0.5, hurries=1.0, patience=10.0, chat=1e4)
-BY_STEPS = ParticipantStyle(guides=1.0, names_goal=0.0, names_street=0.0, hurries=1.0, patience=10.0, chat=1e4)
+BY_GOALS = ParticipantStyle(guides=0.0, names_street=0.5, hurries=1.0, patience=10.0, chat=1e4)
+BY_STEPS = ParticipantStyle(guides=1.0, names_street=0.0, hurries=1.0, patience=10.0, chat=1e4)
 
 
 def first_words(style: ParticipantStyle) -> str:

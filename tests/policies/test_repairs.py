@@ -15,7 +15,7 @@ from dorothie_gym.policies.speech import remark
 from tests.policies.said import heard, with_words
 
 M = DialogueMove
-CALM = ParticipantStyle(guides=0.0, names_goal=1.0, names_street=0.0, hurries=1.0, patience=60.0, chat=1e4, puzzled=1.0)
+CALM = ParticipantStyle(guides=0.0, names_street=0.0, hurries=1.0, patience=60.0, chat=1e4, puzzled=1.0)
 
 
 class Human:

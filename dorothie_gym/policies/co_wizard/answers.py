@@ -26,6 +26,7 @@ from dorothie_gym.policies.co_wizard.proposition_truth import (
     reason_to_turn_round,
     seconds_to_goal,
     sees_far,
+    street_here,
 )
 from dorothie_gym.policies.notable_conditions import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
@@ -147,18 +148,20 @@ def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.
     """Returns, with some probability, an addition to an answer: why something is not seen, or the time to the goal."""
     unseen = asked.predicate is Predicate.SEES and not believes(state.knowledge, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
-        return _poor_view(view, rng)
+        return _poor_view(state, view, rng)
     if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
-        return plan_remark(state, view, rng, joined=True)
+        holds = believes(state.knowledge, view, asked)
+        return plan_remark(state, view, rng, joined=True) if holds else ()
     return ()
 
 
-def _poor_view(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _poor_view(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns, with some probability, a remark about a limited view."""
     limit, fault = limit_of(view.raw), camera_fault(view.raw)
     if limit is None or rng.random() < 0.3:
         return ()
     if fault is not None:
+        state.dialogue = state.dialogue.with_view_fault(fault)  # need not be reported any more
         return (fault_remark(fault, joined=True),)
     return (replace(view_remark(limit, sight(view.raw), rng), joined=True),)
 
@@ -284,8 +287,10 @@ def _name_objects(state: CoWizardState, view: CoWizardView) -> None:
     things = tuple(dict.fromkeys(thing.kind for thing in view.objects))[:2]
     if not things:
         state.say(intend(Function.ANSWER, Proposition.of(Predicate.SEES, object=ObjectClass.ROAD)))
+    wording = Wording(topic="sees_only") if len(things) == 1 else None
     for number, thing in enumerate(things):
-        state.say(intend(Function.ANSWER, Proposition.of(Predicate.SEES, object=thing), joined=number > 0))
+        seen = Proposition.of(Predicate.SEES, object=thing)
+        state.say(intend(Function.ANSWER, seen, wording=wording, joined=number > 0))
 
 
 def _name_way(state: CoWizardState, view: CoWizardView) -> None:
@@ -330,7 +335,7 @@ def _next_turns(state: CoWizardState, view: CoWizardView) -> tuple[Proposition, 
 
 
 def _name_street(state: CoWizardState, view: CoWizardView) -> None:
-    street = street_of(view.raw, state.town, view.lane)
+    street = street_here(state.town, view)
     if street is StreetName.UNKNOWN:
         state.say(intend(Function.UNCERTAIN_ANSWER))
     else:

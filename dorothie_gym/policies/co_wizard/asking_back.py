@@ -95,9 +95,9 @@ def _narrow(state: CoWizardState, view: CoWizardView, words: ParsedText) -> None
         state.dialogue = state.dialogue.with_proposal(Directive(direction=words.direction, junction=choice.junction))
         turn = act_builders.action(ActionValue.J_TURN, direction=words.direction)
         state.say(intend(Function.CHECK_QUESTION, turn, wording=Wording(direction=words.direction)))
-    elif goal is not None and (state.beliefs.exact or goal in words.landmarks):
+    elif goal is not None and not state.intentions.arrived and (state.beliefs.exact or goal in words.landmarks):
         state.say(intend(Function.CHECK_QUESTION, act_builders.destination(goal)))
-    elif goal is not None:
+    elif goal is not None and not state.intentions.arrived:
         state.say(intend(Function.SET_QUESTION, act_builders.action(ActionValue.QUERIED)))
     else:
         state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))

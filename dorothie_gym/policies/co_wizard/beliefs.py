@@ -123,6 +123,10 @@ class BeliefState:
         """Adds to the look of the goal."""
         return replace(self, look=look if self.look is None else self.look.joined(look))
 
+    def without_look(self) -> BeliefState:
+        """Forgets the look of the goal, which belongs to another house or person."""
+        return replace(self, look=None)
+
     def with_place_ruled_out(self) -> BeliefState:
         """Excludes the current place as a candidate for the name of its landmark."""
         return self if self.place is None else replace(self, ruled_out=(*self.ruled_out, self.place))

@@ -14,7 +14,6 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
-from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import STEERING_AWAY, acknowledge, sign_of_hearing, what_keeps
 from dorothie_gym.policies.co_wizard.answers import (
@@ -45,6 +44,7 @@ from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, 
 from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, is_plain_sign, still_due
+from dorothie_gym.policies.co_wizard.places_ahead import distance_ahead
 from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts, settle_with_order, take_plan
 from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,
@@ -52,6 +52,8 @@ from dorothie_gym.policies.co_wizard.repairs import (
     expects_stop,
     hear_wrong_way,
     is_garbled,
+    is_murmur,
+    is_settled,
     is_unclear,
     is_unclear_reply,
     names_unknown_place,
@@ -59,6 +61,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
+from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.policy import replace
@@ -70,9 +73,6 @@ if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
-
-NEAR = 100
-"""Distance up to which a place that is said to be ahead is approached slowly [m]."""
 
 FAR = 150
 """Distance up to which the car is sent to a place ahead, rather than along a road [m]."""
@@ -100,8 +100,11 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         state.commands = state.commands.reacting_until(view.time + reaction)
     done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
     state.speech = state.speech.without_told(heard.words.told)
-    before = () if done else still_due(state, heard.acts)
+    before, behind = ((), ()) if done else still_due(state, heard.acts)
     state.speech = state.speech.cleared()
+    if is_murmur(state, view, heard):
+        state.say(*before, *behind)
+        return
     unclear = is_unclear(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
@@ -131,7 +134,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     before = tuple(itertools.dropwhile(is_plain_sign, before))  # the "okay" to what was said before comes too late
     if before:
         before = (replace(before[0], joined=False), *before[1:])
-    state.speech = state.speech.cleared().plan(*before, *answer)
+    state.speech = state.speech.cleared().plan(*before, *answer, *behind)
 
 
 def _mishears(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
@@ -209,12 +212,13 @@ def _obey(
         OBEYED[action](state, view, act, words)
     answers = act.move is not DialogueMove.INSTRUCT and actions[0] in _WAYS
     keeps = what_keeps(state, view, actions[0])
-    if keeps is None or actions[0] in STEERING_AWAY:
+    limited = limit_remark(state, view, words.speed) if ActionValue.SPEED_CHANGE in actions and words.speed else ()
+    if limited:
+        state.say(*limited)
+    elif keeps is None or actions[0] in STEERING_AWAY:
         acknowledge(state, view, actions[0], words, rng, answers=answers)
     if keeps is not None:
         state.say(replace(keeps, joined=not state.speech.idle))
-    if ActionValue.SPEED_CHANGE in actions and words.speed is not None:
-        state.say(*limit_remark(state, view, words.speed))
     note_order(state, view, actions[0])
     if contradicts:
         check_goal(state, view)
@@ -293,14 +297,14 @@ def _explanation(
     name = landmarks[0] if landmarks else None
     if _COMMANDS & set(act.values(Slot.ACTION)):
         _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
-    elif words.distance is not None and name is not None and name is state.beliefs.goal and _is_near(state, words):
-        approach_stop(state, view, name, float(words.distance))
+    elif name is not None and name is state.beliefs.goal and (ahead := distance_ahead(state, words)) is not None:
+        approach_stop(state, view, name, ahead)
         if rng.random() > state.style.silent:
             state.say(sign_of_hearing("near"))
     elif _is_here(state, view, words):
         do_stop(state, view, act, words)
         stops = act_builders.action(ActionValue.STOP)
-        state.say(intend(Function.ACCEPT, stops, wording=Wording(topic="taken")))
+        state.say(intend(Function.ACCEPT, stops, wording=Wording(topic="stops_here")))
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
@@ -341,11 +345,6 @@ def _is_here(state: CoWizardState, view: CoWizardView, words: ParsedText) -> boo
     return here and not view.standing and not state.intentions.arrived and state.beliefs.goal is not None
 
 
-def _is_near(state: CoWizardState, words: ParsedText) -> bool:
-    """Returns whether a place that the car is guided to is said to be near."""
-    return not state.beliefs.exact and words.distance is not None and words.distance <= NEAR
-
-
 def _statement(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
@@ -355,21 +354,16 @@ def _statement(
     if "wrong" in words.text.lower():
         state.feel(Happening.WRONG_WAY, view.time)
         hear_wrong_way(state, view)
-    elif _is_called_dark(words) and not view.lights:
+    elif is_called_dark(words) and not view.lights:
         switch_lights_on(state)
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
+    elif passes_over(state, words, rng):
+        return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
-        sees = words.told is not None and camera_fault(view.raw) is None
+        sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None
         state.say(sign_of_hearing("seen" if sees else "told"))
-
-
-def _is_called_dark(words: ParsedText) -> bool:
-    """Returns whether a statement says that it is dark."""
-    told = words.told
-    dark = told is not None and told.get("parameter") is WeatherParameter.SUN_ALTITUDE_ANGLE
-    return dark and told is not None and told.get("high") is True
 
 
 def _reply(
@@ -402,6 +396,8 @@ def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct
         set_goal(state, view, landmarks[0], streets, rng, corrected=True)
     elif (goal is None or state.intentions.arrived) and landmarks:
         set_goal(state, view, landmarks[0], streets, rng)
+    elif act.move is DialogueMove.CLARIFY and landmarks and state.beliefs.exact:
+        state.say(intend(Function.ACCEPT, act_builders.destination(landmarks[0]), wording=Wording(topic="taken")))
     else:
         hear_description(state, view, streets, landmarks, rng)
 
@@ -463,6 +459,8 @@ def _confusion(
 ) -> None:
     """Repeats a remark that was not understood; another time, expresses it differently."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
+    if is_settled(state, view, words):
+        return
     if state.speech.has_just_asked_back or state.speech.turns_of_repair(view.time):
         explain_differently(state, view, words, rng)
     else:
@@ -474,7 +472,7 @@ def _small_talk(
 ) -> None:
     awaited = not state.beliefs.statuses or view.time - state.dialogue.asked_at < state.config.answer_time
     expected = awaited and state.beliefs.goal is None and state.intentions.directive is None
-    if _senseless(state, view, act, words, asks=expected or is_garbled(words)):
+    if _senseless(state, view, act, words, asks=expected):
         return
     if rng.random() < state.style.chats:
         replies = intend(Function.OTHER, wording=Wording(topic="reply"))

@@ -32,8 +32,16 @@ _OWNER = re.compile(
     r"(?:house|home|place)\b"
 )
 _FRIEND = re.compile(
-    r"\b(?:my friend|our passenger) (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle )?[A-Z][\w-]+)(?!\w|'s)"
+    r"\b(?:my friend|our passenger|pick up|picking up|[Pp]ick up)"
+    r" (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle |Grandpa |Grandma )?[A-Z][\w-]+)(?!\w|'s)"
 )
+_DRIVES = re.compile(
+    r"(turn|stop|go|get|be|drive|head|pull|park|take (me|us|the|a|that|this)|bring (me|us)|switch|change|slow|speed"
+    r"|keep|make|move|merge|follow|stay|continue|wait|find|swing|flip|double)\b"
+)
+"""What a passenger needs from the driver; other business is the passenger's own."""
+
+_CUT_OFF = re.compile(r"\b(of|for|to|and|a|an|the|with|some|his|her|their)$")
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
@@ -66,7 +74,10 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
     if found is not None:
         first, _, rest = found["owner"].partition(" ")
         name = rest if rest and first.lower() in _BEFORE_NAMES else found["owner"]
-        state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", name))
+        owner = _OF_SPEAKER.sub("your ", name)
+        if state.beliefs.owner is not None and owner != state.beliefs.owner:
+            state.beliefs = state.beliefs.without_look()
+        state.beliefs = state.beliefs.with_owner(owner)
     elif done or state.beliefs.goal is not LandmarkName.HOUSE:
         state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
 
@@ -78,6 +89,8 @@ def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:
         return
     found = _FRIEND.search(heard.words.text)
     if found is not None:
+        if state.beliefs.friend is not None and found["friend"] != state.beliefs.friend:
+            state.beliefs = state.beliefs.without_look()
         state.beliefs = state.beliefs.with_friend(found["friend"])
     elif any(_OVER & act.slots for act in heard.acts) or state.beliefs.goal is not LandmarkName.PERSON:
         state.beliefs = state.beliefs.with_friend(None)  # somebody else than the last one
@@ -86,8 +99,8 @@ def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:
 def without_purposes(heard: HeardUtterance) -> HeardUtterance:
     """Returns an utterance without the steps that a purpose seems to ask for: "I have to collect Mila"."""
     tells = any(act.move is DialogueMove.EXPLAIN and not act.slots for act in heard.acts)
-    clause = _CLAUSE.search(heard.words.text) if tells and heard.words.plan else None
-    if clause is None:
+    clause = _CLAUSE.search(heard.words.text) if heard.words.plan else None
+    if clause is None or (not tells and _DRIVES.match(clause["errand"]) is not None):
         return heard
     rest = f"{heard.words.text[: clause.start()]} {heard.words.text[clause.end() :]}"
     return replace(heard, words=replace(heard.words, plan=understand(rest.strip(" ,.")).plan))
@@ -104,6 +117,8 @@ def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
         return None  # "I need you to take the next right" does not describe an errand
     purpose = read_purpose(clause["errand"])
     item = _OF_SPEAKER.sub("your ", purpose.items[0]) if purpose.items else None
+    if item is not None and _CUT_OFF.search(item) is not None:
+        item = None  # its end was not heard
     person = None if purpose.person is None else _OF_SPEAKER.sub("your ", purpose.person)
     return None if item is person is None else Proposition.of(Predicate.PURPOSE, place=place, item=item, person=person)
 

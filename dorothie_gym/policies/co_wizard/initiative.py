@@ -161,6 +161,8 @@ def _may_ask_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> bo
     near = waiting or choice.distance < reach_at(state.config.ask_distance, view.speed, state.town)
     if not near or wanted_exit(state, view) is not None:
         return False
+    if progress is not None and state.beliefs.exact and not waiting:
+        return False  # the car finds its own way, and is only beside it for a moment
     if progress is not None:
         crossing = progress.next_crossing(state.town, view.station)
         if crossing is None or progress.changes_before(crossing):

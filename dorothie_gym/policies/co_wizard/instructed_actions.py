@@ -143,7 +143,7 @@ def limit_remark(state: CoWizardState, view: CoWizardView, speed: int) -> tuple[
     if speed < limit + LIMIT_TOLERANCE:
         return ()
     content = Proposition.of(Predicate.DRIVES_AT, speed=limit, limit=True)
-    return (intend(CommunicativeFunction.INFORM, content, wording=Wording(topic="limit", speed=limit), joined=True),)
+    return (intend(CommunicativeFunction.INFORM, content, wording=Wording(topic="limit", speed=limit)),)
 
 
 def _do_lights(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:

@@ -18,18 +18,26 @@ if TYPE_CHECKING:
 
 _SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
 _ORDERING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+_YES = DialogueMove.REPLY_Y
+_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _ANSWERS = MoveGroup.REPLY.moves
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 
 
-def still_due(state: CoWizardState, acts: Sequence[DialogueAct]) -> tuple[Remark, ...]:
+def still_due(state: CoWizardState, acts: Sequence[DialogueAct]) -> tuple[tuple[Remark, ...], tuple[Remark, ...]]:
     """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled.
 
     Args:
         state: working copy of the state.
-        acts: acts of the utterance; after an order only answers are still due.
+        acts: acts of the utterance; after an order, or a request to repeat, only answers are still due.
+
+    Returns:
+        Answers and what is joined to them, which come before the reply to the utterance, and other remarks, which come
+        after it.
     """
-    ordered = any(act.move in _ORDERING and act.values(Slot.ACTION) for act in acts)
+    ordered = any(
+        act.move is DialogueMove.CONFUSE or (act.move in _ORDERING and act.values(Slot.ACTION)) for act in acts
+    )
     kept: list[Remark] = []
     dropped = False
     for item in state.speech.queue:
@@ -40,15 +48,33 @@ def still_due(state: CoWizardState, acts: Sequence[DialogueAct]) -> tuple[Remark
             kept.append(item)
     if len(kept) < len(state.speech.queue):
         state.dialogue = state.dialogue.with_proposal(None)
-    return tuple(kept)
+    return _owed_first(kept)
+
+
+def _owed_first(queue: Sequence[Remark]) -> tuple[tuple[Remark, ...], tuple[Remark, ...]]:
+    """Divides remarks into reactions, with what is joined to them, and remarks of the speaker's own accord."""
+    owed: list[Remark] = []
+    own: list[Remark] = []
+    kind = owed
+    for item in queue:
+        if not item.joined:
+            kind = own if item.act.move is DialogueMove.EXPLAIN and not item.urgent else owed
+        kind.append(item)
+    return tuple(owed), tuple(own)
 
 
 def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """Joins the answers to an utterance.
 
-    An "okay" is dropped if another remark follows, and "what?" if a part of the utterance was understood.
-    Plans come last.
+    An "okay" is dropped if another remark follows, and "what?" if a part of the utterance was understood; small talk is
+    only answered where there is nothing else. Plans come last.
     """
+    answers = [item for item in answers if item.act.move is not DialogueMove.IRRELEVANT] or answers
+    answers = [item for k, item in enumerate(answers) if not any(_says_same(item, other) for other in answers[:k])]
+    if any(said.predicate is Predicate.KNOWS for item in answers if item.act.move is _YES for said in item.meaning):
+        answers = [item for item in answers if item.act.move is not DialogueMove.CHECK]
+    checked = [item.act.values(Slot.LANDMARK) for item in answers if item.act.move is DialogueMove.CHECK]
+    answers = [item for item in answers if item.act.move not in _SIGNS or item.act.values(Slot.LANDMARK) not in checked]
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
     plans = [k for k, item in enumerate(answers) if _tells_plan(item)]
@@ -57,6 +83,13 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     leads = [following.joined for following in answers[1:]]
     kept = [item for k, item in enumerate(answers) if not plain[k] or (k == 0 and (all(plain) or leads[0]))]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _says_same(item: Remark, other: Remark) -> bool:
+    """Returns whether two remarks have the same contents, and some at all."""
+    alike = item.act.move is other.act.move or {item.act.move, other.act.move} <= _SIGNS
+    same = item.act.slots == other.act.slots and item.wording.direction is other.wording.direction
+    return bool(item.act.slots) and alike and same
 
 
 def is_plain_sign(item: Remark) -> bool:

@@ -210,9 +210,14 @@ def _carry_straight(state: CoWizardState, view: CoWizardView, step: PlanStep) ->
     return not due.passed and choice is not None and choice.junction == due.junction
 
 
+_BEHIND: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
+"""Conditions of steps that end behind a place, which is none of the stops."""
+
+
 def _announce_place(state: CoWizardState, step: PlanStep) -> None:
     """Reports that the car has come to the place up to which it was to go straight on."""
-    name = None if step.condition is None else step.condition.place.landmark
+    passes = step.condition is None or step.condition.relation in _BEHIND
+    name = None if passes or step.condition is None else step.condition.place.landmark
     if name is not None:
         there = Proposition.of(Predicate.SEES, place=name)
         state.say(intend(Function.INFORM, there, wording=Wording(topic="reached"), urgent=True))

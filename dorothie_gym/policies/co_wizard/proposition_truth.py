@@ -88,6 +88,13 @@ def lane_ends(town: Town, view: CoWizardView) -> bool:
     return not town.successors(lane.id) and lane.length - view.station < ENDS_WITHIN
 
 
+def street_here(town: Town, view: CoWizardView) -> StreetName:
+    """Returns the street that the car is on; in a junction, the one that it comes from or is turning onto, if known."""
+    lanes = (view.lane, *town.predecessors(view.lane), *(link.target for link in town.successors(view.lane)))
+    streets = (street_of(view.raw, town, lane) for lane in lanes)
+    return next((street for street in streets if street is not StreetName.UNKNOWN), StreetName.UNKNOWN)
+
+
 def is_localised(view: CoWizardView, most: float) -> bool:
     """Returns whether the variance of the position is at most `most` [m^2]."""
     return view.variance <= most
@@ -135,7 +142,7 @@ def _about_goal(known: CoWizardKnowledge, said: Proposition) -> bool:
 
 
 def _is_on_street(known: CoWizardKnowledge, view: CoWizardView, said: Proposition) -> bool | None:
-    here = street_of(view.raw, known.town, view.lane)
+    here = street_here(known.town, view)
     if here is StreetName.UNKNOWN or not is_localised(view, known.config.lost_variance):
         return None
     return here is said.get("street")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.conversation import is_partly_inaudible
+from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
@@ -44,6 +44,10 @@ _WITHOUT_CONTENT = frozenset(
 )
 """Moves that may be said without any content."""
 
+_WANTS_REPLY = act_builders.QUESTIONS | {DialogueMove.INSTRUCT, DialogueMove.CONFUSE, DialogueMove.ALIGN}
+_EMPTY = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.EXPLAIN})
+_NO_MORE: Final = 6.0  # time after a remark within which a murmur is a reaction to it [s]
+
 _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
 """Moves that are repeated as "I said ..."; other statements are repeated unchanged."""
 
@@ -70,6 +74,16 @@ def ask_for_known_place(state: CoWizardState, view: CoWizardView) -> None:
     state.dialogue = state.dialogue.after_asking(view.time)
 
 
+def is_murmur(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
+    """Returns whether a few words without content follow a remark that needs no answer: "okay, mate", half heard."""
+    last, words = state.speech.last, heard.words
+    asked = last is None or last.act.move in _WANTS_REPLY or not state.speech.has_just_spoken(view.time, _NO_MORE)
+    content = (
+        words.plan or words.question or words.told or any(act.slots or act.move not in _EMPTY for act in heard.acts)
+    )
+    return not (asked or content or expects_stop(state, view, words)) and is_garbled(words)
+
+
 def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
     """Returns whether an utterance is partly inaudible and must be repeated.
 
@@ -93,6 +107,19 @@ def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) ->
     """Returns whether meaningless words are probably a request to stop: the car is guided to a place that is near."""
     guided = state.beliefs.goal is not None and not state.beliefs.exact and state.route.progress is None
     return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
+
+
+def is_settled(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether what the participant has not understood needs no repetition.
+
+    The car has said something else meanwhile, or has asked where to go and knows it by now.
+    """
+    last = state.speech.last_content
+    if last is None:
+        return False
+    asks_goal = last.act.move is DialogueMove.QUERY_W and LandmarkName.QUERIED in last.act.values(Slot.LANDMARK)
+    spoke_meanwhile = state.speech.last_end > view.time - 0.5 * speech_seconds(words.text)
+    return spoke_meanwhile or (asks_goal and state.beliefs.goal is not None and not state.intentions.arrived)
 
 
 def repeat_last(state: CoWizardState) -> None:

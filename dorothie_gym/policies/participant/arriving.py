@@ -18,7 +18,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.approach_end import ending
 from dorothie_gym.policies.participant.given_orders import times_told
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.orders import of_place, order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
@@ -51,7 +51,10 @@ GAIN_RANGE = (-2.0, 3.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
 FURTHER = 5.0
-"""Distance to the place up to which "a bit further" is said, and above which metres [m]."""
+"""Distance to the place up to which "a bit further" is said, and above which car lengths [m]."""
+
+LENGTHS = 16.0
+"""Distance to the place up to which car lengths are said, and above which the car is told to keep going [m]."""
 
 SHORT_RESERVE = 1.0
 """Distance by which short spoken distances are shortened [m]."""
@@ -60,7 +63,7 @@ HARDLY = 1.0
 """Way of the car that shows that it follows instructions to drive on a little [m]."""
 
 FEWEST = 3.0
-"""Smallest distance that is said in metres [m]; the car stops a little earlier."""
+"""Smallest distance that is said [m]; the car stops a little earlier."""
 
 ROLLING = 3.5
 """Speed up to which a car that was sent on a little may still stop by itself [m/s]; it may have misheard how far."""
@@ -82,9 +85,6 @@ STANDING_RANGE = 45.0
 
 PATIENT_TIME = 6.0
 """Standstill after which a car at the place, or one that is not guided, gets its next instruction [s]."""
-
-_HERE = Wording(topic="here")
-"""Wording of the statement that the place is right here."""
 
 _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
 _SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
@@ -120,7 +120,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 def _is_sent_a_little(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether the car was just told to drive on a little, rather than straight on, and does so."""
     lately = view.time - state.guidance.nudged_at < state.config.nudge_time
-    straight_on = state.guidance.nudges > IN_VAIN and state.guidance.sent_straight_on
+    straight_on = state.guidance.sent_straight_on
     runs_past = view.speed > ROLLING and state.route.to_goal.left(view.station) < stopping_distance(view.speed)
     return lately and not (straight_on or runs_past)
 
@@ -141,7 +141,7 @@ def prepare_stop(state: ParticipantState, view: ParticipantView, left: float, rn
     if room_to_stop(state, view, left)[0] < -state.config.late_stop:
         # there is only time for a shout
         points_out = _has_stopped_twice(state)
-        act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording())
+        act, wording = (_here(state).act, _here(state).wording) if points_out else (_STOP, Wording())
         shouts = [word_act(act, Role.PARTICIPANT, rng, wording, style=_SHOUTING) for _ in range(SHOUTS)]
         options = [text for text in (*shouts, state.guidance.stop_text) if text != state.guidance.stop_said] or shouts
         shortest = min(options, key=state.speech.delivery.seconds)
@@ -160,7 +160,7 @@ def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> Non
     """
     first = not state.route.misses and state.guidance.stopped_at == -math.inf
     points_out = (first and rng.random() < state.style.points_out) or _has_stopped_twice(state)
-    act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording(here=True))
+    act, wording = (_here(state).act, _here(state).wording) if points_out else (_STOP, Wording(here=True))
     text = said = state.guidance.stop_said
     for _ in range(REWORDINGS):
         text = word_act(act, Role.PARTICIPANT, rng, wording, style=state.speech.style)
@@ -173,7 +173,8 @@ def _here(state: ParticipantState) -> Remark:
     """Returns the statement that the place is right here, which makes a guided car stop."""
     place = None if state.task.goal is None else state.task.goal.name
     here = Proposition.of(Predicate.CLOSE, place=place)
-    return intend(CommunicativeFunction.INFORM, here, elided=("place",), wording=_HERE, urgent=True)
+    wording = Wording(topic=of_place("here", place))
+    return intend(CommunicativeFunction.INFORM, here, elided=("place",), wording=wording, urgent=True)
 
 
 def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
@@ -183,20 +184,15 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
 
 
 def _announce_place(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
-    """Announces the place with its distance [m], or requests a lower speed if there is no time for an announcement."""
+    """Announces the place, or requests a lower speed if there is no time for an announcement."""
     goal, speed = state.task.goal, max(view.speed, state.config.soon_speed)
     if goal is None:
         return
     if left > 3.5 * speed + 20.0:
         room = left > 3.5 * speed + 20.0 + ENDING_TIME * speed
         end = ending(state, view, rng) if room and rng.random() < state.style.endings else ()
-        distance = max(left - view.speed * (3.0 + ENDING_TIME * len(end)), 10.0)  # when it has been said
-        if end or rng.random() < state.config.states_distance:
-            ahead = Proposition.of(Predicate.DISTANCE, place=goal.name, metres=10 * round(distance / 10.0))
-            words = intend(CommunicativeFunction.INFORM, ahead, wording=Wording(topic="ahead"), urgent=True)
-        else:
-            wording = Wording(distance=distance)
-            words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
+        ahead = Proposition.of(Predicate.CLOSE, place=goal.name)
+        words = intend(CommunicativeFunction.INFORM, ahead, wording=Wording(topic="ahead"), urgent=True)
         said = (words, *(replace(item, urgent=True) for item in end))
     elif left > 3.0 * speed + 12.0 and not state.guidance.slowed_early:
         said = (order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True),)
@@ -291,7 +287,7 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
 
     A third instruction to a car that has hardly moved is replaced by the question why it stands; then the car is told
     to go straight on, in case it waits before a junction, and to start. A car that moves, but too little, is told the
-    distance.
+    distance, in car lengths; one that stands far away is told to keep going until it is stopped.
     """
     left = state.route.to_goal.left(view.station)
     counted = state.guidance.after_nudging(view.time, left)
@@ -309,11 +305,12 @@ def _nudge(state: ParticipantState, view: ParticipantView, left: float, counted:
         return order(DialogueMove.INSTRUCT, ActionValue.START) if attempt == IN_VAIN else straight_on()
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
-    reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE
-    if too_little:
+    if left > LENGTHS:
+        wording = Wording(topic="run_up")
+    elif too_little:
         wording = Wording(distance=max(left, FEWEST))
     else:
-        wording = Wording(distance=left - reserve) if left > FURTHER else Wording(topic="further")
+        wording = Wording(distance=left - SHORT_RESERVE) if left > FURTHER else Wording(topic="further")
     return order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording)
 
 

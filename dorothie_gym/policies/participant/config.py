@@ -51,7 +51,6 @@ class ParticipantConfig(GuidanceConfig):
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
         omits_straight: lowest probability of leaving out the announcement to drive straight across a junction.
-        states_distance: probability that a place ahead is announced by a statement, not by an instruction.
         way_round_cost: extra cost of each lane change and U-turn after failures [m].
         off_route: number of decisions off the route after which a new one is planned.
         missed_within: distance to the goal below which leaving the route counts as a miss [m].
@@ -66,8 +65,6 @@ class ParticipantConfig(GuidanceConfig):
         aim: the same at first: a car that stops too late has to turn round twice [m].
         pull: expected acceleration of a car after a turn [m/s^2].
         ready_time: standstill after which a car near the goal gets its next instruction [s].
-        distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
-            rolls on [m].
         nudge_time: time after an instruction to drive on a little in which no other follows [s].
         late_stop: distance past the goal beyond which the stop instruction is shortened [m].
         arrival_distance: distance to the goal within which other remarks are dropped [m].
@@ -111,7 +108,6 @@ class ParticipantConfig(GuidanceConfig):
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
     omits_straight: float = 0.95
-    states_distance: float = 0.75
     way_round_cost: float = 400.0
     off_route: int = 3
     missed_within: float = 15.0
@@ -126,7 +122,6 @@ class ParticipantConfig(GuidanceConfig):
     aim: float = 0.8
     pull: float = 3.0
     ready_time: float = 1.6
-    distance_reserve: float = 8.0
     nudge_time: float = 7.0
     late_stop: float = 1.0
     arrival_distance: float = 60.0
@@ -151,7 +146,6 @@ class ParticipantStyle:
 
     Attributes:
         guides: probability of guidance to a place that the car may know.
-        names_goal: probability that the goal is named before guidance.
         names_street: probability that a street is added to a place or a turn.
         hurries: probability that the next task follows in the same breath as the report of the last.
         patience: standstill after which the participant asks for the reason [s].
@@ -176,7 +170,6 @@ class ParticipantStyle:
     """
 
     guides: float
-    names_goal: float
     names_street: float
     hurries: float
     patience: float
@@ -208,7 +201,6 @@ class ParticipantStyle:
         by_turns = persona.knowledge * persona.talkativeness > BACKSEAT
         return cls(
             guides=0.35 if by_turns else 0.06,
-            names_goal=within(0.85, 1.0, persona.certainty, rng),
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -17,7 +17,13 @@ from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
 from dorothie_gym.policies.participant.messages import message_remark, seconds_to_take_in
-from dorothie_gym.policies.participant.stories import as_afterthought, purpose_of, story_remark
+from dorothie_gym.policies.participant.stories import (
+    as_afterthought,
+    picks_up,
+    purpose_of,
+    purpose_of_target,
+    story_remark,
+)
 from dorothie_gym.policies.participant.trip_talk import recollection
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
@@ -27,6 +33,9 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
+
+_COMMON: Final = (LandmarkName.HOUSE, LandmarkName.PERSON)
+"""Landmarks that a town has several of, so that only the present one is clear without a name."""
 
 # --- changes of the tasks -------------------------------------------------------------------------------------------
 
@@ -82,9 +91,7 @@ def _report_done(
 
 def _wording_of_meeting(view: ParticipantView, subgoal: SeenSubgoal) -> Wording:
     """Returns the wording of the report that a person was picked up, or only met."""
-    purpose = purpose_of(view, subgoal.index)
-    picks_up = purpose is not None and purpose.action is not None and purpose.action.startswith("pick up")
-    return Wording(topic="picked_up" if picks_up else "met")
+    return Wording(topic="picked_up" if picks_up(purpose_of(view, subgoal.index)) else "met")
 
 
 def _report_added(
@@ -177,10 +184,12 @@ def _go_first(
     switch_target(state, view, subgoal, landmark)
     street = None if view.unique(landmark) else landmark.street
     now = act_builders.errand(landmark.name, GoalStatus.ONGOING, street)
+    later = intend(Function.REQUEST, act_builders.errand(former.name, GoalStatus.PENDING), joined=True)
+    put_off = () if former.name in _COMMON else (later,)  # "that house" could be any
     state.say_only(
         intend(Function.REQUEST, now, wording=Wording(topic="added")),
         *message_remark(state, view, landmark, rng),
-        intend(Function.REQUEST, act_builders.errand(former.name, GoalStatus.PENDING), joined=True),
+        *put_off,
     )
 
 
@@ -336,16 +345,25 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     street = None
     if not view.unique(place) or rng.random() < state.style.names_street:
         street = act_builders.named(place.street)
+    wording = pick_up_wording(state, view)
     if task.target in task.put_off:
         resumed = act_builders.errand(place.name, GoalStatus.ONGOING)
-        return intend(Function.REQUEST, resumed, wording=Wording(topic="resume"))
+        return intend(Function.REQUEST, resumed, wording=wording or Wording(topic="resume"))
     goal = act_builders.destination(place.name, street)
+    if wording is not None:
+        return intend(Function.REQUEST, goal, wording=wording)
     more = sum(subgoal.open for subgoal in view.subgoals) > 2
     if street is None and more and rng.random() < 0.5:
         return intend(Function.REQUEST, goal, wording=Wording(topic="first"))
     if street is None and rng.random() < state.config.leaves_route:
         return intend(Function.REQUEST, goal, act_builders.action(ActionValue.UNKNOWN))
     return intend(Function.REQUEST, goal)
+
+
+def pick_up_wording(state: ParticipantState, view: ParticipantView) -> Wording | None:
+    """Returns the wording of a destination as "pick up Lin"; None where nobody is picked up there."""
+    person = state.task.goal is not None and state.task.goal.name is LandmarkName.PERSON
+    return Wording(topic="pick_up") if person and picks_up(purpose_of_target(state, view)) else None
 
 
 def _say_announcement(
@@ -363,7 +381,7 @@ def _say_announcement(
         state.say(*recollection(state, view, rng))
     goal, target = state.task.goal, state.task.target
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
-    named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]
+    named = [mark for mark in later if mark is not None and goal is not None and mark.name not in (goal.name, *_COMMON)]
     if named and rng.random() < 0.25:
         state.say(intend(Function.INFORM, act_builders.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:
@@ -382,8 +400,7 @@ def announce_target(state: ParticipantState, view: ParticipantView, rng: np.rand
         return
     if not task.announced and view.time >= task.next_at:
         state.task = task.after_announcement(view.time)
-        if not state.guidance.guiding or rng.random() < state.style.names_goal:
-            _say_announcement(state, view, same_breath and not state.speech.idle, rng)
+        _say_announcement(state, view, same_breath and not state.speech.idle, rng)
         return
     if not task.announced:
         return

@@ -21,7 +21,12 @@ from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach, repeat_stop
-from dorothie_gym.policies.participant.given_orders import is_about_to_turn_round, turned_round_lately
+from dorothie_gym.policies.participant.given_orders import (
+    has_turned_since,
+    is_about_to_turn_round,
+    last_given,
+    turned_round_lately,
+)
 from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
@@ -58,6 +63,12 @@ ANNOUNCING_TIME = 1.5
 U_TURN_WAIT = 4.0
 """Standstill on the lane of a U-turn after which the U-turn is announced although it is not near [s]."""
 
+SENT_ON = 12.0
+"""Time for which "straight on" need not be said again [s]."""
+
+OBEYING = 3.0
+"""Time after an order before which its failure is none of the guidance [s]."""
+
 FAST = 50.0
 """Speed above which the car is asked to slow down long before the place [km/h]."""
 
@@ -90,7 +101,7 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         state.route = state.route.replanned(state.town, view.place)
         drove_past = before < config.missed_within and former.next_manoeuvre(view.station) is None
         missed = drove_past or state.route.has_missed(before, view.station)
-        if state.guidance.guiding and missed:
+        if state.guidance.guiding and missed and _was_told(state, view):
             state.feel(Happening.MISSED, view.time)
             state.guidance = state.guidance.after_miss()
             state.route = state.route.after_miss(state.town, view.place, former)
@@ -102,6 +113,13 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
             # the car does not know yet that it has arrived
             state.guidance = state.guidance.for_new_route(state.route.to_goal.left(view.station))
     state.guidance = state.guidance.with_distance(state.route.to_goal.left(view.station))
+
+
+def _was_told(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has been guided on this way for long enough to do as it was told."""
+    last, guidance = last_given(state), state.guidance
+    ordered = last is not None and view.time - last.time > OBEYING
+    return ordered or guidance.approach_announced or guidance.stopped_at > -math.inf
 
 
 def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> bool:
@@ -127,11 +145,11 @@ def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before
         state.say_only(_wrong_way(state, expires))
 
 
-def _wrong_way(state: ParticipantState, expires: float = math.inf) -> Remark:
-    """Returns the remark that the car has left the route to the place."""
+def _wrong_way(state: ParticipantState, expires: float = math.inf, topic: str = "wrong_way") -> Remark:
+    """Returns the remark that the car has left the route to the place, or is heading away from it."""
     place = None if state.task.goal is None else state.task.goal.name
     wrong = Proposition.of(Predicate.RIGHT_WAY, negated=True, place=place)
-    wording = Wording(topic="wrong_way")
+    wording = Wording(topic=topic)
     return intend(CommunicativeFunction.INFORM, wrong, elided=("place",), wording=wording, expires=expires)
 
 
@@ -148,7 +166,7 @@ def watch(state: ParticipantState, view: ParticipantView) -> None:
     if lost:
         state.guidance = replace(state.guidance, best=left)  # it is said once of one detour
         if not turned_round_lately(state, view):
-            state.say(_wrong_way(state))
+            state.say(_wrong_way(state, topic="heading_away"))
     stuck = state.motion.standstill(view.time) > config.lost_standstill and view.time > state.motion.excused_until
     if lost or stuck:
         state.set_guiding(True)
@@ -186,7 +204,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if not near and stuck:
         key, words = ("on", view.lane, 0), order(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
-    if stuck and state.guidance.step == key and state.guidance.repeats + 1 >= IN_VAIN:
+    if stuck and state.guidance.step == key and state.guidance.repeats + 1 >= IN_VAIN and not _told_to_stop(state):
         note_step(state, view, ("why", view.lane, 0))
         state.say(why_standing(state, view))
         return
@@ -198,6 +216,19 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     again = state.guidance.step == key
     if near and (not again or overdue):
         _announce(state, view, step=(key, distance, words), again=again, rng=rng)
+
+
+def _told_to_stop(state: ParticipantState) -> bool:
+    """Returns whether the car stands because that was the last order."""
+    last = last_given(state)
+    return last is not None and ActionValue.STOP in last.act.slots
+
+
+def _has_just_sent_on(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car was told a moment ago to go straight on, and has not turned since."""
+    last = last_given(state)
+    sent = last is not None and ActionValue.LANE_FOLLOW in last.act.slots and view.time - last.time < SENT_ON
+    return sent and last is not None and not has_turned_since(view, last)
 
 
 def _has_told_way(
@@ -287,6 +318,8 @@ def _is_left_to_ask(
     rng: np.random.Generator,
 ) -> bool:
     """Returns whether a turn is announced only if the car asks; driving straight on needs no announcement."""
+    if goes_straight and not view.standing and _has_just_sent_on(state, view):
+        return True
     if key[0] != "turn" or state.guidance.step == key:
         return False
     if key[1] in turn_lanes(state.town) and (goes_straight or view.lane == key[1]):
@@ -358,9 +391,10 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _turns_later(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether a U-turn is not ordered yet: in a junction, or while the car says what keeps it."""
+    """Returns whether a U-turn is not ordered yet: while the car drives over a junction, or says what keeps it."""
     kept = state.motion.moved_at <= state.guidance.step_at and view.time < state.motion.excused_until
-    return kept or state.town.lanes[view.lane].in_junction
+    crossing = state.town.lanes[view.lane].in_junction and state.motion.standstill(view.time) <= U_TURN_WAIT
+    return kept or crossing
 
 
 def _turns_better(state: ParticipantState, view: ParticipantView, farther: float) -> bool:

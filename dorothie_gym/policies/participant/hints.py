@@ -43,12 +43,6 @@ _SIGNS = {
 _CLOSE, _FAR = 120.0, 220.0
 """Largest route length to a target that is called close, and smallest to one that is called far [m]."""
 
-_MEASURED = 60.0, 350.0
-"""Range of route lengths that are stated [m]."""
-
-_PROGRESS = frozenset({Predicate.CLOSE, Predicate.DISTANCE, Predicate.RIGHT_WAY})
-"""Facts that are stated to a car that finds its own route."""
-
 _IN_MIND = 12.0
 """Time for which a place that was named is understood as "it" [s]."""
 
@@ -67,13 +61,10 @@ def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
     felt = _feeling(state, view)
     if felt is not None and rng.random() < _FEELINGS:
         return (_said(state, felt),)
+    if not state.guidance.guiding or not state.task.announced:
+        return ()  # a car that finds its own route need not be told where the place is, nor how far
     named = is_in_mind(state, view)
-    helps = state.guidance.guiding  # a car that knows the place needs no description of it
-    facts = [
-        fact
-        for fact in _facts(state, view)
-        if fact not in state.task.told and (named or _can_name(fact)) and (helps or fact.predicate in _PROGRESS)
-    ]
+    facts = [fact for fact in _facts(state, view) if fact not in state.task.told and (named or _can_name(fact))]
     if not facts:
         return ()
     return (_said(state, facts[int(rng.integers(len(facts)))], names_place=not named),)
@@ -137,7 +128,7 @@ def _said(state: ParticipantState, content: Proposition, *, names_place: bool = 
     topic = f"{'not_' * content.negated}{topic}"
     wording = Wording(topic=topic, direction=side if isinstance(side, Direction) else None)
     names_place = names_place or topic == "looks_like"
-    elided = ("cause",) if names_place and content.predicate is not Predicate.RIGHT_WAY else ("place", "cause")
+    elided = ("cause",) if names_place else ("place", "cause")
     return intend(CommunicativeFunction.INFORM, content, elided=elided, wording=wording, joined=True)
 
 
@@ -151,10 +142,6 @@ def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Propositi
         if left < _CLOSE or left > _FAR:
             yield Proposition.of(Predicate.CLOSE, place=goal.name, negated=left > _FAR)
         direct = not progress.turns_round_first(state.town, view.station)
-        if direct and _MEASURED[0] < left < _MEASURED[1]:
-            yield Proposition.of(Predicate.DISTANCE, place=goal.name, metres=_rounded(left))
-        if direct and not progress.astray and not view.standing and not state.guidance.guiding:
-            yield Proposition.of(Predicate.RIGHT_WAY, place=goal.name)
         if direct and progress.next_crossing(state.town, view.station) is None:
             yield Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
     if goal.street is not StreetName.UNKNOWN and street_of(view.raw, state.town, view.lane) is goal.street:
@@ -200,21 +187,22 @@ def _side(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) ->
     return Direction.RIGHT if is_on_right(state.town, goal.lane, goal.x, goal.y) else Direction.LEFT
 
 
-def _rounded(metres: float) -> int:
-    """Returns a length rounded for speech: to tens, from 200 m on to fifties [m]."""
-    step = 10.0 if metres < 195.0 else 50.0
-    return round(step * round(metres / step))
+def _is_nearly_there(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car comes close to the target for the first time."""
+    progress = state.route.progress
+    missed = state.route.misses or state.guidance.passes
+    return progress is not None and progress.left(view.station) < _CLOSE and not (progress.astray or missed)
 
 
 def _feeling(state: ParticipantState, view: ParticipantView) -> Proposition | None:
     """Returns the participant's current feeling, and its reason; None if there is none, or if it was stated before."""
-    goal, progress, motion = state.task.goal, state.route.progress, state.motion
+    goal, motion = state.task.goal, state.motion
     if motion.standstill(view.time) > state.style.patience and view.time >= motion.excused_until:
         felt = Proposition.of(Predicate.FEELS, feeling="impatient", cause=Proposition.of(Predicate.STANDS))
     elif sight(view.raw) < DENSE:
         poor = Proposition.of(Predicate.VISIBILITY, negated=True)
         felt = Proposition.of(Predicate.FEELS, feeling="nervous", cause=poor)
-    elif goal is not None and progress is not None and progress.left(view.station) < _CLOSE and not progress.astray:
+    elif goal is not None and _is_nearly_there(state, view):
         close = Proposition.of(Predicate.CLOSE, place=goal.name)
         felt = Proposition.of(Predicate.FEELS, feeling="pleased", cause=close)
     else:

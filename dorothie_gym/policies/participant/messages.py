@@ -29,6 +29,11 @@ LONGEST_REASON = 55
 _PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this|that|those|these)\b")
 
 
+_HERE = re.compile(r"\bhere\b")
+_POINTS = re.compile(r"\b(this|these|I|we|my|our|us|me)\b", re.IGNORECASE)
+"""Words of a sender that mean something else in another mouth."""
+
+
 def refers_back(text: str) -> bool:
     """Returns whether a text has a pronoun, whose antecedent must have been mentioned."""
     return _PRONOUN.search(text) is not None
@@ -52,7 +57,10 @@ def message_remark(
         return ()
     if rng.random() >= state.config.tells_message or (read.sender is None and refers_back(read.reason)):
         return ()
-    said = Proposition.of(Predicate.PURPOSE, place=landmark.name, person=read.sender, reason=read.reason)
+    if _POINTS.search(read.reason) is not None:
+        return ()
+    reason = _HERE.sub("there", read.reason)  # where the sender is
+    said = Proposition.of(Predicate.PURPOSE, place=landmark.name, person=read.sender, reason=reason)
     topic = "reason_after" if read.sender is None else "message"
     return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
 

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
-    from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
+    from dorothie_gym.ontology.slots import ActionValue, StreetName
 
 FUNCTIONS: Final = MappingProxyType(
     {
@@ -22,6 +23,11 @@ FUNCTIONS: Final = MappingProxyType(
     }
 )
 """Communicative function of an order, by move."""
+
+
+def of_place(topic: str, place: LandmarkName | None) -> str:
+    """Returns the topic of a remark that calls a place "it"; another one for people, who are no "it"."""
+    return f"{topic}_person" if place is LandmarkName.PERSON else topic
 
 
 def order(

@@ -25,7 +25,7 @@ from dorothie_gym.policies.observation_parser import (
     weather,
 )
 from dorothie_gym.policies.participant.given_orders import turned_round_lately
-from dorothie_gym.policies.participant.stories import purpose_of_target
+from dorothie_gym.policies.participant.stories import picks_up, purpose_of_target
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT, usual_cruise
@@ -55,6 +55,9 @@ LIGHTS_INTERVAL = 25.0
 WHY_INTERVAL = 40.0
 """Time between questions why the car stands [s]."""
 
+LONG_STANDSTILL = 25.0
+"""Standstill after which a guided car is asked why it stands [s]."""
+
 WHY_DISTANCE = 45.0
 """Distance to the place within which the participant does not ask about a standstill [m]."""
 
@@ -83,15 +86,24 @@ def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
 
 
 def _passenger(purpose: Purpose) -> str | None:
-    """Returns the person that is picked up on an errand, if its name can follow "our passenger"."""
-    picks_up = purpose.action is not None and purpose.action.lower().startswith("pick up")
-    named = purpose.person is not None and purpose.person[0].isupper() and "'" not in purpose.person
-    return purpose.person if picks_up and named else None
+    """Returns the person that is picked up on an errand, by a name that can follow "pick up"."""
+    if not picks_up(purpose) or purpose.person is None:
+        return None
+    return _last_name_of(purpose.person) if "'" in purpose.person else _with_capital(purpose.person)
 
 
 def _first_name(person: str | None) -> str | None:
     """Returns the name of a person that is called by one name: not "Aunt Mei" or "the children"."""
     return person if person is not None and person.isalpha() and person[0].isupper() else None
+
+
+def _last_name_of(person: str) -> str | None:
+    """Returns "Nilo" of "Rosa's brother Nilo", None of "Ayumi's mother"."""
+    return _first_name(person.rpartition(" ")[2])
+
+
+def _with_capital(person: str) -> str | None:
+    return person if person[0].isupper() else None
 
 
 def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -245,8 +257,10 @@ def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.rand
 
 def _ask_why_standing(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     since, progress = state.motion.standing_since, state.route.progress
-    if since is None or state.guidance.guiding or view.time < state.motion.excused_until:
+    if since is None or view.time < state.motion.excused_until:
         return
+    if state.guidance.guiding and state.motion.standstill(view.time) < LONG_STANDSTILL:
+        return  # its next instruction makes it go on
     near = progress is not None and progress.left(view.station) < WHY_DISTANCE
     waited = view.time - max(since, state.conversation.heard_at, state.speech.last_end)
     asked_lately = view.time - state.conversation.asked_at <= WHY_INTERVAL
@@ -317,7 +331,7 @@ def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Gen
 
 def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """Returns the remarks that are possible now; equal ones count several times."""
-    goal = state.task.destination
+    goal, street = state.task.destination, street_of(view.raw, state.town, view.lane)
     asks, asks_open = Function.PROPOSITIONAL_QUESTION, Function.SET_QUESTION
     found: list[tuple[Remark, ...]] = [
         *((intend(Function.OTHER),),) * 3,
@@ -332,7 +346,8 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found.append((intend(asks_open, Proposition.of(Predicate.DRIVES_AT, speed=ASKED)),))
         found.append((intend(asks, Proposition.of(Predicate.CROWDED, object=ObjectClass.VEHICLES)),))
         found += trip_questions(state)
-        found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
+        if street is not StreetName.UNKNOWN:
+            found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
             speed = _usual_speed(state, view) + 5 if rng.random() < 0.5 else None
@@ -346,7 +361,6 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found += [(intend(asks, Proposition.of(Predicate.SEES, object=thing)),)] * 2
         found.append((intend(asks_open, Proposition.of(Predicate.SEES, object=ObjectClass.QUERIED)),))
         found.append((intend(Function.INFORM, Proposition.of(Predicate.SEES, object=near)),))
-    street = street_of(view.raw, state.town, view.lane)
     if street is not StreetName.UNKNOWN:
         found.append((intend(Function.CHECK_QUESTION, Proposition.of(Predicate.ON_STREET, street=street)),))
     return found

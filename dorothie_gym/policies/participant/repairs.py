@@ -33,6 +33,13 @@ _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueM
 
 _SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
 
+_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+"""Moves that need not be understood word for word."""
+
+_ORDERING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
+
+_ABOUT_TALK = frozenset({DialogueMove.CONFUSE, DialogueMove.ALIGN})
+
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
 """Actions that are wanted immediately and are not steps of the route."""
 
@@ -48,11 +55,15 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
         heard: utterance of the car.
         rng: random generator of the decision.
     """
-    if is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
+    sign = heard.acts[0].move in _SIGNS
+    if not sign and is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
         return True
     if heard.acts[0].move is DialogueMove.CLARIFY or not state.speech.may_ask_back(view.time):
         return False
+    last, told = state.speech.last, heard.words.told
+    if told is not None and last is not None and any(said.contains(told) for said in last.meaning):
+        return False  # both say the same
     spoke_meanwhile = state.speech.last_end > view.time - speech_seconds(heard.words.text)
     matters = any(act.move in _WORTH_REPEATING and _has_named_slot(act) for act in heard.acts)
     if not (spoke_meanwhile and matters and state.speech.idle and rng.random() < state.style.puzzled):
@@ -114,7 +125,7 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         view: observation.
         rng: random generator of the decision.
     """
-    last, goal = state.speech.last_content, state.task.goal
+    last, goal = _last_worth_repeating(state), state.task.goal
     turns = state.speech.turns_of_repair(view.time)
     if turns > 1:
         return
@@ -123,12 +134,12 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         return
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
     ordered = last is not None and last.act.move is DialogueMove.INSTRUCT and bool(last.act.slots)
-    if last is not None and goal is not None and any(said.predicate is Predicate.PURPOSE for said in last.meaning):
+    if last is not None and goal is not None and _is_about_place(last):
         state.say_first(intend(CommunicativeFunction.REQUEST, act_builders.destination(goal.name, goal.street)))
-        return  # the purpose came with the destination, which has to be understood
+        return  # also a purpose came with the destination, which has to be understood
     if last is not None and lately and (not ordered or _is_of_the_moment(last)):
         again = ordered and max(times_told(state, action) for action in _actions(last)) >= IN_VAIN
-        said = repeated(last, CommunicativeFunction.CORRECTION) if again else replace(last, text="", joined=False)
+        said = repeated(last, CommunicativeFunction.CORRECTION) if again else _again(last)
         state.say_first(said)
         return
     step = next_step(state, view, DialogueMove.CLARIFY, rng) if state.guidance.step is not None else None
@@ -140,6 +151,35 @@ def explain_again(state: ParticipantState, view: ParticipantView, rng: np.random
         state.say_first(intend(CommunicativeFunction.CORRECTION, act_builders.destination(goal.name)))
     elif last is not None:
         state.say_first(repeated(last, CommunicativeFunction.CORRECTION))
+
+
+def _is_about_place(last: Remark) -> bool:
+    """Returns whether a remark names a destination or its purpose, rather than a step."""
+    purpose = any(said.predicate is Predicate.PURPOSE for said in last.meaning)
+    orders = last.act.move in _ORDERING and GoalStatus.ABANDONED not in last.act.slots
+    return purpose or (orders and bool(last.act.values(Slot.LANDMARK)) and not last.act.values(Slot.ACTION))
+
+
+def _again(last: Remark) -> Remark:
+    """Returns a remark to be said again: in the same words if it is small talk, or about an object."""
+    asks = last.act.move in act_builders.QUESTIONS and bool(last.act.values(Slot.OBJECT))
+    keeps = asks or last.act.move is DialogueMove.IRRELEVANT
+    return last if keeps and not last.joined else replace(last, text="", joined=False)
+
+
+def _last_worth_repeating(state: ParticipantState) -> Remark | None:
+    """Returns what matters most in the last utterance: the destination or the order; otherwise its last remark.
+
+    A request to repeat, and the question whether one was understood, are not repeated.
+    """
+    breath: list[Remark] = []
+    for item in reversed(state.speech.said):
+        if item.act.move not in _ABOUT_TALK:
+            breath.append(item)
+        if breath and not item.joined:
+            break
+    orders = (item for item in reversed(breath) if item.act.move in _ORDERING and item.act.slots)
+    return next(orders, breath[0] if breath else None)
 
 
 def _explain_differently(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:

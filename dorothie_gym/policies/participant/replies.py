@@ -27,11 +27,12 @@ from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utteranc
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn
-from dorothie_gym.policies.participant.goals import announcement, describe
+from dorothie_gym.policies.participant.goals import announcement, describe, pick_up_wording
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere, is_near_by
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
+from dorothie_gym.policies.participant.route_steps import route_step
 from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
 from dorothie_gym.policies.participant.yes_no_answers import (
     addition,
@@ -54,6 +55,13 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.view import ParticipantView
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+
+_YES_NO = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
+
+_ORDERS = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+
+_TAKEN_UP = 8.0
+"""Time within which the car takes up an order [s]."""
 
 _REPLIES = frozenset(
     {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
@@ -97,7 +105,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         return
     state.conversation = state.conversation.after_hearing(view.time)
     state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
-    if heard.acts and has_missed(state, view, heard, rng):
+    if _asks_what_is_being_said(state, view, heard) or (heard.acts and has_missed(state, view, heard, rng)):
         return
     puzzled_by = state.conversation.puzzled_by
     if puzzled_by is not None:
@@ -120,9 +128,12 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
             continue  # the question that follows is answered instead
         if answer is not None:
             answer(state, view, act, heard.words, rng)
-    if state.speech is before and _answers_question(state, heard):
+    again = _misheard_question(state, heard) if state.speech is before else None
+    if again is not None:
+        state.say_first(again)
+    elif state.speech is before and _answers_question(state, heard):
         _thank(state, view, rng)
-    elif state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
+    elif state.speech is before and _needs_nod(state, view, heard):
         # an utterance that takes up an instruction needs no acknowledgement of its own
         alone = heard.acts[0].move not in _ACKNOWLEDGEMENTS
         _nod(state, view, rng, _nod_to(view, heard), heard.words.told, alone=alone)
@@ -141,12 +152,10 @@ def _open_question(
         _name_order(state, landmarks, rng)
     elif _correct(state, view, act, words):
         return
-    elif GoalStatus.QUERIED in act.values(Slot.STATUS):
+    elif GoalStatus.QUERIED in act.values(Slot.STATUS) or not state.task.announced:
         _name_target(state, view, rng)
     elif landmarks == (LandmarkName.QUERIED,):
-        named_lately = view.time - state.task.announced_at < state.config.just_said
-        if not named_lately and not _was_just_named(state, view):
-            _name_target(state, view, rng, *addition(state, view, rng))
+        _name_target(state, view, rng, *addition(state, view, rng))
     elif actions:
         if not _was_just_named(state, view):
             state.set_guiding(True)
@@ -159,6 +168,19 @@ def _open_question(
         ask_back(state, view, words, rng)
 
 
+def _asks_what_is_being_said(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
+    """Returns whether the car has asked where to go, or something inaudible, while it was being told."""
+    asks = bool(heard.acts) and all(
+        act.move is DialogueMove.QUERY_W and not act.values(Slot.ACTION) for act in heard.acts
+    )
+    return asks and (_is_just_announced(state, view) or _was_just_named(state, view))
+
+
+def _is_just_announced(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the destination is being named, or was a moment ago, so that a question for it is settled."""
+    return view.time - state.task.announced_at < state.config.just_said
+
+
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
     """Answers the question where to go."""
     state.task = state.task.after_announcement(view.time)
@@ -166,7 +188,7 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
     street = announced.get("street")
     place = act_builders.first_name([announced.get("place")])
     wanted = act_builders.destination(place, street if isinstance(street, StreetName) else None)
-    answer = intend(Function.ANSWER, wanted)
+    answer = intend(Function.ANSWER, wanted, wording=pick_up_wording(state, view))
     state.say_only(answer, *more)
 
 
@@ -246,10 +268,22 @@ def _explanation(
         else:
             deny_arrival(state)
         return
+    if ActionValue.U_TURN in act.values(Slot.ACTION):
+        _let_turn_round(state, view)
     if act.values(Slot.OBJECT):
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
         if ObjectClass.STATIC in act.values(Slot.OBJECT):
             note_blocked(state, view, near=True)
+
+
+def _let_turn_round(state: ParticipantState, view: ParticipantView) -> None:
+    """Does not order a U-turn that the car has just announced by itself."""
+    step = route_step(state, view)
+    if step is not None and step.key[0] == "round" and state.guidance.guiding:
+        note_step(state, view, step.key)
+        first = state.speech.first
+        if first is not None and ActionValue.U_TURN in first.act.values(Slot.ACTION):
+            state.speech = state.speech.cleared()
 
 
 def _has_another_goal(state: ParticipantState, act: DialogueAct, words: ParsedText) -> bool:
@@ -298,10 +332,35 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 
+def _needs_nod(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
+    """Returns whether an utterance states something, asks for nothing, and does not only take up an order."""
+    moves = {act.move for act in heard.acts}
+    unasked = not state.speech.has_just_spoken(view.time, _TAKEN_UP)
+    told = unasked or heard.words.told is not None or any(act.slots for act in heard.acts)
+    explains = told and DialogueMove.EXPLAIN in moves and moves.isdisjoint(act_builders.QUESTIONS)
+    return explains and not _takes_up_order(state, view, heard)
+
+
+def _takes_up_order(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
+    """Returns whether the car only says that it does what it was just told to do."""
+    last = state.speech.last
+    if last is None or last.act.move not in _ORDERS or not state.speech.has_just_spoken(view.time, _TAKEN_UP):
+        return False
+    return any(set(act.values(Slot.ACTION)) & set(last.act.values(Slot.ACTION)) for act in heard.acts)
+
+
 def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
     """Returns whether the car has answered the last question."""
     last = state.speech.last
     return last is not None and last.act.move in act_builders.QUESTIONS and heard.acts[0].move in _REPLIES
+
+
+def _misheard_question(state: ParticipantState, heard: HeardUtterance) -> Remark | None:
+    """Returns the open question to be asked once more, because the car has answered it with a yes or a no."""
+    last, before = state.speech.last, state.speech.said[-2:-1]
+    if last is None or last.act.move is not DialogueMove.QUERY_W or heard.acts[0].move not in _YES_NO:
+        return None
+    return None if before and before[0].act == last.act else replace(last, text="", joined=False)
 
 
 def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -402,6 +461,7 @@ _ANSWERS: dict[
     DialogueMove.QUERY_YN: answer_yes_no,
     DialogueMove.QUERY_W: _open_question,
     DialogueMove.EXPLAIN: _explanation,
+    DialogueMove.CLARIFY: _explanation,
     DialogueMove.CONFUSE: _confusion,
     DialogueMove.ALIGN: _alignment,
     DialogueMove.INSTRUCT: _request,

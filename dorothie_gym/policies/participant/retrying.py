@@ -11,7 +11,7 @@ from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.given_orders import is_about_to_turn_round, rounds_told, times_told
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.orders import of_place, order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.route_state import section
@@ -29,6 +29,9 @@ SOON_AGAIN = 250.0
 
 LARGER = 0.25
 """Growth of the detour that is accepted to avoid a manoeuvre, with each attempt."""
+
+MOST_RETRIES = 12
+"""Number of attempts up to which it grows."""
 
 _ANSWERS = MoveGroup.REPLY.moves
 
@@ -54,9 +57,10 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
             if just or slower:
                 state.say_only(*just, *slower)
         return
-    if passed and passes >= IN_VAIN:
+    if passed and passes:
         missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
-        elided, wording = ("place", "times"), Wording(topic="passed_again")
+        topic = "passed_again" if passes >= IN_VAIN else "passed_just"
+        elided, wording = ("place", "times"), Wording(topic=of_place(topic, goal.name))
         reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
     else:
         here = section(state.town, view.lane)
@@ -71,7 +75,7 @@ def _just_passed(state: ParticipantState, view: ParticipantView) -> tuple[Remark
     if state.task.goal is None or not state.guidance.passes:
         return ()
     passed = Proposition.of(Predicate.PASSED, place=state.task.goal.name)
-    wording = Wording(topic="passed_just")
+    wording = Wording(topic=of_place("passed_just", state.task.goal.name))
     return (intend(CommunicativeFunction.INFORM, passed, elided=("place",), wording=wording, expires=_soon(view)),)
 
 
@@ -136,7 +140,7 @@ def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> R
 def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
     """Plans a route that avoids manoeuvres, each time at a larger detour, and says why."""
     progress = state.route.to_goal
-    cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, IN_VAIN))
+    cost = state.config.way_round_cost * (1.0 + LARGER * min(state.guidance.retries, MOST_RETRIES))
     state.guidance = replace(state.guidance, retries=state.guidance.retries + 1)
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
     state.route = state.route.with_progress(progress).sparing_worn(state.town, view.place)

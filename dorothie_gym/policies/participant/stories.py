@@ -10,6 +10,7 @@ import numpy as np
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.participant.messages import LONGEST_REASON, refers_back
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
@@ -40,6 +41,8 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
     }
     if told.reason is not None and refers_back(told.reason) and not _has_told_purpose(state, view, goal):
         options.pop("reason", None)  # the antecedent of "she" must be mentioned first
+    if goal.name is LandmarkName.PERSON and picks_up(told):
+        options.pop("purpose", None)  # it is the order itself: "let's pick up Lin"
     if not options:
         return ()
     prefers = "purpose" if rng.random() < PURPOSES else "reason"
@@ -71,6 +74,11 @@ def as_afterthought(item: Remark) -> Remark:
     if item.wording.topic != "reason":
         return item
     return replace(item, wording=dataclasses.replace(item.wording, topic="reason_after"))
+
+
+def picks_up(purpose: Purpose | None) -> bool:
+    """Returns whether the purpose of an errand is to pick somebody up."""
+    return purpose is not None and purpose.action is not None and purpose.action.lower().startswith("pick up")
 
 
 def purpose_of_target(state: ParticipantState, view: ParticipantView) -> Purpose | None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _LONG_WAIT: Final = 20.0  # standstill that is worth a remark when it ends [s]
 _LATELY: Final = 15.0  # time after its end within which it is remarked on [s]
+_STILL_THERE: Final = 60.0  # distance to the last stop up to which it is "here" [m]
 _IN_SIGHT: Final = 40.0  # distance of a former stop that the car passes again [m]
 _CALM: Final = 0.25  # stress up to which the trip goes well
 
@@ -38,6 +39,9 @@ def recollection(state: ParticipantState, view: ParticipantView, rng: np.random.
     if stop is None or stop.name is goal.name:
         return ()
     near = Proposition.of(Predicate.NEAR, place=goal.name, landmark=stop.name)
+    x, y = view.position
+    if pm.hypot(stop.x - x, stop.y - y) < _STILL_THERE:
+        return _stated(state, near, "near_here", elided=(*elided, "landmark"))
     if stop.name in FAMOUS and not person:
         return _stated(state, near, "near_stop", elided=elided)
     return _stated(state, near, "near_last", elided=(*elided, "landmark"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from dorothie_gym.policies.participant.goals import announcement, route_length, 
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
-from dorothie_gym.policies.participant.repairs import ask_back
+from dorothie_gym.policies.participant.repairs import ask_back, name_step_or_place
 from dorothie_gym.policies.participant.stories import story_remark
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
 """Actions that determine the route."""
+
+_ASKS_WHERE = re.compile(r"\b(where|which|tell me|what)\b")
+"""Words of an open question for the way, of which a part was misheard."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
@@ -57,6 +61,7 @@ def check(
         return
     if landmarks:
         state.set_guiding(False)  # the car knows the place
+        state.task = state.task.after_announcement(view.time)
     wanted = checked(state, act, words)
     state.say_first(_short(Function.CONFIRM, wanted), *addition(state, view, rng))
 
@@ -97,6 +102,8 @@ def _fits(
     if instructed is not None and lately and actions & set(instructed.act.slots):
         return words.direction is None or instructed.wording.direction in (None, words.direction)
     meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
+    if ActionValue.U_TURN in meant and actions == {ActionValue.J_TURN} and words.direction is None:
+        return True  # "shall I turn?"
     if wanted is Direction.STRAIGHT:
         return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
     return bool(actions & meant) and (wanted is None or words.direction is wanted)
@@ -108,7 +115,7 @@ def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         return ()
     if state.guidance.guiding or not is_in_mind(state, view) or rng.random() < 0.5:
         return hint(state, view, rng)
-    return story_remark(state, view, rng)
+    return tuple(item for item in story_remark(state, view, rng) if item.wording.topic != "reason")
 
 
 def _refuse_with_step(
@@ -138,7 +145,7 @@ def answer_yes_no(
     elif offered is not None:
         _answer_offer(state, view, offered)
     elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
-        _answer_street(state, view, act)
+        _answer_street(state, view, act, rng)
     elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
         sight = Proposition.of(Predicate.SEES, object=objects[0])
@@ -211,8 +218,12 @@ def go_first(name: LandmarkName) -> Remark:
     return intend(Function.REQUEST, act_builders.destination(name), wording=Wording(topic="first"), joined=True)
 
 
-def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
+def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct, rng: np.random.Generator) -> None:
     """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
+    if not state.task.announced and state.task.goal is not None:
+        state.task = state.task.after_announcement(view.time)
+        state.say_only(announcement(state, view, rng))  # it cannot be about the way to a place that it does not know
+        return
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     named = {street for item in state.speech.said for street in item.act.values(Slot.STREET)}
@@ -227,6 +238,9 @@ def _answer_proposal(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Confirms the right way, or else names it."""
+    if words.direction is None and _ASKS_WHERE.search(words.text.lower()):
+        name_step_or_place(state, view, rng)  # "please tell me where turn"
+        return
     if not _fits(state, view, act, words, rng):
         _refuse_with_step(state, view, act, words, rng)
         return

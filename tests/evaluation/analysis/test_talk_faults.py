@@ -12,6 +12,7 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     laps,
     mention_checks,
     order_checks,
+    passenger_checks,
     repair_runs,
     reply_checks,
 )
@@ -219,6 +220,37 @@ def test_person_is_no_it():
     she = human(5.0, "look for a yellow coat", M.EXPLAIN, meaning=coat)
     assert wrong(mention_checks.pronouns(drive(it)))
     assert not wrong(mention_checks.pronouns(drive(she)))
+
+
+def test_metres_of_a_passenger_are_found():
+    close = [Proposition.of(P.CLOSE, place=HOUSE).to_json()]
+    counted = human(5.0, "the house is forty meters ahead", M.EXPLAIN, HOUSE, meaning=close)
+    told = human(5.0, "the house is just ahead", M.EXPLAIN, HOUSE, meaning=close)
+    order = human(9.0, "go straight for four meters", M.INSTRUCT, A.LANE_FOLLOW)
+    assert wrong(passenger_checks.ways_without_metres(drive(counted, order))) == [
+        "the house is forty meters ahead",
+        "go straight for four meters",
+    ]
+    assert not wrong(passenger_checks.ways_without_metres(drive(told)))
+
+
+def test_question_why_the_car_stands_after_an_order_to_stop_is_found():
+    stands = [Proposition.of(P.STANDS, action=A.STOP).to_json()]
+    stop = human(5.0, "stop", M.INSTRUCT, A.STOP)
+    why = human(15.0, "why are we standing?", M.QUERY_W, A.STOP, meaning=stands)
+    drive_on = human(10.0, "drive on", M.INSTRUCT, A.START)
+    assert wrong(passenger_checks.own_stops(drive(stop, why)))
+    assert not wrong(passenger_checks.own_stops(drive(stop, drive_on, why)))
+    assert not wrong(passenger_checks.own_stops(drive(why)))
+
+
+def test_destination_that_was_told_is_not_asked_for():
+    where = car(12.0, "where to next?", M.QUERY_W, type(KFC).QUERIED)
+    told = human(8.0, "to the KFC", M.INSTRUCT, KFC)
+    later = human(8.0, "the KFC comes later", M.INSTRUCT, KFC, S.PENDING)
+    assert wrong(passenger_checks.destinations_asked_for(drive(told, where)))
+    assert not wrong(passenger_checks.destinations_asked_for(drive(later, where)))
+    assert not wrong(passenger_checks.destinations_asked_for(drive(where)))
 
 
 # --- figures ----------------------------------------------------------------------------------------------------------

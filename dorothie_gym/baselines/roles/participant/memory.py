@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.view import ParticipantView
 
 AVERAGE: Final = ParticipantStyle(
-    guides=0.0, names_goal=1.0, names_street=0.2, hurries=0.3, patience=10.0, chat=250.0, waits=0.4, hints=0.2,
+    guides=0.0, names_street=0.2, hurries=0.3, patience=10.0, chat=250.0, waits=0.4, hints=0.2,
     reasons=0.12, aligns=0.02, nods=0.5, curious=0.05, notices=0.9, puzzled=0.0, points_out=0.5, thanks=0.5,
     verifies=0.05,
 )  # fmt: skip

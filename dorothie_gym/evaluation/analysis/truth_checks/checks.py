@@ -15,6 +15,7 @@ from dorothie_gym.evaluation.analysis.truth_checks import (
     laps,
     mention_checks,
     order_checks,
+    passenger_checks,
     repair_runs,
     reply_checks,
     sense_checks,
@@ -84,6 +85,9 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "own_doing": "questions why the car turns round that follow no order to do so",
         "arrivals_without_creeping": "guided arrivals with at most one order to drive on a little",
         "crowds": "remarks on traffic and crowds that are news",
+        "ways_without_metres": "ways that the participant tells without metres",
+        "own_stops": "questions why the car stands that follow no order to stop",
+        "destinations_asked_for": "questions where to go that were not answered just before",
         "directions_ahead": "directions with two or more steps",
         "directions_by_places": "directions that name a landmark or an object",
     }
@@ -192,6 +196,9 @@ _PASSAGES: Final[Mapping[str, Callable[[Session], Iterator[Case]]]] = MappingPro
         "own_doing": sense_checks.own_doing,
         "arrivals_without_creeping": sense_checks.arrivals_without_creeping,
         "crowds": sense_checks.crowds,
+        "ways_without_metres": passenger_checks.ways_without_metres,
+        "own_stops": passenger_checks.own_stops,
+        "destinations_asked_for": passenger_checks.destinations_asked_for,
     }
 )
 """Checks of passages that need no map, by figure."""
