@@ -34,7 +34,7 @@ BLENDED = 0.3
 SHARP = 0.03
 """Width of a footprint up to which one sample is sufficient [m]."""
 
-LONG = 0.4
+LONG = 0.7
 """Length of a footprint from which points along the ray are sampled [m]; shorter ones are sampled as squares."""
 
 WIDE = 0.4

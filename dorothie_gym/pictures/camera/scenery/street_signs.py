@@ -264,7 +264,7 @@ def _is_free(
         return False
     if post is not None:
         spot = np.array([shapely.Point(*post.tolist()).buffer(0.3)], dtype=np.object_)
-        return clearance.has_room(*post.tolist(), 0.2) and bool(free_of(spot, clearance.reserved)[0])
+        return clearance.has_room(float(post[0]), float(post[1]), 0.2) and bool(free_of(spot, clearance.reserved)[0])
     ground = np.array([shapely.LineString(ends).buffer(0.15)], dtype=np.object_)
     if not all(free_of(ground, tree)[0] for tree in (clearance.lanes, clearance.trees, clearance.reserved)):
         return False
