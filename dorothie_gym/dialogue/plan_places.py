@@ -88,6 +88,9 @@ class PlaceReader(PlanState):
         frame = self.frame
         vague = frame is not None and frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
         direct = frame is not None and (frame.at is None or frame.borrowed or (vague and place.reference is None))
+        if frame is not None and frame.borrowed and frame.action is StepAction.STRAIGHT and not self.fresh:
+            if frame.relation in _PASSED and item.relation in _PASSED:
+                frame = self.open_step(StepAction.STRAIGHT)  # "past the KFC, over the bridge"
         if frame is not None and not self.fresh and direct and (frame.action is not None or frame.verb):
             self.attach(frame, item.relation, place)
         elif self.mood is not ClauseMood.STATEMENT:
