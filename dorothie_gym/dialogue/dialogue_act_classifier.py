@@ -53,6 +53,9 @@ _ANSWERING = frozenset(
 _OTHER_SIDE = re.compile(r"\b(other|opposite|wrong) (side|kerb|curb)\b")
 """Sides by which a place to stop is corrected."""
 
+_NO_ORDERS = frozenset({DialogueMove.REPLY_N, DialogueMove.ACKNOWLEDGE, DialogueMove.IRRELEVANT})
+"""Moves that the words of an order do not have."""
+
 _QUESTIONS = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
 _BEFORE_QUESTIONS = frozenset(
     {DialogueMove.EXPLAIN, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.REPLY_N}
@@ -330,8 +333,8 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     if not spans or all(formula_move(_plain_words(span.text)) is not None for span in spans):
         return spans  # formulas have no other move
     found = retagged(spans, span_features(spans))
-    if found is None or (all(move is DialogueMove.REPLY_N for _, move in found) and understand(text).plan):
-        return spans  # "no, not right, left!" orders something
+    if found is None or (all(move in _NO_ORDERS for _, move in found) and understand(text).plan):
+        return spans  # "no, not right, left!" orders something, and "okay, drive on" as well
     if after is None and {move for _, move in found} & _ANSWERING - {span.act.move for span in spans}:
         return spans  # nothing was said that could be answered or corrected
     if any(_joins_sentences(part, spans) for part, _ in found):

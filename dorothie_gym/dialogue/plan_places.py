@@ -67,9 +67,8 @@ class PlaceReader(PlanState):
         place = item.place.reference if item.place is not None else self.last_place
         if place is not None and place.reference is Anaphor.THERE and self.last_place is not None:
             place = self.last_place
-        if item.place is None and self._is_about(place):
-            return
-        if item.place is None and self.pending.at is not None and item.relation is ConditionRelation.AT:
+        known = self.pending.at is not None and item.relation is ConditionRelation.AT
+        if item.place is None and (self._is_about(place) or known):
             return  # "just past the KFC, that's where you stop"
         if place is None:
             if item.place is not None and item.place.ordinal is not None:
@@ -86,8 +85,9 @@ class PlaceReader(PlanState):
             self.negation = None
             return
         frame = self.frame
-        vague = frame is not None and frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
-        direct = frame is not None and (frame.at is None or frame.borrowed or (vague and place.reference is None))
+        direct = frame is not None and self._takes(frame, place)
+        if frame is not None and self._passes_next(frame, item.relation):
+            frame = self.open_step(StepAction.STRAIGHT)  # "past the KFC, over the bridge"
         if frame is not None and not self.fresh and direct and (frame.action is not None or frame.verb):
             self.attach(frame, item.relation, place)
         elif self.mood is not ClauseMood.STATEMENT:
@@ -104,6 +104,16 @@ class PlaceReader(PlanState):
         self.frame, self.fresh = None, True
         self.pending.relation, self.pending.at = ConditionRelation.AT, place
         return True
+
+    def _takes(self, frame: Frame, place: PlaceReference) -> bool:
+        """Returns whether a step has no place yet, or one that says less: "stop over there, where the people are"."""
+        vague = frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
+        return frame.at is None or frame.borrowed or (vague and place.reference is None)
+
+    def _passes_next(self, frame: Frame, relation: ConditionRelation) -> bool:
+        """Returns whether another place is passed behind the one of a step."""
+        goes_on = frame.borrowed and frame.action is StepAction.STRAIGHT and not self.fresh
+        return goes_on and frame.relation in _PASSED and relation in _PASSED
 
     def _pass_between(self, relation: ConditionRelation) -> None:
         """Makes a step of a place that is passed before another one: "past the KFC, over the bridge, then left"."""

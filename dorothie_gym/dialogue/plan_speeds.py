@@ -77,7 +77,8 @@ class SpeedReader(PlanState):
             frame = self.frame if self.frame is not None and not self.fresh else None
         if frame is not None and frame.action is not None and frame.action not in NEEDING_PLACE:
             if item.unit or frame.action is StepAction.SPEED:
-                changed = frame.word in _BY and frame.change is not None and "off" in self.clauses.words
+                said = self.clauses.words
+                changed = frame.change is not None and "off" in said and not _BY.isdisjoint(said)
                 frame.speed = None if changed else item.speed
                 frame.bare_number = None if item.unit or changed else item.speed
         elif item.unit or (frame is not None and frame.verb in ("do", "go", "drive", "make", "keep", "take")):
