@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.dialogue.conversation import speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
@@ -173,7 +174,10 @@ def _asks_what_is_being_said(state: ParticipantState, view: ParticipantView, hea
     asks = bool(heard.acts) and all(
         act.move is DialogueMove.QUERY_W and not act.values(Slot.ACTION) for act in heard.acts
     )
-    return asks and (_is_just_announced(state, view) or _was_just_named(state, view))
+    explicit = any(LandmarkName.QUERIED in act.slots for act in heard.acts)
+    meanwhile = state.speech.last_end > view.time - speech_seconds(heard.words.text)
+    told = _is_just_announced(state, view) or _was_just_named(state, view)
+    return asks and told and not state.speech.has_just_asked_back and (explicit or meanwhile)
 
 
 def _is_just_announced(state: ParticipantState, view: ParticipantView) -> bool:
