@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Direction, Wording, WordingContext, guess_spans, word_acts
+from dorothie_gym.dialogue import Direction, Wording, WordingContext, guess_spans, word_act, word_acts
 from dorothie_gym.dialogue.conversation import resembles_request_to_repeat
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
@@ -189,12 +189,13 @@ def test_destination_is_always_named_by_its_owner():
     assert all("Mateo" in text for text in texts)
 
 
-def test_person_to_be_picked_up_is_a_passenger_not_always_a_friend():
+def test_person_is_a_friend_or_a_passenger_in_orders_and_a_name_otherwise():
     rng, act = np.random.default_rng(1), DialogueAct.of(M.INSTRUCT, LandmarkName.PERSON)
     aunt = WordingContext(passenger="Aunt Mei")
     texts = [word_acts([act], Role.PARTICIPANT, rng, scene=aunt)[0].text for _ in range(20)]
     assert all("our passenger Aunt Mei" in text for text in texts)
     assert all(LandmarkName.PERSON in guess_spans(text)[0].act.slots for text in texts)
     both = WordingContext(passenger="Priya", friend="Priya")
-    named = " ".join(word_acts([act], Role.PARTICIPANT, rng, scene=both)[0].text for _ in range(40))
-    assert "my friend Priya" in named and "our passenger Priya" in named
+    assert all("my friend Priya" in word_acts([act], Role.PARTICIPANT, rng, scene=both)[0].text for _ in range(20))
+    picked = Wording(topic="pick_up")
+    assert all("pick up Priya" in word_act(act, Role.PARTICIPANT, rng, picked, scene=both) for _ in range(20))

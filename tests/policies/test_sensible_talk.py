@@ -1,166 +1,198 @@
-"""Talk that a stranger finds sensible: signs, names, distances, and what is repeated."""
+"""What is said makes sense: one sign of hearing, no stale remarks, names kept, reasons for a change of the way."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand, word_act, word_acts
-from dorothie_gym.dialogue.looks import read_look
-from dorothie_gym.dialogue.realization_context import WordingContext
-from dorothie_gym.dialogue.speaker_style import SpeakerStyle
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, ObjectClass, Role
-from dorothie_gym.policies.co_wizard.beliefs import BeliefState
+from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording, understand
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Role, StreetName
+from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, sign_of_hearing
+from dorothie_gym.policies.co_wizard.errand_memory import note_friend, without_purposes
+from dorothie_gym.policies.co_wizard.goals import set_goal
 from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, still_due
-from dorothie_gym.policies.co_wizard.places_ahead import JUST_AHEAD, distance_ahead
-from dorothie_gym.policies.co_wizard.small_remarks import passes_over
-from dorothie_gym.policies.participant.messages import _HERE, _POINTS
-from dorothie_gym.policies.participant.reactions import _passenger
-from dorothie_gym.policies.speech import remark
-from dorothie_gym.tasks.purposes import Purpose
+from dorothie_gym.policies.heard_utterance import heard_utterance
+from dorothie_gym.policies.notable_conditions import Noticed
+from dorothie_gym.policies.participant.given_orders import note_said, rounds_told, turned_round_lately
+from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.reconsidering import own_up
+from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.retrying import remark_on_miss, stop_circling
+from dorothie_gym.policies.participant.telling_way import take_up_confirmation
+from dorothie_gym.policies.speech import Remark, intend
+from tests.policies.said import with_words
+from tests.policies.test_acknowledgement import start
+from tests.policies.test_arriving import Guide
 
-M = DialogueMove
-A = ActionValue
-PERSON, HOUSE, KFC = LandmarkName.PERSON, LandmarkName.HOUSE, LandmarkName.KFC
-
-
-def worded(move: DialogueMove, *values, topic: str | None = None, count: int = 40, role=Role.PARTICIPANT, **scene):
-    rng, act = np.random.default_rng(5), DialogueAct.of(move, *values)
-    context = WordingContext(**scene)
-    return {word_act(act, role, rng, Wording(topic=topic), scene=context).lower() for _ in range(count)}
-
-
-# --- distances --------------------------------------------------------------------------------------------------------
+M, A, F = DialogueMove, ActionValue, CommunicativeFunction
+LEFT, RIGHT = Direction.LEFT, Direction.RIGHT
 
 
-@pytest.mark.parametrize(
-    ("metres", "heard"), [(5.0, range(4, 6)), (9.0, range(8, 11)), (14.0, range(13, 15)), (4.0, range(4, 5))]
-)
-def test_short_ways_are_said_in_car_lengths_that_the_car_understands(metres, heard):
-    rng, act = np.random.default_rng(2), DialogueAct.of(M.INSTRUCT, A.LANE_FOLLOW)
-    for _ in range(20):
-        text = word_act(act, Role.PARTICIPANT, rng, Wording(distance=metres))
-        assert "meter" not in text and "car length" in text
-        assert understand(text).distance in heard, text
+def heard_by_car(text: str, *acts: DialogueAct):
+    state, view = start()
+    heard = heard_utterance(with_words(dict(view.raw), Role.PARTICIPANT, text, *acts), Role.PARTICIPANT)
+    assert heard is not None
+    return state, heard
 
 
-def test_place_just_ahead_has_a_distance_for_a_guided_car():
-    guided = SimpleNamespace(beliefs=BeliefState(goal=HOUSE))
-    assert distance_ahead(guided, understand("Mateo's house is just up ahead")) == JUST_AHEAD
-    assert distance_ahead(guided, understand("Mateo's house is forty meters ahead")) == 40.0
-    assert distance_ahead(guided, understand("Mateo's house has a red roof")) is None
-    knows = SimpleNamespace(beliefs=BeliefState(goal=HOUSE, exact=True))
-    assert distance_ahead(knows, understand("Mateo's house is just up ahead")) is None
-
-
-def test_place_ahead_is_announced_without_metres():
-    close = worded(M.EXPLAIN, HOUSE, topic="ahead", owner="Mateo")
-    assert close and not any("meter" in text for text in close)
-
-
-# --- people -----------------------------------------------------------------------------------------------------------
-
-
-def test_person_that_is_picked_up_is_named():
-    for text in worded(M.INSTRUCT, PERSON, topic="pick_up", passenger="Lin", friend="Lin"):
-        assert "pick up lin" in text
-        assert PERSON in understand(text.replace("lin", "Lin")).landmarks, text
-
-
-@pytest.mark.parametrize("topic", ["here_person", "passed_just_person", "passed_again_person"])
-def test_person_is_no_it(topic):
-    for text in worded(M.EXPLAIN, topic=topic):
-        assert not {"it", "it's"} & set(text.replace(",", "").split()), text
-
-
-@pytest.mark.parametrize(
-    ("person", "named"),
-    [("Lin", "Lin"), ("Uncle Sandro", "Uncle Sandro"), ("Rosa's brother Nilo", "Nilo"), ("Ayumi's mother", None)],
-)
-def test_name_that_follows_pick_up(person, named):
-    assert _passenger(Purpose(text="Pick up somebody", action="pick up somebody", person=person)) == named
-
-
-# --- messages ---------------------------------------------------------------------------------------------------------
-
-
-def test_reason_of_a_message_is_told_from_the_place_of_the_listener():
-    assert _HERE.sub("there", "nobody here can leave the desk") == "nobody there can leave the desk"
-    assert _POINTS.search("this wall is no place to sit") is not None
+def turn(side: Direction, topic: str | None = None, *, joined: bool = False) -> Remark:
+    return replace(order(M.INSTRUCT, A.J_TURN, Wording(direction=side, topic=topic)), joined=joined)
 
 
 # --- the car ----------------------------------------------------------------------------------------------------------
 
 
-def talking(*queue):
-    state = SimpleNamespace(said=[])
-    state.speech = SimpleNamespace(queue=queue)
-    state.dialogue = SimpleNamespace(with_proposal=lambda _: state.dialogue)
-    state.say = state.said.extend
-    return state
+def test_second_okay_and_second_plan_are_left_out():
+    place = intend(F.ACCEPT, Proposition.of(Predicate.GOAL, place=LandmarkName.KFC))
+    plans = [intend(F.INFORM, Proposition.of(each, place=LandmarkName.KFC)) for each in (Predicate.HAS_ROUTE,) * 2]
+    said = in_one_breath([place, sign_of_hearing("align"), *plans])
+    assert [item.act.move for item in said] == [M.CONFIRM, M.EXPLAIN]
 
 
-def test_own_remarks_come_after_the_answer_and_not_to_one_who_has_not_understood():
-    wet, yes = remark(M.EXPLAIN), remark(M.REPLY_Y)
-    answers, own = still_due(talking(wet, yes), [DialogueAct.of(M.EXPLAIN)])
-    assert (answers, own) == ((yes,), (wet,))
-    assert still_due(talking(wet, yes), [DialogueAct.of(M.CONFUSE)]) == ((yes,), ())
+def test_order_leaves_only_answers_of_what_was_to_be_said():
+    state, _ = start()
+    yes = intend(F.AFFIRMATIVE_ANSWER, Proposition.of(Predicate.LOCALISED))
+    blocked = intend(F.INFORM, Proposition.of(Predicate.POSSIBLE, action=A.J_TURN, negated=True))
+    state.say(blocked, yes)
+    assert still_due(state, (DialogueAct.of(M.EXPLAIN),)) == ((yes,), (blocked,))
+    assert still_due(state, (DialogueAct.of(M.INSTRUCT, A.U_TURN),)) == ((yes,), ())
 
 
-def test_small_talk_and_repetitions_are_left_out_beside_an_answer():
-    taken, joke = remark(M.CONFIRM, KFC), remark(M.IRRELEVANT)
-    assert [item.act.move for item in in_one_breath([joke, taken])] == [M.CONFIRM]
-    assert [item.act.move for item in in_one_breath([joke])] == [M.IRRELEVANT]
-    assert len(in_one_breath([taken, taken])) == 1
-    check, sign = remark(M.CHECK, KFC), remark(M.ACKNOWLEDGE, KFC)
-    assert [item.act.move for item in in_one_breath([check, sign])] == [M.CHECK]
+def test_mere_okay_does_not_mean_the_order_and_a_stop_is_promised():
+    for seed in range(30):
+        for action in (A.J_TURN, A.STOP):
+            state, view = start()
+            words = understand("turn left" if action is A.J_TURN else "stop here")
+            acknowledge(state, view, action, words, np.random.default_rng(seed), answers=False)
+            for item in state.speech.queue:
+                assert not (item.act.move is M.ACKNOWLEDGE and item.meaning)
+                assert action is not A.STOP or item.act.move is M.CONFIRM
 
 
-@pytest.mark.parametrize("text", ["well, that took a while", "that's the last one on the list", "so far so good"])
-def test_remarks_in_passing_need_no_okay(text):
-    state = SimpleNamespace(said=[], speech=SimpleNamespace(last=None))
-    state.say = state.said.append
-    assert passes_over(state, understand(text), np.random.default_rng(0))
-    assert all(item.act.move is M.ACKNOWLEDGE for item in state.said)
+@pytest.mark.parametrize(
+    ("text", "friend"),
+    [
+        ("go to my friend Idris on Baits", "Idris"),
+        ("our passenger Aunt Mei, please", "Aunt Mei"),
+        ("my friend on Baits", None),
+        ("my friend Lin's place", None),
+    ],
+)
+def test_name_of_the_person_is_taken_up(text, friend):
+    state, heard = heard_by_car(text, DialogueAct.of(M.INSTRUCT, LandmarkName.PERSON))
+    note_friend(state, heard)
+    assert state.beliefs.friend == friend
 
 
-def test_only_a_single_thing_is_nothing_else():
-    several = worded(M.REPLY_W, ObjectClass.VEHICLES, topic="sees", role=Role.CO_WIZARD)
-    assert not any("nothing else" in text or "just" in text.split() for text in several)
+def test_name_is_dropped_with_the_errand():
+    state, heard = heard_by_car("go to my friend Idris", DialogueAct.of(M.INSTRUCT, LandmarkName.PERSON))
+    note_friend(state, heard)
+    done = DialogueAct.of(M.EXPLAIN, GoalStatus.COMPLETE)
+    _, other = heard_by_car("that's done, my friend on Beal", done, DialogueAct.of(M.INSTRUCT, LandmarkName.PERSON))
+    note_friend(state, other)
+    assert state.beliefs.friend is None
 
 
-def test_look_of_another_person_is_forgotten():
-    beliefs = BeliefState(goal=PERSON).with_look(read_look("somebody in a green coat"))
-    assert beliefs.look is not None and beliefs.without_look().look is None
+def test_purpose_of_an_errand_is_no_step_of_a_plan():
+    acts = (DialogueAct.of(M.EXPLAIN), DialogueAct.of(M.INSTRUCT, LandmarkName.HOUSE))
+    _, heard = heard_by_car("I need to collect Mila, Thabo's house on Division", *acts)
+    assert len(heard.words.plan) == 2 and len(without_purposes(heard).words.plan) == 1
+    _, way = heard_by_car("I need you to turn left, then right", DialogueAct.of(M.INSTRUCT, A.J_TURN))
+    assert without_purposes(way) is way
 
 
-# --- words ------------------------------------------------------------------------------------------------------------
+def test_street_of_a_place_off_the_map_is_remembered():
+    state, view = start()
+    beal = (StreetName.BEAL,)
+    state.beliefs = replace(state.beliefs, ruled_out=tuple(mark.place for mark in view.landmarks))
+    set_goal(state, view, LandmarkName.HOUSE, beal, np.random.default_rng(0))
+    assert state.beliefs.streets == beal
+    state.speech = state.speech.cleared()
+    set_goal(state, view, LandmarkName.HOUSE, (), np.random.default_rng(0))
+    assert state.beliefs.streets == beal
+    assert all(StreetName.QUERIED not in item.act.slots for item in state.speech.queue)
 
 
-def test_now_is_said_once():
-    rng = np.random.default_rng(8)
-    acts = [DialogueAct.of(M.ACKNOWLEDGE), DialogueAct.of(M.INSTRUCT, A.SPEED_CHANGE)]
-    for _ in range(300):
-        spans = word_acts(acts, Role.PARTICIPANT, rng, [None, Wording(faster=False, speed=20)])
-        words = spans[1].text.lower().replace(",", "").split()
-        assert words.count("now") < 2, spans[1].text
+def test_crowd_that_was_mentioned_without_an_object_is_no_news():
+    heard = Noticed().after_hearing(understand("look at that traffic"), 10.0)
+    assert [at for _, at in heard.crowds] == [10.0]
 
 
-def test_address_is_said_once_in_a_breath():
-    rng, style = np.random.default_rng(8), SpeakerStyle(address="pal", addressing=0.9)
-    acts = [DialogueAct.of(M.EXPLAIN, GoalStatus.COMPLETE), DialogueAct.of(M.INSTRUCT, KFC)]
-    for _ in range(100):
-        text = " ".join(span.text for span in word_acts(acts, Role.PARTICIPANT, rng, style=style)).lower()
-        assert text.count("pal") < 2, text
+# --- the participant --------------------------------------------------------------------------------------------------
 
 
-def test_red_light_or_sign_is_not_in_the_way():
-    stands = Proposition.of(Predicate.STANDS, action=A.STOP)
-    cause = Proposition.of(Predicate.HINDERS, object=ObjectClass.TRAFFIC_SIGN)
-    because = Proposition.of(Predicate.BECAUSE, effect=stands, cause=cause)
-    rng, act = np.random.default_rng(1), DialogueAct.of(M.EXPLAIN, A.STOP, ObjectClass.TRAFFIC_SIGN)
-    for _ in range(20):
-        text = word_act(act, Role.CO_WIZARD, rng, Wording(topic="because_standing", content=because))
-        assert "in the way" not in text
+def confirmed(human: Guide, words: str, *told: Remark) -> bool:
+    human.state.speech = replace(human.state.speech, said=told, last=told[-1], last_end=human.view.time - 2.0, queue=())
+    human.observation |= with_words(human.observation, Role.CO_WIZARD, words, DialogueAct.of(M.CONFIRM, A.J_TURN))
+    heard = heard_utterance(human.view.raw, Role.CO_WIZARD)
+    assert heard is not None
+    return take_up_confirmation(human.state, human.view, heard, human.rng) and human.moves()[:1] == [M.CLARIFY]
+
+
+@pytest.mark.parametrize(
+    ("words", "corrects"),
+    [
+        ("Right, the next left, then the next right.", False),
+        ("The next left, then the next right, got it.", False),
+        ("The next left, got it.", False),
+        ("The next right, then the next left.", True),
+    ],
+)
+def test_only_another_way_is_corrected(words, corrects):
+    way = turn(LEFT, "way_nth"), turn(RIGHT, "way_nth", joined=True)
+    assert confirmed(Guide(60.0, speed=6.0), words, *way) is corrects
+    newer = order(M.INSTRUCT, A.U_TURN)
+    assert not confirmed(Guide(60.0, speed=6.0), words, *way, newer), "another order was given since"
+
+
+def test_turn_behind_a_u_turn_is_no_turn_to_the_wrong_side():
+    human = Guide(60.0, speed=6.0)
+    told = order(M.INSTRUCT, A.U_TURN), turn(LEFT, "way_nth", joined=True)
+    human.state.speech = replace(human.state.speech, said=told, last=told[-1], last_end=human.view.time - 2.0)
+    act = DialogueAct.of(M.CONFIRM, A.J_TURN, A.U_TURN)
+    human.observation |= with_words(human.observation, Role.CO_WIZARD, "Turn around, then the next left, sure.", act)
+    listen(human.state, human.view, human.rng)
+    assert M.CLARIFY not in human.moves()
+
+
+def test_way_that_no_longer_holds_is_replaced_with_a_word_of_why():
+    human = Guide(60.0, speed=6.0)
+    told = turn(LEFT, "way_nth")
+    for rerouted, said, moves in ((True, (told,), [M.EXPLAIN, M.INSTRUCT]), (True, (), [M.INSTRUCT])):
+        human.state.guidance = replace(human.state.guidance, rerouted=rerouted)
+        human.state.speech = replace(human.state.speech, said=said, queue=(turn(RIGHT),))
+        own_up(human.state, human.view)
+        assert human.moves() == moves and not human.state.guidance.rerouted
+
+
+def test_first_drive_past_the_place_is_remarked_on():
+    human = Guide(60.0, speed=6.0)
+    human.state.guidance = replace(human.state.guidance, visits=1, slowed_early=True)
+    human.state.route = replace(human.state.route, misses=1)
+    remark_on_miss(human.state, human.view, passed=True)
+    assert [said.predicate for item in human.state.speech.queue for said in item.meaning] == [Predicate.PASSED]
+    note_said(human.state, human.view, turn(LEFT))
+    note_said(human.state, human.view, human.state.speech.queue[0])
+    assert human.state.guidance.given, "what was ordered still counts"
+
+
+def test_order_to_turn_round_that_is_repeated_on_the_spot_counts_once():
+    human = Guide(60.0, speed=6.0)
+    round_ = order(M.INSTRUCT, A.U_TURN)
+    for heading, times in ((0.0, 1), (0.0, 1), (3.0, 2)):
+        human.observation["pose"] = human.observation["pose"] + np.array([0.0, 0.0, heading])
+        note_said(human.state, human.view, round_)
+        assert rounds_told(human.state) == times
+    assert turned_round_lately(human.state, human.view)
+    human.observation["time"] = human.observation["time"] + 60.0
+    assert not turned_round_lately(human.state, human.view)
+
+
+def test_nobody_complains_while_the_car_obeys():
+    human = Guide(60.0, speed=6.0)
+    note_said(human.state, human.view, order(M.INSTRUCT, A.U_TURN))
+    before = human.state.speech
+    stop_circling(human.state, human.view)
+    assert human.state.speech is before

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.dialogue.conversation import speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
@@ -128,7 +129,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
             continue  # the question that follows is answered instead
         if answer is not None:
             answer(state, view, act, heard.words, rng)
-    again = _misheard_question(state, heard) if state.speech is before else None
+    again = _to_say_again(state, view, heard) if state.speech is before else None
     if again is not None:
         state.say_first(again)
     elif state.speech is before and _answers_question(state, heard):
@@ -173,7 +174,10 @@ def _asks_what_is_being_said(state: ParticipantState, view: ParticipantView, hea
     asks = bool(heard.acts) and all(
         act.move is DialogueMove.QUERY_W and not act.values(Slot.ACTION) for act in heard.acts
     )
-    return asks and (_is_just_announced(state, view) or _was_just_named(state, view))
+    explicit = any(LandmarkName.QUERIED in act.slots for act in heard.acts)
+    meanwhile = state.speech.last_end > view.time - speech_seconds(heard.words.text)
+    told = _is_just_announced(state, view) or _was_just_named(state, view)
+    return asks and told and not state.speech.has_just_asked_back and (explicit or meanwhile)
 
 
 def _is_just_announced(state: ParticipantState, view: ParticipantView) -> bool:
@@ -353,6 +357,23 @@ def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
     """Returns whether the car has answered the last question."""
     last = state.speech.last
     return last is not None and last.act.move in act_builders.QUESTIONS and heard.acts[0].move in _REPLIES
+
+
+def _to_say_again(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> Remark | None:
+    """Returns the question that the car has misheard, or the destination that it denies; None without either."""
+    if not _denies_destination(state, heard):
+        return _misheard_question(state, heard)
+    goal = state.task.destination
+    state.task = state.task.after_reminding(view.time)
+    return intend(Function.REQUEST, act_builders.destination(goal.name, goal.street))
+
+
+def _denies_destination(state: ParticipantState, heard: HeardUtterance) -> bool:
+    """Returns whether the car has answered that it is not going to the place where it should."""
+    last, goal = state.speech.last, state.task.goal
+    checked = last is not None and last.act.move is DialogueMove.CHECK and goal is not None
+    denied = bool(heard.acts) and heard.acts[0].move in (DialogueMove.REPLY_N, DialogueMove.REPLY_U)
+    return checked and denied and goal is not None and last is not None and goal.name in last.act.slots
 
 
 def _misheard_question(state: ParticipantState, heard: HeardUtterance) -> Remark | None:
