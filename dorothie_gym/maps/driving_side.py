@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 
-from dorothie_gym.maps.model import LinkType
+from dorothie_gym.maps.link_types import LinkType
 
 OPPOSITES = {
     LinkType.LEFT: LinkType.RIGHT,

@@ -16,6 +16,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.maps.link_types import LANE_CHANGES as LANE_CHANGES
+from dorothie_gym.maps.link_types import LinkType as LinkType
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import allocating
@@ -39,26 +41,6 @@ LEVEL_HEIGHT = 2.5
 NARROW = 2.3
 """Width below which a lane that tapers away is too narrow for a car, which is 2 m wide [m]; nine tenths of the greatest
 width of a lane that is narrow everywhere."""
-
-
-class LinkType(enum.StrEnum):
-    """Type of a link between two lanes: a turn, or a change to the parallel lane."""
-
-    STRAIGHT = "straight"
-    LEFT = "left"
-    RIGHT = "right"
-    U_TURN = "uturn"
-    LANE_CHANGE_LEFT = "left_lane_change"
-    LANE_CHANGE_RIGHT = "right_lane_change"
-
-    @property
-    def is_lane_change(self) -> bool:
-        """Whether the target lies beside the source instead of following it."""
-        return self in LANE_CHANGES
-
-
-LANE_CHANGES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
-"""Types of the links between lanes side by side."""
 
 
 @shared

@@ -52,7 +52,7 @@ class TestRun:
         facts = loaded("run", "--seed", 3, "--max-seconds", 4, "--json")
         assert list(facts) == RUN_KEYS
         assert list(facts["subgoals"]) == ["live", "reached"]
-        assert facts["town"] == "brookside" and facts["seed"] == 3 and facts["seconds"] == 4.0
+        assert facts["town"] == "millbrook" and facts["seed"] == 3 and facts["seconds"] == 4.0
         assert facts["session"] is None and facts["arrived"] is False
         assert not any(Path().iterdir()), "nothing is written that was not asked for"
 
@@ -71,7 +71,7 @@ class TestRun:
         result = call("run", "--seed", 3, "--max-seconds", 8)
         assert result.exit_code == 0, result.output
         assert Path("dorothie.png").read_bytes().startswith(b"\x89PNG")
-        for text in ("brookside", "seed 3", "Participant", "Instruct", "0 of its own making", "dorothie.png"):
+        for text in ("millbrook", "seed 3", "Participant", "Instruct", "0 of its own making", "dorothie.png"):
             assert text in result.stdout
         assert max(map(len, result.stdout.splitlines())) <= 80
 

@@ -176,10 +176,10 @@ def fold_of_towns(towns: Sequence[str]) -> TownFold | None:
     return next((fold for fold, there in FOLD_TOWNS.items() if towns and set(towns) <= set(there)), None)
 
 
-def towns_text(towns: Sequence[str]) -> str:
+def towns_text(towns: Sequence[str], separator: str = ",") -> str:
     """Returns towns as `parse_towns` reads them; a fold of generated towns by its name."""
     whole = (TownFold.VALIDATION, TownFold.UNSEEN)
-    return next((str(fold) for fold in whole if tuple(towns) == FOLD_TOWNS[fold]), ",".join(towns))
+    return next((str(fold) for fold in whole if tuple(towns) == FOLD_TOWNS[fold]), separator.join(towns))
 
 
 def _seed(seed: int, number: int) -> int:

@@ -85,8 +85,8 @@ class LeaderboardProtocol:
         towns = [str(town) for town in settings["towns"]]
         whole = {fold: list(parse_towns(fold)) for fold in self.folds}
         if fold_of_towns(towns) not in self.folds or towns not in whole.values():
-            choices = " or ".join(towns_text(there) for there in whole.values())
-            yield f"towns are {one_line(towns_text(towns))}; the protocol has {choices}, in this order"
+            choices = " or ".join(towns_text(there, ", ") for there in whole.values())
+            yield f"towns are {one_line(towns_text(towns, ', '))}; the protocol has {choices}, in this order"
         if settings["sessions_planned"] != self.sessions:
             yield f"{settings['sessions_planned']} sessions; the protocol has {self.sessions}"
         if settings["seed"] != self.seed:
