@@ -56,11 +56,15 @@ Rows = dict[str, dict[tuple[str, int], EpisodeStatistics]]
 def main(
     maps: Annotated[list[str] | None, typer.Argument(help="further maps to try the drivers in")] = None,
     algorithm: Annotated[str, typer.Option(help="algorithm of train-rl")] = "maskable_ppo",
-    pools: Annotated[str, typer.Option(help="towns to train in: seen, generated (the first 64), or both")] = "seen",
-    guidance: Annotated[str, typer.Option(help="turns or goals")] = "goals",
+    pools: Annotated[
+        str, typer.Option("--pools", help="towns to train in: seen, generated (the first 64), or both")
+    ] = "seen",
+    guidance: Annotated[str, typer.Option("--guidance", help="turns or goals")] = "goals",
     exceptions: Annotated[float, typer.Option(help="average number of exceptions in a session")] = 2.0,
     steps: Annotated[int | None, typer.Option(help="steps of a training; default: tuned")] = None,
-    evaluations: Annotated[int, typer.Option(min=1, help="evaluations of a training of given steps")] = 10,
+    evaluations: Annotated[
+        int, typer.Option("--evaluations", min=1, help="evaluations of a training of given steps")
+    ] = 10,
     seeds: Annotated[int, typer.Option(min=1, help="number of trainings in each pool")] = 5,
     episodes: Annotated[int, typer.Option(min=1, help="episodes in each map, and in all unseen towns together")] = 100,
     work: Annotated[Path, typer.Option(help="folder of the trainings")] = Path("runs/generalisation"),

@@ -39,7 +39,7 @@ CHANGELOG: Final = "CHANGELOG.md"
 
 _OPTION: Final = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 _CHOICES: Final = re.compile(r"[a-z]+(\|[a-z]+)+")
-_SCRIPT_OPTION: Final = re.compile(r'add(?:_argument|option)\(\s*"(--[a-z0-9-]+)"')
+_SCRIPT_OPTION: Final = re.compile(r'(?:add_argument|addoption|typer\.Option)\(\s*"(--[a-z0-9-]+)"')
 
 COMMANDS: Final = typer.main.get_command(app)
 """The command line: groups have `commands`, commands have `params`."""

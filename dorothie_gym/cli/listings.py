@@ -234,7 +234,7 @@ def _success(validation: Facts | None) -> str:
 def _show_towns(rows: Sequence[Facts]) -> None:
     table = Table(box=None, pad_edge=False)
     table.add_column("Town", style="bold")
-    table.add_column("Fold")
+    table.add_column("Fold", no_wrap=True, min_width=11)
     for title in ("Lanes", "km", "Junctions", "Streets", "Signals", "Crosswalks", "Sites"):
         table.add_column(title, justify="right")
     for row in rows:

@@ -52,7 +52,7 @@ def test_role_acts_in_its_own_spaces(role: Role) -> None:
 
 def test_session_equals_one_played_by_three_policies() -> None:
     env = SingleRole("co_wizard", max_cycles=40)
-    duo = dorothie_gym.DuoWizardEnv("brookside", max_cycles=40)
+    duo = dorothie_gym.DuoWizardEnv(max_cycles=40)
     policies = {role: make_policy("scripted", role) for role in AGENT_ROLES}
     observations, _ = duo.reset(seed=9)
     states = {role: policies[role].initial_state(policy_seed(9, role), duo.town) for role in AGENT_ROLES}

@@ -9,6 +9,7 @@ import numpy as np
 
 from dorothie_gym.maps.opendrive.car_paths import path_between
 from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array, IntArray
@@ -70,7 +71,7 @@ def _turning_points(line: Array) -> tuple[Array, IntArray]:
     apart, steps = apart[:-1][moving], steps[moving]
     ways = steps / pn.hypot(*steps.T)[:, None]
     cosine = (ways[1:] * ways[:-1]).sum(axis=1)
-    return places, apart[1:][cosine < math.cos(SHARPEST)]
+    return places, apart[1:][cosine < pm.cos(SHARPEST)]
 
 
 def _crossing(line: Array, places: Array, first: int, last: int) -> tuple[int, int] | None:

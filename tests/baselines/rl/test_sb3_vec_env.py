@@ -28,7 +28,7 @@ def test_other_autoreset_modes_are_refused() -> None:
 
 
 def test_episodes_are_those_of_single_environments() -> None:
-    env = make(max_seconds=15.0)
+    env = make(max_seconds=15.0, town="brookside")
     seeds = env.seed(3)
     observations: Any = env.reset()
     singles = [NavigationEnv("brookside", max_seconds=15.0) for _ in range(3)]

@@ -85,7 +85,7 @@ def _open_answer(utterance: Utterance, memory: WorkingMemory, view: CoWizardView
         return why_standing(memory.knowledge, view)
     if utterance.asks_why is ActionValue.U_TURN:
         return why_turning_round(memory.knowledge, view)
-    asked = utterance.heard.words.asked
+    asked = utterance.stated
     if asked is None or asked.predicate is not Predicate.ARRIVES_IN:
         return None
     return arrival(memory.knowledge, view)
@@ -172,7 +172,7 @@ def _is_about(answer: Proposition, utterance: Utterance) -> bool:
 
 def _asked_about(utterance: Utterance) -> tuple[Predicate, ...]:
     """Returns the predicates of answers to a question; empty if it was not understood."""
-    asked = utterance.asked if utterance.asks is not None else utterance.heard.words.asked
+    asked = utterance.asked if utterance.asks is not None else utterance.stated
     if asked is not None:
         return (asked.predicate,)
     for act in utterance.heard.acts:

@@ -69,6 +69,14 @@ class Utterance:
         return tuple(_numbers(self))
 
     @cached_property
+    def stated(self) -> Proposition | None:
+        """Proposition that the words ask for; None where slots tell it, as of a question for the reason of a stop."""
+        asked = self.heard.words.asked
+        if asked is not None and asked.predicate is Predicate.BECAUSE and any(map(_explained, self.heard.acts)):
+            return None
+        return asked
+
+    @cached_property
     def asks(self) -> DialogueMove | None:
         """Move of the first question that yes or no answers; None without one.
 
@@ -76,7 +84,7 @@ class Utterance:
         stop?".
         """
         for act in self.heard.acts:
-            why = self.heard.words.asked is None and _explained(act)
+            why = self.stated is None and _explained(act)
             if act.move is DialogueMove.CHECK or (act.move is DialogueMove.QUERY_YN and not why):
                 return act.move
         return None
@@ -84,7 +92,7 @@ class Utterance:
     @cached_property
     def asks_why(self) -> ActionValue | None:
         """Action whose reason a question asks for: STOP for a standstill, U_TURN for a U-turn."""
-        if self.heard.words.asked is not None:
+        if self.stated is not None:
             return None
         questions = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN)
         return next((_explained(act) for act in self.heard.acts if act.move in questions and _explained(act)), None)
@@ -92,8 +100,8 @@ class Utterance:
     @cached_property
     def asked(self) -> Proposition | None:
         """Proposition of a question, from its words or otherwise from its slots; None if unknown."""
-        if self.heard.words.asked is not None:
-            return self.heard.words.asked
+        if self.stated is not None:
+            return self.stated
         for act in self.heard.acts:
             if act.move in (DialogueMove.QUERY_YN, DialogueMove.CHECK):
                 objects, actions = (_known(act.values(slot)) for slot in (Slot.OBJECT, Slot.ACTION))

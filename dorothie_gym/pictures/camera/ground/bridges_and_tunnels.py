@@ -288,7 +288,7 @@ def _mitres(lines: Array) -> tuple[Array, NDArray[np.bool_]]:
         if len(after) != 1 or ends[end] != 1 or abs(lines[k, 1, 2] - lines[after[0], 0, 2]) > _STEP:
             continue
         both = inward[k] + inward[after[0]]
-        longer = float(both @ both) / 2.0  # 1 + the cosine of the corner
+        longer = float((both * both).sum()) / 2.0  # 1 + the cosine of the corner
         if longer > _SHARPEST:
             aside[k, 1] = aside[after[0], 0] = both / longer
             alone[k, 1] = alone[after[0], 0] = False
