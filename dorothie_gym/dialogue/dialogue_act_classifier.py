@@ -33,6 +33,10 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Sl
 from dorothie_gym.ontology.spellings import parse_move
 
 _SENTENCE_END = re.compile(r"(?<=[.?!])(?<!\b(?:Mr|Ms|Dr)\.)(?<!\bMrs\.)\s+")
+
+_COMMA = re.compile(r",(?=\s|$)")
+"""Comma between words; one inside of a word, as in a number, separates nothing."""
+
 _DOMAIN_RULE = "%domain"
 _WORD_LISTS = ("domain", "small_talk", "reports")
 
@@ -371,7 +375,7 @@ def rule_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]
 
 def _segments(sentence: str) -> list[str]:
     """Returns the segments of a sentence, split recursively at the first comma before a new act."""
-    clauses = sentence.strip().split(",")
+    clauses = _COMMA.split(sentence.strip())
     for number in range(1, min(len(clauses), _MOST_CLAUSES)):
         head, rest = ",".join(clauses[:number]).strip(), ",".join(clauses[number:]).strip()
         if head and rest and _is_boundary(head, rest):

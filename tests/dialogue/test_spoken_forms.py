@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import random
+import string
+
 import pytest
 
 from dorothie_gym.dialogue import DrivingPlan, guess_spans, understand
@@ -66,3 +69,15 @@ def test_forms_of_speech_order_what_plainer_words_do(said: str, plain: str) -> N
 def test_reactions_and_orders_of_free_form(before: str, said: str, move: DialogueMove) -> None:
     after = guess_spans(before)[-1].act.move if before else None
     assert guess_spans(said, after)[0].act.move is move
+
+
+@pytest.mark.parametrize("text", ["left,then right", "okay,left", "go on for 1,000 m", "a,b,c", "Yes,[no,1Go right,"])
+def test_commas_inside_words_lose_no_word(text: str) -> None:
+    assert " ".join(span.text for span in guess_spans(text)) == text
+
+
+def test_any_signs_are_read() -> None:
+    drawn = random.Random(4)
+    for _ in range(200):
+        text = "".join(drawn.choice(f"{string.printable[:95]}  ,.?") for _ in range(drawn.randint(1, 90)))
+        assert " ".join(span.text for span in guess_spans(text)).split() == text.split()
