@@ -7,7 +7,8 @@ import pytest
 from highway_env.envs.common.observation import KinematicObservation, OccupancyGridObservation
 from highway_env.vehicle.objects import Obstacle
 
-from dorothie_gym.sim.town_env import Kinematics, OccupancyGrid, TownEnv
+from dorothie_gym.sim.town_env import TownEnv
+from dorothie_gym.sim.town_observations import Kinematics, OccupancyGrid
 
 FEATURES = [
     "presence", "x", "y", "vx", "vy", "heading", "cos_h", "sin_h", "cos_d", "sin_d", "long_off", "lat_off", "ang_off",
