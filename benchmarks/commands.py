@@ -256,10 +256,13 @@ def sessions(
     def measured(progress: Progress) -> Figures:
         from benchmarks.sessions import CO_WIZARDS, TOWNS, measure
 
-        return measure(
-            town or TOWNS, co_wizards=co_wizard or CO_WIZARDS, sessions=count, seed=seed, record=record,
-            against=against, repeats=repeats, progress=progress,
-        )  # fmt: skip
+        try:
+            return measure(
+                town or TOWNS, co_wizards=co_wizard or CO_WIZARDS, sessions=count, seed=seed, record=record,
+                against=against, repeats=repeats, progress=progress,
+            )  # fmt: skip
+        except ValueError as error:
+            fail(str(error))
 
     _run("sessions", measured, picture, as_json)
 

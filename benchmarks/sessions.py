@@ -9,10 +9,14 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.timing import BenchmarkProcessError, Figures, Progress, Timing, ignore_progress, machine, rounded
+from dorothie_gym.maps import load_town
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies import make_policy
 from dorothie_gym.support.interruption import starting_process
 
 ROOT: Final = Path(__file__).parents[1]
@@ -55,8 +59,14 @@ def measure(
         progress: callback for the progress.
 
     Raises:
+        TownError: there is no such town, or its file is invalid.
+        ValueError: there is no such policy.
         BenchmarkProcessError: there is no such revision, or a process ended early.
     """
+    for town in towns:
+        load_town(town)  # before the first process
+    for name in co_wizards:
+        make_policy(name, Role.CO_WIZARD)
     settings = {
         "towns": list(towns),
         "seeds": list(range(seed, seed + sessions)),
@@ -64,7 +74,10 @@ def measure(
         "max_seconds": max_seconds,
     }
     with builds(against) as folders:
-        rows = [_row(folders, {**settings, "co_wizard": name}, repeats, progress) for name in co_wizards]
+        rows = [
+            _row(folders, {**settings, "co_wizard": name}, repeats, partial(_scaled, progress, number, len(co_wizards)))
+            for number, name in enumerate(co_wizards)
+        ]
     return {
         "towns": list(towns),
         "sessions": sessions * len(towns),
@@ -75,6 +88,11 @@ def measure(
         "repeats": repeats,
         "machine": machine(),
     }
+
+
+def _scaled(progress: Progress, number: int, count: int, part: str, share: float) -> None:
+    """Reports the progress of one of several measurements."""
+    progress(part, (number + share) / count)
 
 
 def _row(folders: Mapping[str, Path], settings: Mapping[str, Any], repeats: int, progress: Progress) -> Figures:
@@ -145,7 +163,10 @@ def _output(command: Sequence[str], build: Path | None = None) -> str:
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=build, env=environment
         )
-    output, noise = process.communicate()
+    try:
+        output, noise = process.communicate()
+    finally:
+        process.kill()  # after Ctrl-C
     if process.returncode:
         last = noise.strip().splitlines()[-1:] or ["no message"]
         raise BenchmarkProcessError(f"{command[0]} ended with code {process.returncode}: {last[0]}")
