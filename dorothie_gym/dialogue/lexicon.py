@@ -71,6 +71,7 @@ _WORD = re.compile(r"[a-z0-9']+|\?|,")
 _STAMMER = re.compile(r"\b(\w{1,3})(?:-\1)*-+(?=\1)")
 """Beginning of a word that is said once more: "t-turn", "l-l-left"."""
 
+_LETTERS = re.compile(r"[a-z]+")
 _DRAWL = re.compile(r"([a-z])\1{2,}")
 """Letters of a drawl: "stooop"."""
 
@@ -107,14 +108,14 @@ def _fluent(text: str) -> str:
     """Returns a text without beginnings of words that are said once more, and without drawls."""
     if "-" in text:
         text = _STAMMER.sub("", text)
-    return _DRAWL.sub(_undrawled, text) if _DRAWL.search(text) else text
+    return _LETTERS.sub(lambda word: _DRAWL.sub(_undrawled, word[0]), text) if _DRAWL.search(text) else text
 
 
 def _undrawled(match: re.Match[str]) -> str:
-    letter = match[1]
-    before, behind = match.string[: match.start()], match.string[match.end() :]
-    begin, end = re.split(r"[^a-z]", before)[-1], re.split(r"[^a-z]", behind)[0]
-    return letter if begin + letter + end in _spoken_forms().single else letter * (1 + (letter in _DOUBLED))
+    """Returns the letters for which those of a drawl in a word stand."""
+    letter, word = match[1], match.string
+    single = word[: match.start()] + letter + word[match.end() :] in _spoken_forms().single
+    return letter if single or letter not in _DOUBLED else 2 * letter
 
 
 @functools.lru_cache(maxsize=16384)

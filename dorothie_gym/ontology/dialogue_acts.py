@@ -179,6 +179,13 @@ _ENDS: Mapping[DialogueUnit, tuple[UnitEnd, ...]] = MappingProxyType(
 )
 
 
+ORDERING_MOVES = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+"""Moves by which a passenger orders something: an instruction, the answer to an open question, a correction."""
+
+SIGNS_OF_HEARING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+"""Moves that show that something was heard."""
+
+
 # --- decision tree ----------------------------------------------------------------------------------------------------
 
 

@@ -56,6 +56,9 @@ class SeenLandmark:
         return self.lane, self.station
 
 
+COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
+"""Names of which a town may have several places, so that the name alone says little."""
+
 IN_VIEW = 45.0
 """Largest distance, along each axis, of a landmark that utterances refer to [m]."""
 

@@ -12,7 +12,7 @@ from dorothie_gym.errors import TownError
 from dorothie_gym.maps import NoteAction, NoteKind, Town
 from dorothie_gym.maps.import_notes import ImportNote
 from dorothie_gym.maps.opendrive import import_opendrive
-from dorothie_gym.maps.opendrive.folds import turns_back, without_folds
+from dorothie_gym.maps.opendrive.lane_loops import turns_back, without_loops
 
 from .opendrive_text import geometry, lane, linked, opendrive, road, section
 
@@ -45,17 +45,17 @@ def test_lanes_inside_a_sharp_bend_lead_on_without_loops(tmp_path: Path, curvatu
     assert bool(notes) == inside
 
 
-def test_a_line_without_folds_is_the_same_object() -> None:
+def test_a_line_without_loops_is_the_same_object() -> None:
     angle = np.linspace(0.0, 6.0, 200)
     line = np.column_stack((5.0 * np.cos(angle), 5.0 * np.sin(angle), angle, np.full(200, 3.5)))
-    assert without_folds(line) is line
+    assert without_loops(line) is line
 
 
 @pytest.mark.parametrize("overlap", [0.001, 0.02])
 def test_sections_that_overlap_by_millimetres_are_no_fold(overlap: float) -> None:
     x = np.concatenate((np.arange(0.0, 10.0, 0.25), np.arange(9.75 - overlap, 20.0, 0.25)))
     line = np.column_stack((x, np.zeros((len(x), 2)), np.full(len(x), 3.5)))
-    assert without_folds(line) is line
+    assert without_loops(line) is line
     assert not turns_back(line)
 
 

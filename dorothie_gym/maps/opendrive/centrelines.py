@@ -13,7 +13,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.car_paths import turn_between
 from dorothie_gym.maps.opendrive.connectors import lane_name, repair_connectors
 from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
-from dorothie_gym.maps.opendrive.folds import SHARPEST, turns_back, without_folds
+from dorothie_gym.maps.opendrive.lane_loops import SHARPEST, turns_back, without_loops
 from dorothie_gym.maps.opendrive.parse import refuse_empty
 from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord, SectionRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
@@ -186,7 +186,7 @@ def _fault(dense: Array) -> str:
 
 def _cut(records: OpenDriveRecords, topology: Topology, lane: int, dense: Array) -> Array:
     """Returns a centre line (n, 4) without loops, with a note; one that turns back for good stays as it is."""
-    line = without_folds(dense)
+    line = without_loops(dense)
     if line is None or line is dense:
         return dense
     reason = "lies inside a bend that is too sharp for it; the loops of its centre line were cut off"

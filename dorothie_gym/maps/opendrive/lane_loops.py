@@ -1,4 +1,4 @@
-"""Folds of centre lines: where a lane lies inside a bend that is tighter than its distance from the reference line."""
+"""Loops of centre lines: where a lane lies inside a bend that is tighter than its distance from the reference line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHARPEST = math.radians(100.0)
 """Change of direction from one sample to the next at which a line turns back [rad]."""
 
 REACH = 20.0
-"""Largest distance along the line from a fold to the places at which it is cut off [m]."""
+"""Largest distance along the line from a turning point to the places at which the loop is cut off [m]."""
 
 BEND = 6.0
 """Length of the line before and after these places that is drawn again as a bend [m]."""
@@ -30,14 +30,14 @@ _LEAST_STEP = 0.1
 """Distance between compared samples [m]."""
 
 
-def without_folds(line: Array) -> Array | None:
+def without_loops(line: Array) -> Array | None:
     """Returns the samples of a centre line (n, 4) without the loops on which it runs backwards.
 
     Inside such a bend the line passes the end of its loop, turns back, and turns once more. It is cut off where its
     parts before and after the loop meet, which are joined by a bend.
 
     Returns:
-        The line, the same object if it has no fold; None if it turns back for good.
+        The line, the same object if it has no loop; None if it turns back for good.
     """
     before = len(line)
     while True:
@@ -62,7 +62,7 @@ def turns_back(line: Array) -> bool:
 def _turning_points(line: Array) -> tuple[Array, IntArray]:
     """Returns the distance along a line at its points (n,) [m], and the points at which it turns back.
 
-    Sections of roads overlap by some millimetres, which are no folds.
+    Sections of roads overlap by some millimetres, which are no loops.
     """
     places = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line[:, :2], axis=0).T))))
     apart = np.append(np.flatnonzero(np.diff(np.floor(places / _LEAST_STEP), prepend=-1.0)), len(line) - 1)

@@ -27,7 +27,6 @@ from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differ
 from dorothie_gym.policies.co_wizard.described_looks import looks_heard, take_up_look, without_looks
 from dorothie_gym.policies.co_wizard.errand_memory import note_friend, note_owner, remember, without_purposes
 from dorothie_gym.policies.co_wizard.goals import (
-    COMMON,
     abandon,
     accept_offer,
     accept_street,
@@ -64,6 +63,7 @@ from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
+from dorothie_gym.policies.observation_parser import COMMON
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.policies.turn_lanes import junction_meant

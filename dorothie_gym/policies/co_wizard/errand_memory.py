@@ -32,7 +32,7 @@ _OWNER = re.compile(
     r"(?:house|home|place)\b"
 )
 _FRIEND = re.compile(
-    r"\b(?:my friend|our passenger|pick up|picking up|[Pp]ick up)"
+    r"\b(?:my friend|our passenger|[Pp]ick(?:ing)? up)"
     r" (?P<friend>(?:(?:Mr|Mrs|Ms|Dr)\.? |Aunt |Uncle |Grandpa |Grandma )?[A-Z][\w-]+)(?!\w|'s)"
 )
 _DRIVES = re.compile(

@@ -17,7 +17,13 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.errand_memory import kept_for_later
-from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark, street_of
+from dorothie_gym.policies.observation_parser import (
+    COMMON,
+    SeenLandmark,
+    landmarks_in_view,
+    nearest_landmark,
+    street_of,
+)
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
@@ -25,9 +31,6 @@ from dorothie_gym.session.spaces.actions import LanePosition, Mental
 if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
-
-COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
-"""Names of which a town may have several places."""
 
 
 def known_landmark(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING, DialogueMove, MoveGroup
 from dorothie_gym.ontology.slots import GoalStatus, Slot
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.policy import replace
@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.speech import Remark
 
 _SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
-_ORDERING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _YES = DialogueMove.REPLY_Y
-_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _ANSWERS = MoveGroup.REPLY.moves
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 
@@ -36,7 +34,7 @@ def still_due(state: CoWizardState, acts: Sequence[DialogueAct]) -> tuple[tuple[
         after it.
     """
     ordered = any(
-        act.move is DialogueMove.CONFUSE or (act.move in _ORDERING and act.values(Slot.ACTION)) for act in acts
+        act.move is DialogueMove.CONFUSE or (act.move in ORDERING_MOVES and act.values(Slot.ACTION)) for act in acts
     )
     kept: list[Remark] = []
     dropped = False
@@ -74,7 +72,11 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     if any(said.predicate is Predicate.KNOWS for item in answers if item.act.move is _YES for said in item.meaning):
         answers = [item for item in answers if item.act.move is not DialogueMove.CHECK]
     checked = [item.act.values(Slot.LANDMARK) for item in answers if item.act.move is DialogueMove.CHECK]
-    answers = [item for item in answers if item.act.move not in _SIGNS or item.act.values(Slot.LANDMARK) not in checked]
+    answers = [
+        item
+        for item in answers
+        if item.act.move not in SIGNS_OF_HEARING or item.act.values(Slot.LANDMARK) not in checked
+    ]
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
     plans = [k for k, item in enumerate(answers) if _tells_plan(item)]
@@ -87,7 +89,7 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
 
 def _says_same(item: Remark, other: Remark) -> bool:
     """Returns whether two remarks have the same contents, and some at all."""
-    alike = item.act.move is other.act.move or {item.act.move, other.act.move} <= _SIGNS
+    alike = item.act.move is other.act.move or {item.act.move, other.act.move} <= SIGNS_OF_HEARING
     same = item.act.slots == other.act.slots and item.wording.direction is other.wording.direction
     return bool(item.act.slots) and alike and same
 

@@ -216,10 +216,9 @@ _BEHIND: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
 
 def _announce_place(state: CoWizardState, step: PlanStep) -> None:
     """Reports that the car has come to the place up to which it was to go straight on."""
-    passes = step.condition is None or step.condition.relation in _BEHIND
-    name = None if passes or step.condition is None else step.condition.place.landmark
-    if name is not None:
-        there = Proposition.of(Predicate.SEES, place=name)
+    until = step.condition
+    if until is not None and until.relation not in _BEHIND and until.place.landmark is not None:
+        there = Proposition.of(Predicate.SEES, place=until.place.landmark)
         state.say(intend(Function.INFORM, there, wording=Wording(topic="reached"), urgent=True))
 
 

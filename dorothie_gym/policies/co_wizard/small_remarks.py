@@ -54,5 +54,6 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
 def is_called_dark(words: ParsedText) -> bool:
     """Returns whether a statement says that it is dark."""
     told = words.told
-    dark = told is not None and told.get("parameter") is WeatherParameter.SUN_ALTITUDE_ANGLE
-    return dark and told is not None and told.get("high") is True
+    if told is None or told.get("parameter") is not WeatherParameter.SUN_ALTITUDE_ANGLE:
+        return False
+    return told.get("high") is True

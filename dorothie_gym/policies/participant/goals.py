@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
+from dorothie_gym.policies.observation_parser import COMMON
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
 from dorothie_gym.policies.participant.messages import message_remark, seconds_to_take_in
 from dorothie_gym.policies.participant.stories import (
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
-
-_COMMON: Final = (LandmarkName.HOUSE, LandmarkName.PERSON)
-"""Landmarks that a town has several of, so that only the present one is clear without a name."""
 
 # --- changes of the tasks -------------------------------------------------------------------------------------------
 
@@ -185,7 +183,7 @@ def _go_first(
     street = None if view.unique(landmark) else landmark.street
     now = act_builders.errand(landmark.name, GoalStatus.ONGOING, street)
     later = intend(Function.REQUEST, act_builders.errand(former.name, GoalStatus.PENDING), joined=True)
-    put_off = () if former.name in _COMMON else (later,)  # "that house" could be any
+    put_off = () if former.name in COMMON else (later,)  # "that house" could be any
     state.say_only(
         intend(Function.REQUEST, now, wording=Wording(topic="added")),
         *message_remark(state, view, landmark, rng),
@@ -381,7 +379,7 @@ def _say_announcement(
         state.say(*recollection(state, view, rng))
     goal, target = state.task.goal, state.task.target
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
-    named = [mark for mark in later if mark is not None and goal is not None and mark.name not in (goal.name, *_COMMON)]
+    named = [mark for mark in later if mark is not None and goal is not None and mark.name not in (goal.name, *COMMON)]
     if named and rng.random() < 0.25:
         state.say(intend(Function.INFORM, act_builders.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:

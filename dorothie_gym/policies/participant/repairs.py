@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.conversation import is_partly_inaudible, resembles_re
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.dialogue_acts import SIGNS_OF_HEARING, DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.given_orders import times_told
@@ -33,8 +33,6 @@ _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueM
 
 _SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
 
-_SIGNS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
-"""Moves that need not be understood word for word."""
 
 _ORDERING = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 
@@ -55,7 +53,7 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
         heard: utterance of the car.
         rng: random generator of the decision.
     """
-    sign = heard.acts[0].move in _SIGNS
+    sign = heard.acts[0].move in SIGNS_OF_HEARING
     if not sign and is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
         return True

@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.conversation import speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING, DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import (
     ActionValue,
@@ -55,11 +55,9 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
 
-_ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
 _YES_NO = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
 
-_ORDERS = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 
 _TAKEN_UP = 8.0
 """Time within which the car takes up an order [s]."""
@@ -136,7 +134,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         _thank(state, view, rng)
     elif state.speech is before and _needs_nod(state, view, heard):
         # an utterance that takes up an instruction needs no acknowledgement of its own
-        alone = heard.acts[0].move not in _ACKNOWLEDGEMENTS
+        alone = heard.acts[0].move not in SIGNS_OF_HEARING
         _nod(state, view, rng, _nod_to(view, heard), heard.words.told, alone=alone)
 
 
@@ -348,7 +346,7 @@ def _needs_nod(state: ParticipantState, view: ParticipantView, heard: HeardUtter
 def _takes_up_order(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
     """Returns whether the car only says that it does what it was just told to do."""
     last = state.speech.last
-    if last is None or last.act.move not in _ORDERS or not state.speech.has_just_spoken(view.time, _TAKEN_UP):
+    if last is None or last.act.move not in ORDERING_MOVES or not state.speech.has_just_spoken(view.time, _TAKEN_UP):
         return False
     return any(set(act.values(Slot.ACTION)) & set(last.act.values(Slot.ACTION)) for act in heard.acts)
 

@@ -19,7 +19,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.maps.whereabouts import corner_of
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.participant.hints import famous_nearby
@@ -125,9 +125,8 @@ def _texts(memory: SessionMemory, view: ParticipantView) -> dict[str, object]:
 # --- Forms ------------------------------------------------------------------------------------------------------------
 
 
-_ORDERS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _ANSWERS: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM})
-_POINTERS: Final = ((_ORDERS, ("manoeuvre", "turn")), (_ANSWERS, ("said_action", "said_turn", "said_object")))
+_POINTERS: Final = ((ORDERING_MOVES, ("manoeuvre", "turn")), (_ANSWERS, ("said_action", "said_turn", "said_object")))
 """Sources of actions, directions and objects, by the moves that take them from there."""
 
 

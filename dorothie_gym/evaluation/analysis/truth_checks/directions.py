@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue
 
 if TYPE_CHECKING:
     from dorothie_gym.session.recording.session import Session
 
-_MOVES: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _WAYS: Final = frozenset({ActionValue.J_TURN, ActionValue.LANE_FOLLOW, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 
 
@@ -41,7 +40,7 @@ def directions_of(session: Session) -> Iterator[GivenDirection]:
     """Yields the directions of a session in the order in which they were given."""
     utterances: dict[int, list[bool]] = {}
     for move in session.moves(Role.PARTICIPANT):
-        for said in move.meaning if move.act.move in _MOVES else ():
+        for said in move.meaning if move.act.move in ORDERING_MOVES else ():
             if said.predicate is Predicate.WILL and said.get("action") in _WAYS:
                 place = said.get("place") is not None or said.get("object") is not None
                 utterances.setdefault(move.utterance, []).append(place)

@@ -12,7 +12,7 @@ import numpy as np
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case, judged, plain_words
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
 from dorothie_gym.session.recording.events import UtteranceRecord
@@ -36,7 +36,6 @@ SAME_PLACE: Final = 40.0
 SECONDS: Final = 8.0
 """Time within which an order that contradicts another one needs a word of why [s]."""
 
-_ORDERING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _EXCUSES: Final = frozenset(
     {DialogueMove.CLARIFY, DialogueMove.REPLY_N, DialogueMove.EXPLAIN, DialogueMove.CONFUSE, DialogueMove.REPLY_U}
 )
@@ -76,7 +75,7 @@ def unchanged(session: Session) -> Iterator[Case]:
     """Yields the groups of orders in equal words at one place; wrong are those of more than `MOST_ALIKE` orders."""
     group: list[tuple[UtteranceRecord, float, float]] = []
     for said in session.utterances(Role.PARTICIPANT):
-        if not any(move.act.move in _ORDERING and move.act.values(Slot.ACTION) for move in said.moves):
+        if not any(move.act.move in ORDERING_MOVES and move.act.values(Slot.ACTION) for move in said.moves):
             continue
         x, y = _position(session, said.start)
         if group:
@@ -145,7 +144,7 @@ def _way_of(said: UtteranceRecord) -> tuple[ActionValue, Direction | None] | Non
     """Returns the first way that an utterance orders: turn and side, U-turn, or straight on."""
     for move in said.moves:
         ways = [value for value in move.act.values(Slot.ACTION) if value in _STEERING]
-        if move.act.move in _ORDERING and len(ways) == 1 and isinstance(ways[0], ActionValue):
+        if move.act.move in ORDERING_MOVES and len(ways) == 1 and isinstance(ways[0], ActionValue):
             words = understand(move.span)
             if words.distance is not None or words.further:
                 continue

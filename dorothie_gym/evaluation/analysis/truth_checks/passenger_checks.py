@@ -1,4 +1,4 @@
-"""What a passenger says to a driver: ways without metres, and questions that were not settled just before."""
+"""Checks of a passenger's talk: ways without metres, and questions that were not settled just before."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case, judged
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 
@@ -23,7 +23,6 @@ TOLD_WITHIN: Final = 10.0
 """Time after a destination was named within which it need not be asked for [s]."""
 
 _METRES: Final = re.compile(r"\bmet(?:er|re)s?\b", re.IGNORECASE)
-_ORDERING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _HOW_FAR: Final = frozenset({Predicate.CLOSE, Predicate.DISTANCE})
 _LATER: Final = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
@@ -31,7 +30,7 @@ _LATER: Final = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.
 def ways_without_metres(session: Session) -> Iterator[Case]:
     """Yields what the participant says of the way still to go; wrong is what counts it in metres."""
     for move in session.moves(Role.PARTICIPANT):
-        orders = move.act.move in _ORDERING and ActionValue.LANE_FOLLOW in move.act.slots
+        orders = move.act.move in ORDERING_MOVES and ActionValue.LANE_FOLLOW in move.act.slots
         states = move.act.move is DialogueMove.EXPLAIN and any(said.predicate in _HOW_FAR for said in move.meaning)
         if orders or states:
             yield Case(_METRES.search(move.span) is None, move.start, move.span)
@@ -41,7 +40,7 @@ def own_stops(session: Session) -> Iterator[Case]:
     """Yields the participant's questions why the car stands; wrong are those after its own order to stop."""
     ordered = -STOPPED_WITHIN
     for move in session.moves(Role.PARTICIPANT):
-        if move.act.move in _ORDERING and move.act.values(Slot.ACTION):
+        if move.act.move in ORDERING_MOVES and move.act.values(Slot.ACTION):
             ordered = move.end if ActionValue.STOP in move.act.slots else -STOPPED_WITHIN
         if move.act.move is DialogueMove.QUERY_W and any(map(_asks_why_standing, move.meaning)):
             yield Case(move.start - ordered >= STOPPED_WITHIN, move.start, move.span)
@@ -64,7 +63,7 @@ def destinations_asked_for(session: Session) -> Iterator[Case]:
 
 def _names_destination(move: MoveRecord) -> bool:
     named = move.act.values(Slot.LANDMARK) and _LATER.isdisjoint(move.act.slots) and not move.act.values(Slot.ACTION)
-    return move.act.move in _ORDERING and bool(named)
+    return move.act.move in ORDERING_MOVES and bool(named)
 
 
 def _asks_why_standing(asked: Proposition) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case, judged
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.session.recording.events import EventType, UtteranceRecord
@@ -41,15 +41,13 @@ SETTLING: Final = 5.0
 TURNED: Final = 40.0
 """Change of the heading of a car that turns [degrees]."""
 
-_SIGNS: Final = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
-_ORDERING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _WAYS: Final = frozenset({ActionValue.J_TURN, ActionValue.U_TURN})
 
 
 def signs(session: Session) -> Iterator[Case]:
     """Yields the Co-Wizard's utterances with a plain "okay" or "will do"; wrong are those with two of them."""
     for said in session.utterances(Role.CO_WIZARD):
-        plain = sum(move.act.move in _SIGNS and not move.act.slots for move in said.moves)
+        plain = sum(move.act.move in SIGNS_OF_HEARING and not move.act.slots for move in said.moves)
         if plain:
             yield judged(plain == 1, said)
 
@@ -63,7 +61,7 @@ def orders_after_confirmation(session: Session) -> Iterator[Case]:
     taken: UtteranceRecord | None = None
     for said in session.utterances():
         if said.speaker is Role.CO_WIZARD:
-            takes_up = said.moves[0].act.move in _SIGNS
+            takes_up = said.moves[0].act.move in SIGNS_OF_HEARING
             taken = said if former is not None and takes_up and said.start - former.end < AT_ONCE else None
         elif _ways(said):
             if former is not None and taken is not None and not _has_turned(session, former.start, said.end + SETTLING):
@@ -76,7 +74,7 @@ def own_doing(session: Session) -> Iterator[Case]:
     """Yields the participant's questions why the car turns round; wrong are those after its own order to do so."""
     ordered = -np.inf
     for move in session.moves(Role.PARTICIPANT):
-        if move.act.move in _ORDERING and ActionValue.U_TURN in move.act.slots:
+        if move.act.move in ORDERING_MOVES and ActionValue.U_TURN in move.act.slots:
             ordered = move.end
         if move.act.move is DialogueMove.QUERY_W and any(map(_asks_why_turning, move.meaning)):
             yield Case(move.start - ordered > OBEYED, move.start, move.span)
@@ -91,7 +89,7 @@ def arrivals_without_creeping(session: Session) -> Iterator[Case]:
     times = [event.time for event in session.of_type(EventType.SUBGOAL) if event.data.get("cause") == "arrival"]
     for begin, end in itertools.pairwise([0.0, *times]):
         errand = [move for move in moves if begin < move.end <= end]
-        if any(move.act.move in _ORDERING and ActionValue.STOP in move.act.slots for move in errand):
+        if any(move.act.move in ORDERING_MOVES and ActionValue.STOP in move.act.slots for move in errand):
             creeps = [move for move in errand if _creeps(move)]
             yield Case(len(creeps) <= MOST_CREEPING, end, " / ".join(move.span for move in creeps))
 
@@ -112,7 +110,7 @@ def _ways(said: UtteranceRecord) -> list[tuple[ActionValue, Direction | None]]:
     found = []
     for move in said.moves:
         ways = [value for value in move.act.values(Slot.ACTION) if isinstance(value, ActionValue) and value in _WAYS]
-        if move.act.move in _ORDERING and ways:
+        if move.act.move in ORDERING_MOVES and ways:
             found.append((ways[0], understand(move.span).direction))
     return found
 
@@ -132,7 +130,7 @@ def _asks_why_turning(asked: Proposition) -> bool:
 
 
 def _creeps(move: MoveRecord) -> bool:
-    if move.act.move not in _ORDERING or ActionValue.LANE_FOLLOW not in move.act.slots:
+    if move.act.move not in ORDERING_MOVES or ActionValue.LANE_FOLLOW not in move.act.slots:
         return False
     words = understand(move.span)
     return words.further or (words.distance is not None and words.distance <= 20)
