@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from typing import Annotated
 
@@ -31,6 +32,9 @@ from dorothie_gym.cli.submit import submit
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 from dorothie_gym.cli.warm_up import warm_up
+from dorothie_gym.support.interruption import end_process
+
+_INTERRUPTED = (128 + signal.SIGINT, 128 + signal.SIGTERM)
 
 app = typer.Typer(
     name="dorothie-gym",
@@ -92,4 +96,9 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # terminals print "?" for letters that they cannot encode
-    app(prog_name="dorothie-gym")
+    try:
+        app(prog_name="dorothie-gym")
+    except SystemExit as ending:
+        if ending.code in _INTERRUPTED:
+            end_process(ending.code)
+        raise

@@ -14,11 +14,12 @@ from tests.forked_commands import start_command
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows does not delete open files")
 
 COMMANDS: dict[str, tuple[str, ...]] = {
-    "generate": ("generate", "--sessions", "12", "--max-seconds", "8", "--workers", "1"),
-    "generate with two workers": ("generate", "--sessions", "12", "--max-seconds", "8", "--workers", "2"),
-    "rollout": ("rollout", "--sessions", "12", "--max-seconds", "8", "--workers", "1"),
-    "run": ("run", "--max-seconds", "8", "--speed", "4", "--no-picture"),
+    "generate": ("generate", "--sessions", "60", "--max-seconds", "8", "--workers", "1"),
+    "generate with two workers": ("generate", "--sessions", "60", "--max-seconds", "8", "--workers", "2"),
+    "rollout": ("rollout", "--sessions", "60", "--max-seconds", "8", "--workers", "1"),
+    "run": ("run", "--max-seconds", "8", "--speed", "1", "--no-picture"),
 }
+"""Commands by name; each goes on for eight seconds and more, so that the folder is deleted while it writes."""
 
 
 @pytest.mark.long

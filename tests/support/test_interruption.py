@@ -67,3 +67,20 @@ def run(program: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, timeout=60, check=False
     )
+
+
+def test_an_interrupted_process_ends_before_its_modules_are_taken_apart() -> None:
+    done = run("""
+        import atexit, os, sys
+        from dorothie_gym.support.interruption import end_process
+
+        class Library:
+            def __del__(self):
+                os.abort()  # as C code does that was cut off and frees its memory again
+
+        library = Library()
+        atexit.register(print, "exit function")
+        print("buffered")
+        end_process(130)
+    """)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "buffered\nexit function\n", "")
