@@ -9,10 +9,11 @@ from dorothie_gym.dialogue import Predicate
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueMove, Slot
 from dorothie_gym.policies.participant.given_orders import note_said
-from dorothie_gym.policies.participant.guidance import guide
+from dorothie_gym.policies.participant.guidance import guide, watch
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import remark_on_miss, remark_on_wrong_turn
 from dorothie_gym.policies.participant.state import StepKey
+from dorothie_gym.policies.route_state import section
 from tests.policies.test_arriving import Guide
 
 
@@ -106,6 +107,17 @@ def test_turn_that_was_not_taken_twice_is_avoided():
     assert remark_on_wrong_turn(human.state, human.view, step)
     assert predicates(human) == [Predicate.TRIED, Predicate.WILL]
     assert connector in [place[0] for place in human.state.route.avoided]
+
+
+@pytest.mark.parametrize(("times", "guides"), [(2, False), (3, True)])
+def test_car_that_comes_along_for_the_third_time_is_guided(times, guides):
+    human = Guide(200.0, speed=8.0)
+    human.state.guidance = replace(human.state.guidance, guiding=False, best=np.inf)
+    here = section(human.env.town, human.view.lane)
+    human.state.route = replace(human.state.route, driven=(here, (here[0] + 1, here[1])) * times)
+    watch(human.state, human.view)
+    assert human.state.guidance.guiding is guides
+    assert predicates(human) == [Predicate.TRIED] * guides
 
 
 def test_car_that_stands_although_told_to_start_twice_is_asked_why():

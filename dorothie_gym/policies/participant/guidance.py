@@ -31,6 +31,7 @@ from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
     IN_VAIN,
+    been_here,
     remark_on_miss,
     remark_on_wrong_turn,
     stop_circling,
@@ -48,6 +49,7 @@ from dorothie_gym.policies.participant.telling_way import (
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
+from dorothie_gym.policies.route_state import section
 from dorothie_gym.policies.scripted_agent_limits import CALM_SPEED, reach_at
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, turn_lanes
@@ -154,7 +156,7 @@ def _wrong_way(state: ParticipantState, expires: float = math.inf, topic: str = 
 
 
 def watch(state: ParticipantState, view: ParticipantView) -> None:
-    """Begins to guide a car that makes a long detour or stands for a long time."""
+    """Begins to guide a car that makes a long detour, comes along for the third time, or stands for a long time."""
     progress, config = state.route.progress, state.config
     if state.guidance.guiding or progress is None or not state.task.announced:
         return
@@ -167,8 +169,11 @@ def watch(state: ParticipantState, view: ParticipantView) -> None:
         state.guidance = replace(state.guidance, best=left)  # it is said once of one detour
         if not turned_round_lately(state, view):
             state.say(_wrong_way(state, topic="heading_away"))
+    circles = state.route.driven.count(section(state.town, view.lane)) > IN_VAIN
+    if circles and not lost:
+        state.say(been_here(view))
     stuck = state.motion.standstill(view.time) > config.lost_standstill and view.time > state.motion.excused_until
-    if lost or stuck:
+    if lost or circles or stuck:
         state.set_guiding(True)
 
 

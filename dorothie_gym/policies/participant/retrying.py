@@ -64,8 +64,8 @@ def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bo
         reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
     else:
         here = section(state.town, view.lane)
-        been_here = state.route.driven.count(here) >= IN_VAIN
-        reason = _in_vain(view, None, "been_here" if been_here else "tried")
+        again = state.route.driven.count(here) >= IN_VAIN
+        reason = been_here(view) if again else _in_vain(view, None, "tried")
     _try_another_way(state, view, reason)
     state.say(*(replace(slower, joined=True) for slower in _more_slowly(state, view)))
 
@@ -122,6 +122,11 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     else:
         tried = _in_vain(view, ActionValue.U_TURN, "tried_u_turn")
     _try_another_way(state, view, tried)
+
+
+def been_here(view: ParticipantView) -> Remark:
+    """Returns the remark that the car comes along here again."""
+    return _in_vain(view, None, "been_here")
 
 
 def why_standing(state: ParticipantState, view: ParticipantView) -> Remark:
