@@ -116,10 +116,11 @@ STORES: Final[Mapping[LandmarkName, StoreDesign]] = MappingProxyType(
 MIDDLE_STRIPE: Final[Colour] = (208, 30, 44)
 """Colour of the stripe between those of accent and fascia (`Top.STRIPED`)."""
 
-_WALLS: Final[tuple[Colour, ...]] = (
-    (46, 178, 184), (246, 214, 62), (126, 92, 168), (58, 104, 190), (92, 158, 84), (240, 140, 46),
-)  # fmt: skip
-"""Colours of houses; none has the everyday name of a colour of the facades of other buildings, but for glass fronts."""
+_WALLS: Final[tuple[Colour, ...]] = ((46, 178, 184), (242, 222, 56), (126, 92, 168), (58, 104, 190), (92, 158, 84))
+"""Colours of houses; none has the everyday name of a colour of the facades of other buildings, but for glass fronts.
+
+They keep their names in the shade: yellow is without red, because dark orange is brown.
+"""
 
 _ROOFS: Final[tuple[Colour, ...]] = ((206, 44, 38), (34, 34, 38), (242, 242, 238), (104, 60, 36), (224, 198, 152))
 
@@ -130,16 +131,16 @@ _MOST_STOREYS: Final = 3
 _GARDENS: Final = tuple(Garden)
 
 _COATS: Final[tuple[Colour, ...]] = (
-    (250, 216, 30), (206, 36, 40), (40, 150, 70), (44, 92, 200), (128, 70, 170), (240, 132, 30), (36, 176, 180),
+    (248, 226, 40), (206, 36, 40), (40, 150, 70), (44, 92, 200), (128, 70, 170), (36, 176, 180),
 )  # fmt: skip
 
-_TROUSERS: Final[tuple[Colour, ...]] = ((40, 60, 140), (236, 234, 228), (24, 24, 26), (112, 68, 38), (128, 128, 128))
-"""Trousers; the last is gray. Together with `_COATS`, 35 sites differ."""
+_TROUSERS: Final[tuple[Colour, ...]] = ((40, 60, 140), (236, 234, 228), (24, 24, 26), (112, 68, 38), (190, 40, 44))
+"""Trousers; none is gray, as white ones look in the shade. Together with `_COATS`, 30 sites differ."""
 
 
 def site_key(town: str, site: int) -> int:
     """Returns the number that determines the design of a house or person, from the town's name and the site's id."""
-    return zlib.crc32(town.encode()) % 420 + site  # 420: the designs of houses and of people repeat
+    return zlib.crc32(town.encode()) % 180 + site  # 180: all designs of houses and of people
 
 
 def house_design(key: int) -> HouseDesign:
@@ -151,7 +152,7 @@ def house_design(key: int) -> HouseDesign:
     """
     storey, garden, roof = key % _MOST_STOREYS, key % len(_GARDENS), key % len(_ROOFS)
     return HouseDesign(
-        wall=_WALLS[(2 * storey + garden - roof) % len(_WALLS)],
+        wall=_WALLS[(storey + garden - roof) % len(_WALLS)],
         roof=_ROOFS[roof],
         trim=_TRIMS[(key + key // (_MOST_STOREYS * len(_GARDENS) * len(_ROOFS))) % len(_TRIMS)],
         storeys=1 + storey,

@@ -64,7 +64,7 @@ def test_neighbours_differ_in_every_colour():
 
 
 def test_two_of_sixty_houses_differ_in_two_of_colour_storeys_roof_and_garden():
-    for first in (0, 31, 400):
+    for first in (0, 31, 170):
         looks = [
             (colour_name(house.wall), house.storeys, colour_name(house.roof), house.garden)
             for house in map(house_design, range(first, first + 60))
@@ -77,9 +77,9 @@ def test_designs_of_a_kind_are_equally_frequent():
     for attribute in ("wall", "roof", "storeys", "garden", "trim"):
         counts = Counter(getattr(house_design(key), attribute) for key in range(180))
         assert len(set(counts.values())) == 1
-    assert len({(design.coat, design.trousers) for design in map(person_design, range(35))}) == 35
+    assert len({(design.coat, design.trousers) for design in map(person_design, range(30))}) == 30
 
 
 def test_towns_differ_in_the_designs_of_their_first_site():
-    assert len({house_design(site_key(f"generated:{seed}", 0)).wall for seed in range(30)}) >= 5
+    assert len({house_design(site_key(f"generated:{seed}", 0)).wall for seed in range(30)}) == 5
     assert site_key("midtown", 3) == site_key("midtown", 0) + 3

@@ -50,6 +50,7 @@ _HOUSE_STOREY = 3.0  # [m] height of a storey of a house
 _TREE = 1.1, 0.9  # [m] radius of the tree beside a house, and distance of its trunk from the wall
 _HOUSE_DEPTH = 8.2  # [m] largest depth of a house
 _NEAREST, _FRONT_GARDEN = 0.8, 3.0  # [m] least and largest depth of its front garden
+_SLOPES = {1: 0.45, 2: 0.65, 3: 1.0}  # of the roof by storeys: visible above the eaves, and smaller than the walls
 _HIPPED = 2  # neighbours in a row with the same form of roof
 _METAL: Rgb = (178, 180, 182)
 _ROOF: Rgb = (128, 126, 124)
@@ -349,7 +350,7 @@ def _house(works: _Works) -> None:
     add_roof(
         works.builder, Roof.HIPPED if lot.key // _HIPPED % 2 else Roof.ALONG, lot.at((deep[0] + deep[1]) / 2.0, 0.0),
         lot.heading, (deep[1] - deep[0], length), works.base + walls, tiles=design.roof,
-        gable=np.array(design.wall, dtype=np.float64), slope=1.0,
+        gable=np.array(design.wall, dtype=np.float64), slope=_SLOPES[design.storeys],
     )  # fmt: skip
     works.panel(deep[0] - 0.03, 0.0, 1.1, 1.2, 2.2, texture=Texture.DOOR)
     for storey in range(design.storeys):
