@@ -27,7 +27,7 @@ class Appearance:
         facade: colour of the walls of a house.
         storeys: number of its storeys.
         roof: colour of its roof.
-        tree: whether a tree stands beside it; only True is ever stated.
+        garden: what is in front of it or beside it: "tree", "hedge", "fence" or "flowers".
         frames: colour of its window frames.
         coat: colour of the coat of a person.
         trousers: colour of the trousers.
@@ -36,7 +36,7 @@ class Appearance:
     facade: str | None = None
     storeys: int | None = None
     roof: str | None = None
-    tree: bool | None = None
+    garden: str | None = None
     frames: str | None = None
     coat: str | None = None
     trousers: str | None = None
@@ -64,7 +64,10 @@ class Appearance:
     def features(self) -> tuple[str, ...]:
         """Noun phrases of the attributes: "a yellow facade", "two storeys"."""
         said = self.stated
-        return tuple(_FEATURES[name].format(_article(value), value, _storeys(value)) for name, value in said.items())
+        return tuple(
+            _garden(value) if name == "garden" else _FEATURES[name].format(_article(value), value, _storeys(value))
+            for name, value in said.items()
+        )
 
     @property
     def listed(self) -> str:
@@ -78,7 +81,7 @@ class Appearance:
             return ""
         size = f"{_COUNTS.get(self.storeys, self.storeys)}-storey " if self.storeys is not None else ""
         parts = [f"the {self.roof} roof"] if self.roof is not None else []
-        parts += ["the tree beside it"] if self.tree else []
+        parts += [f"the {_GARDENS[self.garden]}"] if self.garden is not None else []
         parts += [f"the {self.frames} window frames"] if self.frames is not None else []
         return f"the {self.facade} {size}house" + (f" with {enumeration(parts)}" if parts else "")
 
@@ -116,38 +119,45 @@ def read_look(text: str) -> Appearance:
         value = next((group for group in match.groups() if group is not None), "")
         if name == "storeys":
             found[name] = _NUMBERS.get(value, 0)
-        elif name == "tree":
-            found[name] = True
+        elif name == "garden":
+            found[name] = next(kind for kind in _GARDENS if kind in match.group())
         else:
             found[name] = _SPELT.get(value, value)
     return Appearance(**found)
 
 
+_GARDENS: Final = MappingProxyType(
+    {
+        "tree": "tree beside it",
+        "hedge": "hedge in front",
+        "fence": "white fence in front",
+        "flowers": "flowers in front",
+    }
+)
 _FEATURES: Final = MappingProxyType(
     {
         "facade": "{0} facade",
         "storeys": "{2}",
         "roof": "{0} roof",
-        "tree": "a tree beside it",
         "frames": "{1} window frames",
         "coat": "{0} coat",
         "trousers": "{1} trousers",
     }
 )
-_NUMBERS: Final = MappingProxyType({"one": 1, "single": 1, "1": 1, "two": 2, "2": 2})
-_COUNTS: Final[Mapping[object, str]] = MappingProxyType({1: "one", 2: "two"})
+_NUMBERS: Final = MappingProxyType({"one": 1, "single": 1, "1": 1, "two": 2, "2": 2, "three": 3, "3": 3})
+_COUNTS: Final[Mapping[object, str]] = MappingProxyType({1: "one", 2: "two", 3: "three"})
 _SPELT: Final = MappingProxyType({"grey": "gray"})
 _COLOUR: Final = f"({'|'.join((*COLOURS, 'grey'))})"
-_SIZE: Final = r"(?:(?:one|single|two|[12])[- ]stor\w+ )?"
+_SIZE: Final = r"(?:(?:one|single|two|three|[123])[- ]stor\w+ )?"
 _PATTERNS: Final = MappingProxyType(
     {
         name: re.compile(pattern)
         for name, pattern in {
             "facade": rf"\b{_COLOUR} {_SIZE}(?:facade|walls?|front|house|building|one)\b"
             rf"|\b(?:house|building|facade|walls?) (?:is|are) {_COLOUR}\b",
-            "storeys": r"\b(one|single|two|[12])[- ](?:stor(?:ey|eys|y|ies)|floors?)\b",
+            "storeys": r"\b(one|single|two|three|[123])[- ](?:stor(?:ey|eys|y|ies)|floors?)\b",
             "roof": rf"\b{_COLOUR} roof\b|\broof is {_COLOUR}\b",
-            "tree": r"\b(?:a|the) tree\b",
+            "garden": r"\b(?:a|the) (?:tree|hedge)\b|\b(?:a|the)(?: white)? fence\b|\bflowers in front\b",
             "frames": rf"\b{_COLOUR} (?:window frames|windows|frames)\b",
             "coat": rf"\b{_COLOUR} (?:coat|jacket)\b|\b(?:coat|jacket) is {_COLOUR}\b",
             "trousers": rf"\b{_COLOUR} (?:trousers|pants)\b",
@@ -159,6 +169,11 @@ _PATTERNS: Final = MappingProxyType(
 def _article(value: object) -> str:
     word = str(value)
     return f"{'an' if word[:1] in 'aeiou' else 'a'} {word}"
+
+
+def _garden(kind: str) -> str:
+    words = _GARDENS[kind]
+    return words if kind == "flowers" else _article(words)
 
 
 def _storeys(value: object) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dorothie_gym.dialogue.looks import Appearance, distinguishing
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.tasks.landmark_designs import colour_name, house_design, person_design
+from dorothie_gym.tasks.landmark_designs import colour_name, house_design, person_design, site_key
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
@@ -28,14 +28,14 @@ def look_at(town: Town, name: LandmarkName, x: float, y: float) -> Appearance | 
     if distance > _AT_SITE:
         return None
     if name is LandmarkName.PERSON:
-        clothes = person_design(site)
+        clothes = person_design(site_key(town.name, site))
         return Appearance(coat=colour_name(clothes.coat), trousers=colour_name(clothes.trousers))
-    house = house_design(site)
+    house = house_design(site_key(town.name, site))
     return Appearance(
         facade=colour_name(house.wall),
         storeys=house.storeys,
         roof=colour_name(house.roof),
-        tree=True if house.tree else None,
+        garden=str(house.garden),
         frames=colour_name(house.trim),
     )
 

@@ -1,13 +1,15 @@
 """Designs of the landmarks: forms and colours of buildings and people, as the camera draws and speakers describe them.
 
-A brand looks the same everywhere. Houses and people differ by their site, so that no two of a town look alike. Their
-colours are rare among the other buildings and the people in the streets. The designs are our own.
+A brand looks the same everywhere. Houses and people differ by town and site, so that no two of a town look alike: of
+60 houses, any two differ in at least two of colour, storeys, roof and garden. Their colours are rare among the other
+buildings and the people in the streets. The designs are our own.
 """
 
 from __future__ import annotations
 
 import colorsys
 import enum
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -59,23 +61,32 @@ class StoreDesign:
     most: tuple[float, float] = (17.0, 12.0)
 
 
+class Garden(enum.StrEnum):
+    """What grows or stands beside or in front of a house."""
+
+    TREE = "tree"
+    HEDGE = "hedge"
+    FENCE = "fence"
+    FLOWERS = "flowers"
+
+
 @dataclass(frozen=True)
 class HouseDesign:
     """Form and colours of a house.
 
     Attributes:
         wall: colour of the walls.
-        roof: colour of the gabled roof.
-        trim: colour of the frames of the windows, and of the gable.
+        roof: colour of the roof.
+        trim: colour of the frames of the windows.
         storeys: number of storeys.
-        tree: whether a tree stands beside it.
+        garden: a tree beside it, or what is in front of it.
     """
 
     wall: Colour
     roof: Colour
     trim: Colour
     storeys: int
-    tree: bool
+    garden: Garden
 
 
 @dataclass(frozen=True)
@@ -105,35 +116,53 @@ STORES: Final[Mapping[LandmarkName, StoreDesign]] = MappingProxyType(
 MIDDLE_STRIPE: Final[Colour] = (208, 30, 44)
 """Colour of the stripe between those of accent and fascia (`Top.STRIPED`)."""
 
-_WALLS: Final[tuple[Colour, ...]] = ((46, 178, 184), (240, 202, 70), (126, 92, 168), (58, 104, 190), (92, 158, 84))
-"""Colours of houses; none has the everyday name of a colour of the facades of other buildings, but for glass fronts."""
+_WALLS: Final[tuple[Colour, ...]] = ((46, 178, 184), (242, 222, 56), (126, 92, 168), (58, 104, 190), (92, 158, 84))
+"""Colours of houses; none has the everyday name of a colour of the facades of other buildings, but for glass fronts.
 
-_ROOFS: Final[tuple[Colour, ...]] = ((222, 74, 36), (34, 34, 38), (242, 242, 238), (104, 60, 36), (240, 140, 34))
+They keep their names in the shade: yellow is without red, because dark orange is brown.
+"""
 
-_TRIMS: Final[tuple[Colour, ...]] = ((250, 250, 246), (30, 30, 32), (250, 250, 246), (206, 44, 38))
+_ROOFS: Final[tuple[Colour, ...]] = ((206, 44, 38), (34, 34, 38), (242, 242, 238), (104, 60, 36), (224, 198, 152))
 
-_COATS: Final[tuple[Colour, ...]] = ((250, 216, 30), (206, 36, 40), (40, 150, 70), (44, 92, 200), (128, 70, 170))
+_TRIMS: Final[tuple[Colour, ...]] = ((250, 250, 246), (30, 30, 32), (206, 44, 38))
 
-_TROUSERS: Final[tuple[Colour, ...]] = ((40, 60, 140), (236, 234, 228), (24, 24, 26), (112, 68, 38), (128, 128, 128))
-"""Trousers; the last is gray. Together with `_COATS`, 25 sites differ."""
+_MOST_STOREYS: Final = 3
+
+_GARDENS: Final = tuple(Garden)
+
+_COATS: Final[tuple[Colour, ...]] = (
+    (248, 226, 40), (206, 36, 40), (40, 150, 70), (44, 92, 200), (128, 70, 170), (36, 176, 180),
+)  # fmt: skip
+
+_TROUSERS: Final[tuple[Colour, ...]] = ((40, 60, 140), (236, 234, 228), (24, 24, 26), (112, 68, 38), (190, 40, 44))
+"""Trousers; none is gray, as white ones look in the shade. Together with `_COATS`, 30 sites differ."""
 
 
-def house_design(site: int) -> HouseDesign:
-    """Returns the design of a house by the id of its site: neighbouring sites differ in every colour."""
-    row = site // len(_WALLS)
+def site_key(town: str, site: int) -> int:
+    """Returns the number that determines the design of a house or person, from the town's name and the site's id."""
+    return zlib.crc32(town.encode()) % 180 + site  # 180: all designs of houses and of people
+
+
+def house_design(key: int) -> HouseDesign:
+    """Returns the design of a house by the key of its site: neighbouring sites differ in every colour.
+
+    Storeys, garden and roof have numbers of values without a common divisor, so that 60 successive keys have all of
+    their combinations (Chinese remainder theorem). The colour is another for every value of each of them. Two of 60
+    houses therefore differ in at least two of the four, like words of a code with a checksum.
+    """
+    storey, garden, roof = key % _MOST_STOREYS, key % len(_GARDENS), key % len(_ROOFS)
     return HouseDesign(
-        wall=_WALLS[site % len(_WALLS)],
-        roof=_ROOFS[(site + row) % len(_ROOFS)],
-        trim=_TRIMS[(site + row) % len(_TRIMS)],
-        storeys=1 + (site + row // 2) % 2,
-        tree=(site // 2 + row) % 3 == 0,
+        wall=_WALLS[(storey + garden - roof) % len(_WALLS)],
+        roof=_ROOFS[roof],
+        trim=_TRIMS[(key + key // (_MOST_STOREYS * len(_GARDENS) * len(_ROOFS))) % len(_TRIMS)],
+        storeys=1 + storey,
+        garden=_GARDENS[garden],
     )
 
 
-def person_design(site: int) -> PersonDesign:
-    """Returns the clothes of a person by the id of the site."""
-    row = site // len(_COATS)
-    return PersonDesign(coat=_COATS[site % len(_COATS)], trousers=_TROUSERS[(site + row) % len(_TROUSERS)])
+def person_design(key: int) -> PersonDesign:
+    """Returns the clothes of a person by the key of the site."""
+    return PersonDesign(coat=_COATS[key % len(_COATS)], trousers=_TROUSERS[key % len(_TROUSERS)])
 
 
 @lru_cache(maxsize=64)

@@ -8,15 +8,16 @@ import pytest
 
 from dorothie_gym.dialogue.looks import COLOURS, Appearance, distinguishing, read_look
 
+GARDENS = ("tree", "hedge", "fence", "flowers", None)
 HOUSES = [
-    Appearance(facade=facade, storeys=storeys, roof=roof, tree=tree)
-    for facade, storeys, roof, tree in itertools.product(("yellow", "blue"), (1, 2), ("red", "black"), (True, None))
+    Appearance(facade=facade, storeys=storeys, roof=roof, garden=garden)
+    for facade, storeys, roof, garden in itertools.product(("yellow", "blue"), (1, 2, 3), ("red", "black"), GARDENS)
 ]
 
 
 @pytest.mark.parametrize("house", HOUSES)
 def test_what_is_stated_tells_the_house_from_the_others(house: Appearance) -> None:
-    others = [other for other in HOUSES if other != house and not (other.tree and house.tree is None)]
+    others = [other for other in HOUSES if other != house and not (other.garden and house.garden is None)]
     stated = distinguishing(house, others)
     assert stated.fits(house)
     assert not any(stated.fits(other) for other in others)
@@ -47,7 +48,10 @@ def test_clothes_are_read(colour: str) -> None:
     [
         ("the house is green", Appearance(facade="green")),
         ("it's the blue one", Appearance(facade="blue")),
-        ("a grey two-story building with a tree in front", Appearance(facade="gray", storeys=2, tree=True)),
+        ("a grey two-story building with a tree in front", Appearance(facade="gray", storeys=2, garden="tree")),
+        ("it has three floors and a white fence", Appearance(storeys=3, garden="fence")),
+        ("the one with the hedge", Appearance(garden="hedge")),
+        ("i bought her some flowers", Appearance()),
         ("turn left at the red light", Appearance()),
         ("the second house on the left", Appearance()),
         ("is he in the red jacket?", Appearance(coat="red")),

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from dorothie_gym.dialogue.looks import COLOURS
 from dorothie_gym.maps.catalogue import load_town, town_names
 from dorothie_gym.ontology import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.pictures.camera.scenery.landmarks import landmark_form
@@ -14,8 +15,9 @@ from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.scenery.placing import FlatGround
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.place_looks import distinguishing_look, look_at, look_of
-from dorothie_gym.tasks.landmark_designs import colour_name
+from dorothie_gym.tasks.landmark_designs import colour_name, house_design, site_key
 
+PARTS = ("facade", "storeys", "roof", "garden")
 KINDS = (LandmarkName.HOUSE, LandmarkName.PERSON)
 
 
@@ -58,13 +60,31 @@ def test_the_camera_draws_what_is_said(name: LandmarkName) -> None:
     town = load_town("brookside")
     for site in town.sites:
         look = look_at(town, name, *site.position)
-        form = landmark_form(name, Lot(site.id, site.position, 0.0, site.position, 20.0, 15.0), FlatGround())
+        key = site_key(town.name, site.id)
+        form = landmark_form(name, Lot(site.id, site.position, 0.0, site.position, 20.0, 15.0, key), FlatGround())
         drawn = {colour_name(tuple(colour)) for colour in np.unique(form.colours.reshape(-1, 3), axis=0).tolist()}
-        assert {value for value in look.stated.values() if isinstance(value, str)} <= drawn
+        assert {value for value in look.stated.values() if value in COLOURS} <= drawn
         if name is LandmarkName.HOUSE:
-            top = float(form.corners[form.classes == ObjectClass.BUILDING.value][..., 2].max())
-            assert (top > 7.5) is (look.storeys == 2)
-            assert bool((form.classes == ObjectClass.VEGETATION.value).any()) is bool(look.tree)
+            walls = form.corners[(form.colours == house_design(key).wall).all(axis=1)]
+            assert 3.0 * look.storeys < float(walls[..., 2].max()) < 3.0 * look.storeys + 6.0
+            classes = set(form.classes.tolist())
+            assert (ObjectClass.FENCE.value in classes) is (look.garden == "fence")
+            assert (ObjectClass.VEGETATION.value in classes) is (look.garden != "fence")
+
+
+def test_two_houses_of_a_street_differ_in_two_of_colour_storeys_roof_and_garden() -> None:
+    alike = count = 0
+    for name in (*town_names(), *(f"generated:{seed}" for seed in (3, 11, 19))):
+        town = load_town(name)
+        streets = [town.lanes[site.lane].street for site in town.sites]
+        looks = [look_at(town, LandmarkName.HOUSE, *site.position) for site in town.sites]
+        for k, i in itertools.combinations(range(len(looks)), 2):
+            if streets[k] == streets[i]:
+                one, other = looks[k], looks[i]
+                differing = sum(getattr(one, part) != getattr(other, part) for part in PARTS)
+                alike, count = alike + (differing < 2), count + 1
+    assert count > 100
+    assert alike <= 0.05 * count
 
 
 def test_brands_and_other_places_have_no_individual_look() -> None:

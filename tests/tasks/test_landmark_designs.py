@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
+
 import pytest
 
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.tasks.landmark_designs import STORES, colour_name, features_of, house_design, person_design
+from dorothie_gym.tasks.landmark_designs import (
+    STORES,
+    colour_name,
+    features_of,
+    house_design,
+    person_design,
+    site_key,
+)
 
 NAMELESS = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 INDIVIDUAL = (LandmarkName.HOUSE, LandmarkName.PERSON)
@@ -41,11 +51,35 @@ def test_brands_differ_in_what_they_look_like():
 
 
 def test_neighbours_differ_in_every_colour():
-    for site in range(40):
-        house, beside = house_design(site), house_design(site + 1)
+    for key in range(120):
+        house, beside = house_design(key), house_design(key + 1)
         assert house.wall != beside.wall
         assert house.roof != beside.roof
-        person, next_one = person_design(site), person_design(site + 1)
+        assert house.garden is not beside.garden
+        assert house.storeys != beside.storeys
+        person, next_one = person_design(key), person_design(key + 1)
         assert person.coat != next_one.coat
         assert person.trousers != next_one.trousers
         assert colour_name(house.wall) != colour_name(house.roof)
+
+
+def test_two_of_sixty_houses_differ_in_two_of_colour_storeys_roof_and_garden():
+    for first in (0, 31, 170):
+        looks = [
+            (colour_name(house.wall), house.storeys, colour_name(house.roof), house.garden)
+            for house in map(house_design, range(first, first + 60))
+        ]
+        for one, other in itertools.combinations(looks, 2):
+            assert sum(a != b for a, b in zip(one, other, strict=True)) >= 2
+
+
+def test_designs_of_a_kind_are_equally_frequent():
+    for attribute in ("wall", "roof", "storeys", "garden", "trim"):
+        counts = Counter(getattr(house_design(key), attribute) for key in range(180))
+        assert len(set(counts.values())) == 1
+    assert len({(design.coat, design.trousers) for design in map(person_design, range(30))}) == 30
+
+
+def test_towns_differ_in_the_designs_of_their_first_site():
+    assert len({house_design(site_key(f"generated:{seed}", 0)).wall for seed in range(30)}) == 5
+    assert site_key("midtown", 3) == site_key("midtown", 0) + 3

@@ -19,6 +19,9 @@ from dorothie_gym.support.copying import shared
 SIGN_SIZE = 256, 64
 """Width and height of panels with words [px]."""
 
+PLATES = 16
+"""Number of different number plates, a power of two."""
+
 STREET_INK: Ink = (255, 255, 255)
 STREET_GROUND: Ink = (0, 96, 60)
 """Colours of street-name blades: white on green (MUTCD 2009, 2D.43)."""
@@ -49,7 +52,7 @@ class Texture(enum.IntEnum):
     GLASS_FRONT = 13
     """Glazed front of a shop, lit at night: four panes."""
     PLATE = 14
-    """Number plate."""
+    """Number plates, `PLATES` of them one above the other."""
     STOP = 15
     YIELD = 16
     WORKS = 17
@@ -167,7 +170,7 @@ def town_atlas() -> AtlasArrays:
         Texture.CONCRETE: patterns.concrete(),
         Texture.BARK: patterns.bark(),
         Texture.GLASS_FRONT: patterns.glass_front(),
-        Texture.PLATE: lettered("DRT 4127", (64, 16), ink=(24, 30, 60), ground=(236, 236, 230), rim=(60, 60, 70)),
+        Texture.PLATE: _plates(),
         Texture.STOP: lettered("STOP", (64, 64), ink=(255, 255, 255), ground=(190, 24, 32), margin=0.1),
         Texture.YIELD: lettered("YIELD", (64, 64), ink=(190, 24, 32), ground=(252, 252, 250), margin=0.26),
         Texture.WORKS: lettered("ROAD\nWORK", (64, 64), ink=(20, 20, 20), ground=(245, 132, 20), margin=0.22),
@@ -179,6 +182,14 @@ def town_atlas() -> AtlasArrays:
     for texture, words, ink, ground in BRAND_SIGNS.values():
         pictures[texture] = lettered(words, SIGN_SIZE, ink=ink, ground=ground, margin=0.14)
     return TextureAtlas(pictures[texture] for texture in Texture if texture != Texture.PLAIN).arrays()
+
+
+def _plates() -> Picture:
+    """Returns all number plates, the first one at the bottom."""
+    letters, digits = "ABDEFHKLMNPRSTVX", np.random.default_rng(4127).integers(1000, 10_000, PLATES)
+    words = [f"{letters[k]}{letters[(5 * k + 3) % 16]}{letters[(11 * k + 7) % 16]} {digits[k]}" for k in range(PLATES)]
+    plates = [lettered(text, (64, 16), ink=(24, 30, 60), ground=(236, 236, 230), rim=(60, 60, 70)) for text in words]
+    return np.concatenate(plates)
 
 
 @lru_cache(maxsize=1)

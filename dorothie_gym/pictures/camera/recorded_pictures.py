@@ -42,6 +42,7 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Record, RecordArray, empty_records, plain
 from dorothie_gym.support.portable_math import wrap_radians
+from dorothie_gym.tasks.landmark_designs import site_key
 from dorothie_gym.tasks.storyboard import Landmark
 
 if TYPE_CHECKING:
@@ -374,7 +375,7 @@ def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene)
         waypoint = float(stop[0]), float(stop[1])
         if site is None:
             site = len(lots)
-            lots.append(_own_lot(site, (row["x"], row["y"]), waypoint))
+            lots.append(_own_lot(site, (row["x"], row["y"]), waypoint, town.name))
         name = parse_landmark(row["name"])
         landmarks.append(
             Landmark(
@@ -386,7 +387,7 @@ def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene)
     return dataclasses.replace(scene, lots=tuple(lots)), landmarks
 
 
-def _own_lot(number: int, place: tuple[float, float], waypoint: tuple[float, float]) -> Lot:
+def _own_lot(number: int, place: tuple[float, float], waypoint: tuple[float, float], town: str) -> Lot:
     """Returns a lot behind a place, as seen from its waypoint on the road."""
     heading = pm.atan2(place[1] - waypoint[1], place[0] - waypoint[0]) if place != waypoint else 0.0
-    return Lot(number, place, heading, place, *_OWN_LOT)
+    return Lot(number, place, heading, place, *_OWN_LOT, site_key(town, number))

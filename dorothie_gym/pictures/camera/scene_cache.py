@@ -18,6 +18,7 @@ from dorothie_gym.pictures.camera.road_slopes import RoadSlopes
 from dorothie_gym.pictures.camera.scenery.lenses import Lenses
 from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.town_scene import TownScene
+from dorothie_gym.tasks.landmark_designs import site_key
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
@@ -71,7 +72,7 @@ def scene_of(arrays: Arrays, town: Town) -> TownScene:
     """
     mesh = table_of(arrays, "mesh", Mesh)
     lots = tuple(
-        Lot(int(site), (x, y), heading, (front_x, front_y), length, depth)
+        Lot(int(site), (x, y), heading, (front_x, front_y), length, depth, site_key(town.name, int(site)))
         for site, x, y, heading, front_x, front_y, length, depth in arrays["lots"].tolist()
     )
     return TownScene(

@@ -30,7 +30,7 @@ SIZES = [(20.0, 15.0), (10.0, 8.0), (4.0, 4.0)]
 
 def lot(length: float = 20.0, depth: float = 15.0) -> Lot:
     """A lot 10 m to the right of a street along x."""
-    return Lot(0, (40.0, 9.6), math.pi / 2.0, (40.0, 10.0), length, depth)
+    return Lot(0, (40.0, 9.6), math.pi / 2.0, (40.0, 10.0), length, depth, 0)
 
 
 def landmark(index: int, name: LandmarkName, site: int, *, hidden: bool = False, label: str = "House 1") -> Landmark:

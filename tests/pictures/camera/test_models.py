@@ -16,6 +16,7 @@ from dorothie_gym.pictures.camera.models.model_bank import (
     FIRST_CYCLIST,
     FIRST_PERSON,
     FIRST_PROP,
+    LAMP_STATES,
     MODELS,
     ModelBank,
     PlacementRecord,
@@ -25,11 +26,15 @@ from dorothie_gym.pictures.camera.models.model_bank import (
     place_bodies,
     vehicle_model,
 )
-from dorothie_gym.pictures.camera.models.people import POSES
+from dorothie_gym.pictures.camera.models.people import ADULTS, LOOKS, POSES
+from dorothie_gym.pictures.camera.models.vehicles import PAINTS, VehicleType
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH, CYCLIST_LENGTH, CYCLIST_WIDTH
 from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records
+
+CARS = range(0, FIRST_CYCLIST, len(PAINTS) * LAMP_STATES)
+"""A model of each type of cars."""
 
 
 def model(number: int) -> Mesh:
@@ -53,7 +58,7 @@ def test_the_bank_holds_all_models_one_after_the_other() -> None:
     assert bank.ranges[-1, 1] == bank.mesh.size
 
 
-@pytest.mark.parametrize("number", [0, 40, 80, 120])
+@pytest.mark.parametrize("number", CARS)
 def test_cars_fill_the_outline_of_the_simulation(number: int) -> None:
     low, high = model_bank().boxes[number]
     np.testing.assert_allclose(low[:2], (-CAR_LENGTH / 2, -CAR_WIDTH / 2), atol=0.02)
@@ -70,9 +75,13 @@ def test_cyclists_fill_the_outline_of_the_simulation() -> None:
 
 
 def test_people_stand_on_the_ground_in_all_phases() -> None:
-    boxes = model_bank().boxes[FIRST_PERSON:FIRST_PROP]
-    assert np.abs(boxes[:, 0, 2]).max() < 0.06
-    assert 1.6 < boxes[:, 1, 2].min() < boxes[:, 1, 2].max() < 1.95
+    boxes = model_bank().boxes
+    assert np.abs(boxes[FIRST_PERSON:FIRST_PROP, 0, 2]).max() < 0.06
+    for first, poses in ((FIRST_PERSON, POSES), (FIRST_COARSE, (FIRST_PROP - FIRST_COARSE) // len(LOOKS))):
+        tops = boxes[first : first + len(LOOKS) * poses, 1, 2]
+        adults, children = tops[: ADULTS * poses], tops[ADULTS * poses :]
+        assert 1.6 < adults.min() < adults.max() < 1.95
+        assert 1.1 < children.min() < children.max() < 1.35
 
 
 @pytest.mark.parametrize("kind", PropKind)
@@ -89,7 +98,7 @@ def test_models_have_few_triangles() -> None:
     assert sizes[FIRST_COARSE:FIRST_PROP].max() <= 60
 
 
-@pytest.mark.parametrize("number", [0, 40, 80, 120])
+@pytest.mark.parametrize("number", CARS)
 def test_a_car_hides_what_is_behind_it(number: int) -> None:
     """Rays through the body meet a triangle that faces them, from all around and from above."""
     mesh = model(number)
@@ -155,8 +164,32 @@ def test_a_key_chooses_the_looks_for_good() -> None:
     vehicles["x"][:], vehicles["heading"][:], vehicles["odometer"][:] = 50.0, 2.0, 99.0
     assert chosen == [vehicle_model(vehicle, False) for vehicle in vehicles]
     assert max(chosen) < FIRST_CYCLIST
-    shares = np.bincount(np.array(chosen) // 40, minlength=4) / len(chosen)
-    assert (shares > 0.05).all()  # of the four types
+    shares = np.bincount(np.array(chosen) // (len(PAINTS) * LAMP_STATES), minlength=len(VehicleType)) / len(chosen)
+    assert (shares > 0.05).all()
+
+
+def test_neighbouring_cars_have_different_plates_and_colours() -> None:
+    chosen = [vehicle_model(vehicle, False) for vehicle in cars(60)]
+    bank = model_bank()
+    plates, paints = [], []
+    for number in chosen:
+        mesh = model(number)
+        (row, *_) = np.flatnonzero(mesh.textures == Texture.PLATE)
+        plates.append(float(mesh.v_axes[row, 3]))
+        paints.append(number // LAMP_STATES)
+        assert 0.0 <= mesh.v_axes[mesh.textures == Texture.PLATE, 3].min() < 1.0
+    assert len(bank.ranges) == MODELS
+    assert len(set(plates)) > 12
+    assert len(set(paints)) > 35
+
+
+def test_a_fifth_of_the_people_are_children() -> None:
+    walkers = empty_records(PedestrianRecord, 1000)
+    walkers["key"][:] = np.arange(1000)
+    looks = [(pedestrian_model(walker, 10.0) - FIRST_PERSON) // POSES for walker in walkers]
+    share = np.mean(np.array(looks) >= ADULTS)
+    assert 0.15 < share < 0.25
+    assert len(set(looks)) == len(LOOKS)
 
 
 def test_lamps_follow_braking_and_light() -> None:
@@ -171,7 +204,7 @@ def test_lamps_follow_braking_and_light() -> None:
 
 def test_people_step_as_they_walk_and_stand_when_they_stand() -> None:
     (walker,) = empty_records(PedestrianRecord, 1)
-    walker.key, walker.speed = 5, 1.3
+    walker.key, walker.speed = next(key for key in range(99) if mixed(key, 4) % len(LOOKS) < ADULTS), 1.3
     poses = []
     for way in np.arange(0.0, 1.4, 0.05):
         walker.odometer = way
@@ -208,4 +241,4 @@ def test_bodies_near_the_camera_are_placed_once_without_the_own_car() -> None:
 def test_the_bank_is_made_once() -> None:
     bank: ModelBank = model_bank()
     assert bank is model_bank()
-    assert sum(column.nbytes for column in bank.mesh) < 8e6
+    assert sum(column.nbytes for column in bank.mesh) < 13e6

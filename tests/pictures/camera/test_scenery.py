@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
 import subprocess
 import sys
@@ -23,8 +24,10 @@ from dorothie_gym.pictures.camera.ground.materials import LOOKS, Material
 from dorothie_gym.pictures.camera.ground.sheets import town_sheets
 from dorothie_gym.pictures.camera.mesh import MeshBuilder, Surface
 from dorothie_gym.pictures.camera.scenery.buildings import Building, Style, build_buildings, plan_buildings
-from dorothie_gym.pictures.camera.scenery.clearance import Clearance
+from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of
 from dorothie_gym.pictures.camera.scenery.guard_rails import BESIDE, build_rails, rail_lines
+from dorothie_gym.pictures.camera.scenery.houses import house_look
+from dorothie_gym.pictures.camera.scenery.lawns import build_lawns
 from dorothie_gym.pictures.camera.scenery.placing import FlatGround, stamped
 from dorothie_gym.pictures.camera.scenery.signals import build_signals
 from dorothie_gym.pictures.camera.scenery.street_lamps import build_lamps, lamp_places, lot_lamps
@@ -330,3 +333,33 @@ def test_rails_stand_where_the_ground_beside_a_road_is_much_lower() -> None:
         assert line[:, 0].max() > -BESIDE - 8.0
     mesh = build_rails(lines)
     assert set(mesh.classes.tolist()) == {ObjectClass.GUARD_RAIL.value}
+
+
+@pytest.mark.parametrize("name", [*TOWNS, "generated:5"])
+def test_two_houses_near_each_other_differ_in_two_of_colour_storeys_roof_and_garden(name: str) -> None:
+    looks = [(house_look(row.tone), row) for row in buildings_of(name) if row.style is Style.HOUSE]
+    described = [(look.wall, row.storeys, (look.roof, look.tiles), look.garden) for look, row in looks]
+    pairs = [
+        sum(one != other for one, other in zip(described[k], described[i], strict=True))
+        for k, i in itertools.combinations(range(len(looks)), 2)
+        if math.dist(looks[k][1].centre, looks[i][1].centre) < 150.0
+    ]
+    assert len(pairs) > 20
+    assert np.mean(np.array(pairs) >= 2) >= 0.93  # of few pairs; of all towns together 0.98
+
+
+@pytest.mark.parametrize("name", TOWNS)
+def test_most_houses_have_a_garden_and_lawns_have_shrubs(name: str) -> None:
+    buildings, clearance = buildings_of(name), clearance_of(name)
+    mesh = build_lawns(layers_of(name), clearance, buildings, FlatGround())
+    places = mesh.corners.astype(float).mean(axis=1)[:, :2]
+    outlines = [shapely.Polygon(row.outline).buffer(4.0) for row in buildings if row.style is Style.HOUSE]
+    points = shapely.MultiPoint(places)
+    assert np.mean([outline.intersects(points) for outline in outlines]) > 0.75
+    assert set(mesh.classes.tolist()) <= {ObjectClass.VEGETATION.value, ObjectClass.FENCE.value}
+    assert free_of(np.array(points.geoms, dtype=object), clearance.ways).all()
+    apart = shapely.STRtree([shapely.Polygon(row.outline).buffer(4.0) for row in buildings])
+    shrubs = free_of(np.array(points.geoms, dtype=object), apart)
+    assert shrubs.sum() > 20 * 50  # triangles of some fifty shrubs away from buildings
+    again = build_lawns(layers_of(name), clearance, buildings, FlatGround())
+    np.testing.assert_array_equal(mesh.corners, again.corners)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.ontology.world_exceptions import PropKind
+from dorothie_gym.pictures.camera.atlas import PLATES
 from dorothie_gym.pictures.camera.mesh import Mesh, joined
 from dorothie_gym.pictures.camera.models.cyclists import (
     PEDAL_CYCLE,
@@ -22,12 +23,13 @@ from dorothie_gym.pictures.camera.models.cyclists import (
     dressed_cyclist,
 )
 from dorothie_gym.pictures.camera.models.people import (
+    ADULTS,
+    CHILD_SIZE,
     CYCLE,
     LOOKS,
     PHASES,
     POSES,
     STANDING,
-    Outfit,
     dressed_person,
     person_form,
 )
@@ -39,6 +41,8 @@ from dorothie_gym.support.compilation.records import Float, Int32, RecordArray
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
 
 LAMP_STATES = 4
@@ -55,7 +59,7 @@ _COARSE_STEP = 2  # of the phases of walking, every second one has a coarse vers
 _COARSE_POSES = PHASES // _COARSE_STEP + 1
 
 # which type a car has: out of sixteen
-_TYPES = np.array([0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 3, 3, 3], dtype=np.int64)
+_TYPES = np.array([0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5], dtype=np.int64)
 
 FIRST_CYCLIST = len(VehicleType) * len(PAINTS) * LAMP_STATES
 FIRST_PERSON = FIRST_CYCLIST + len(RIDERS) * PEDAL_PHASES
@@ -64,6 +68,7 @@ FIRST_PROP = FIRST_COARSE + len(LOOKS) * _COARSE_POSES
 MODELS = FIRST_PROP + len(PropKind)
 """Number of models."""
 
+_ADULTS, _CHILD_CYCLE = ADULTS, CYCLE * CHILD_SIZE
 _CYCLIST, _EMPTY, _NOBODY = int(Kind.CYCLIST), int(Kind.EMPTY), int(Walk.EMPTY)
 _PAINTS, _LOOKS, _RIDERS, _PROPS = len(PAINTS), len(LOOKS), len(RIDERS), len(PropKind)
 _PROP_SIZES = np.array([(kind.length, kind.width) for kind in PropKind])
@@ -92,19 +97,28 @@ def model_bank() -> ModelBank:
     models: list[Mesh] = []
     for kind in VehicleType:
         form = vehicle_form(kind)
-        models += [painted_vehicle(form, paint, Lamps(state)) for paint in PAINTS for state in range(LAMP_STATES)]
+        for number, paint in enumerate(PAINTS):
+            plate = (5 * number + 7 * kind) % PLATES
+            models += [painted_vehicle(form, paint, Lamps(state), plate) for state in range(LAMP_STATES)]
     riding = [cyclist_form(phase) for phase in range(PEDAL_PHASES)]
     models += [dressed_cyclist(form, rider) for rider in RIDERS for form in riding]
-    fine = {outfit: [person_form(outfit, pose) for pose in range(POSES)] for outfit in Outfit}
-    models += [dressed_person(form, look) for look in LOOKS for form in fine[look.outfit]]
-    poses = [*range(0, PHASES, _COARSE_STEP), STANDING]
-    coarse = {outfit: [person_form(outfit, pose, coarse=True) for pose in poses] for outfit in Outfit}
-    models += [dressed_person(form, look) for look in LOOKS for form in coarse[look.outfit]]
+    models += _people(range(POSES), coarse=False)
+    models += _people([*range(0, PHASES, _COARSE_STEP), STANDING], coarse=True)
     models += [prop_model(kind) for kind in PropKind]
     ends = np.cumsum([0, *(model.size for model in models)])
     boxes = np.array([(m.corners.min(axis=(0, 1)), m.corners.max(axis=(0, 1))) for m in models], dtype=np.float32)
     mesh = joined(models)._replace(components=np.zeros((12, 0), np.float32))  # only copies at their places are drawn
     return ModelBank(mesh, np.column_stack((ends[:-1], ends[1:])).astype(np.int32), boxes)
+
+
+def _people(poses: Iterable[int], *, coarse: bool) -> list[Mesh]:
+    """Returns all persons in the given poses."""
+    kinds = dict.fromkeys((look.outfit, look.child) for look in LOOKS)
+    forms = {
+        (outfit, child): [person_form(outfit, pose, coarse=coarse, child=child) for pose in poses]
+        for outfit, child in kinds
+    }
+    return [dressed_person(form, look) for look in LOOKS for form in forms[look.outfit, look.child]]
 
 
 class PlacementRecord:
@@ -154,7 +168,7 @@ def pedestrian_model(walker: PedestrianRecord, distance: float) -> int:
     """Returns the model of a pedestrian at a distance [m] from the camera."""
     look = mixed(walker.key, 4) % _LOOKS
     standing = abs(walker.speed) < _STAND
-    cycles = walker.odometer / CYCLE
+    cycles = walker.odometer / (CYCLE if look < _ADULTS else _CHILD_CYCLE)
     phase = int((cycles - np.floor(cycles)) * PHASES) % PHASES
     if distance < COARSE_FROM:
         return FIRST_PERSON + look * POSES + (STANDING if standing else phase)

@@ -1,4 +1,4 @@
-"""Walking and standing people in several clothings, each also in a coarse version for the distance."""
+"""Walking and standing adults and children in several clothings, each also in a coarse version for the distance."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.pictures.camera.mesh import new_mesh
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.support import portable_math as pm
 
@@ -28,6 +29,10 @@ POSES = PHASES + 1
 CYCLE = 1.4
 """Distance that a person walks in one cycle [m] (two steps of 0.7 m, Knoblauch et al. 1996)."""
 
+CHILD_SIZE = 0.68
+"""Height of a child relative to an adult: 1.2 m, seven years old (WHO growth reference 2007). Its steps are shorter."""
+
+_CHILD_HEAD = 1.32  # size of a child's head relative to its body, compared with an adult's
 _THIGH, _SHANK, _SOLE = 0.43, 0.42, 0.07  # [m]
 _SWING, _ARM_SWING = 0.42, 0.42  # [rad] largest angles of thighs and arms
 _KNEE = 0.8  # [rad] largest bend of the knee of the leg that swings forward
@@ -44,7 +49,7 @@ class Outfit(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Look:
-    """Clothing and colours of a person."""
+    """Clothing and colours of a person, an adult or a child."""
 
     outfit: Outfit
     top: Rgb
@@ -52,6 +57,7 @@ class Look:
     skin: Rgb
     hair: Rgb
     extra: Rgb
+    child: bool = False
 
     @property
     def palette(self) -> Palette:
@@ -66,30 +72,42 @@ class Look:
         }
 
 
-_SKINS: tuple[Rgb, ...] = ((226, 184, 154), (198, 148, 114), (142, 98, 72), (98, 68, 50))
-_HAIRS: tuple[Rgb, ...] = ((52, 40, 32), (26, 22, 20), (152, 112, 62), (128, 124, 120))
+SKINS: tuple[Rgb, ...] = ((226, 184, 154), (198, 148, 114), (142, 98, 72), (98, 68, 50))
+HAIRS: tuple[Rgb, ...] = ((52, 40, 32), (26, 22, 20), (152, 112, 62), (128, 124, 120), (104, 56, 34))
 _TOPS: tuple[Rgb, ...] = (
     (184, 62, 62), (62, 98, 162), (226, 220, 208), (72, 122, 86), (232, 178, 62), (98, 74, 122), (54, 58, 64),
     (210, 122, 150), (66, 142, 150), (150, 106, 72), (236, 236, 236), (120, 36, 52),
+    (150, 176, 204), (168, 178, 120), (96, 100, 108), (226, 120, 76),
 )  # fmt: skip
-_TROUSERS: tuple[Rgb, ...] = ((46, 52, 74), (74, 68, 60), (34, 36, 40), (110, 104, 92), (58, 76, 104))
+_TROUSERS: tuple[Rgb, ...] = (
+    (46, 52, 74), (74, 68, 60), (34, 36, 40), (110, 104, 92), (58, 76, 104), (160, 150, 128),
+)  # fmt: skip
 _EXTRAS: tuple[Rgb, ...] = ((160, 60, 40), (40, 70, 100), (60, 80, 50))
 
-LOOKS = tuple(
-    Look(
-        Outfit(k % len(Outfit)),
-        top,
-        _TROUSERS[k % 5],
-        _SKINS[(k * 3 + k // 4) % 4],
-        _HAIRS[(k + k // 3) % 4],
-        _EXTRAS[k % 3],
+ADULTS = 24
+"""Number of adults to choose from."""
+
+_CHILDREN = 6
+
+
+def _look(k: int) -> Look:
+    child = k >= ADULTS
+    return Look(
+        Outfit((Outfit.TROUSERS, Outfit.SKIRT, Outfit.BACKPACK)[k % 3]) if child else Outfit(k % len(Outfit)),
+        _TOPS[7 * k % len(_TOPS)],
+        _TROUSERS[(k + k // 5) % len(_TROUSERS)],
+        SKINS[(k * 3 + k // 4) % len(SKINS)],
+        HAIRS[(k + k // 3) % len(HAIRS)],
+        _EXTRAS[k % len(_EXTRAS)],
+        child,
     )
-    for k, top in enumerate(_TOPS)
-)
-"""Persons to choose from."""
 
 
-def person_form(outfit: Outfit, pose: int, *, coarse: bool = False) -> Mesh:
+LOOKS = tuple(map(_look, range(ADULTS + _CHILDREN)))
+"""Persons to choose from, adults first; every fifth is a child."""
+
+
+def person_form(outfit: Outfit, pose: int, *, coarse: bool = False, child: bool = False) -> Mesh:
     """Returns a person without colours, in a phase of walking or standing."""
     model = ModelBuilder(ObjectClass.PEDESTRIAN)
     swing = 0.0 if pose == STANDING else pm.sin(2.0 * math.pi * pose / PHASES)
@@ -109,8 +127,9 @@ def person_form(outfit: Outfit, pose: int, *, coarse: bool = False) -> Mesh:
             x, y, z = foot.tolist()
             model.box((x - 0.08, y - 0.045, z - _SOLE), (x + 0.17, y + 0.045, z + 0.02), Part.SHOES)
         _arm(model, side, -front, hip, sleeves=outfit is not Outfit.TROUSERS, coarse=coarse, standing=pose == STANDING)
-    _torso(model, outfit, hip, coarse=coarse)
-    return model.build()
+    _torso(model, outfit, hip, coarse=coarse, head=_CHILD_HEAD if child else 1.0)
+    form = model.build()
+    return new_mesh(form.corners * np.float32(CHILD_SIZE), *form[1:-1]) if child else form
 
 
 def dressed_person(form: Mesh, look: Look) -> Mesh:
@@ -142,7 +161,7 @@ def _arm(
     model.limb(elbow, hand, (0.045, 0.036), Part.TOP if sleeves else Part.SKIN, shade=0.95)
 
 
-def _torso(model: ModelBuilder, outfit: Outfit, hip: float, *, coarse: bool) -> None:
+def _torso(model: ModelBuilder, outfit: Outfit, hip: float, *, coarse: bool, head: float) -> None:
     sides = 4 if coarse else 6
     waist, shoulders, neck = hip + 0.18, hip + 0.56, hip + 0.66
     lower = {Outfit.SKIRT: (hip - 0.34, 0.22), Outfit.COAT: (hip - 0.30, 0.20)}.get(outfit, (hip - 0.05, 0.165))
@@ -150,15 +169,22 @@ def _torso(model: ModelBuilder, outfit: Outfit, hip: float, *, coarse: bool) -> 
     middle = (0.0, 0.0, waist)
     model.limb((0.0, 0.0, lower[0]), middle, (lower[1], 0.15), slot, sides=sides, flat=0.72, shade=0.93)
     model.limb(middle, (0.0, 0.0, shoulders), (0.15, 0.215), Part.TOP, sides=sides, flat=0.6)
+    face = (0.01, 0.0, hip + 0.635 + 0.125 * head)
     if coarse:
-        model.ball((0.01, 0.0, hip + 0.76), (0.10, 0.095, 0.14), Part.SKIN, sides=4, rings=1)
-        model.ball((-0.02, 0.0, hip + 0.81), (0.10, 0.10, 0.11), Part.HAIR, sides=4, rings=0, part=(0.0, 0.5))
+        model.ball(face, _sized(head, 0.10, 0.095, 0.14), Part.SKIN, sides=4, rings=1)
+        crown = (-0.02, 0.0, face[2] + 0.05)
+        model.ball(crown, _sized(head, 0.10, 0.10, 0.11), Part.HAIR, sides=4, rings=0, part=(0.0, 0.5))
         return
     model.limb((0.0, 0.0, shoulders), (0.0, 0.0, neck - 0.04), (0.21, 0.07), Part.TOP, sides=sides, flat=0.6)
     model.limb((0.0, 0.0, neck - 0.06), (0.0, 0.0, neck + 0.03), (0.055, 0.055), Part.SKIN)
-    model.ball((0.012, 0.0, hip + 0.76), (0.105, 0.09, 0.125), Part.SKIN)
-    model.ball((-0.018, 0.0, hip + 0.795), (0.108, 0.102, 0.115), Part.HAIR, rings=1, part=(0.0, 0.62))
+    model.ball(face, _sized(head, 0.105, 0.09, 0.125), Part.SKIN)
+    crown = (-0.018, 0.0, face[2] + 0.035)
+    model.ball(crown, _sized(head, 0.108, 0.102, 0.115), Part.HAIR, rings=1, part=(0.0, 0.62))
     if outfit is Outfit.BACKPACK:
         model.box((-0.30, -0.14, hip + 0.14), (-0.11, 0.14, hip + 0.54), Part.EXTRA, bottom=True)
     elif outfit is Outfit.SKIRT:
         model.box((-0.09, 0.23, hip - 0.06), (0.13, 0.31, hip + 0.14), Part.EXTRA, bottom=True)
+
+
+def _sized(factor: float, *radii: float) -> list[float]:
+    return [factor * radius for radius in radii]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.pictures.camera.atlas import Texture
+from dorothie_gym.pictures.camera.atlas import PLATES, Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Part, Rgb, dressed
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
@@ -35,6 +35,8 @@ class VehicleType(enum.IntEnum):
     HATCHBACK = 1
     VAN = 2
     PICKUP = 3
+    ESTATE = 4
+    SUV = 5
 
 
 class Lamps(enum.IntFlag):
@@ -49,6 +51,7 @@ class Lamps(enum.IntFlag):
 PAINTS: tuple[Rgb, ...] = (
     (196, 198, 200), (34, 36, 40), (234, 235, 236), (148, 26, 30), (34, 66, 126),
     (98, 102, 106), (58, 86, 68), (172, 152, 120), (212, 120, 30), (18, 100, 116),
+    (240, 200, 40), (92, 40, 66), (120, 164, 204), (70, 52, 40),
 )  # fmt: skip
 """Colours of cars."""
 
@@ -96,6 +99,15 @@ _FORMS = {
         (1.20, -0.95, 1.06, 1.06), (0.55, -0.75, 1.80), 0.76, ((0.08, 0.48), (0.53, 0.94)),
         wheels=(1.55, -1.5, 0.38), tail=0.86,
     ),
+    VehicleType.ESTATE: _Form(
+        ((_FRONT, 0.66, 0.84), (2.28, 0.76, 0.94), (1.10, 0.93, 0.97), (-2.20, 0.98, 0.97), (-_FRONT, 0.92, 0.90)),
+        (1.10, -2.40, 0.93, 0.97), (0.30, -2.20, 1.50), 0.70, ((0.06, 0.32), (0.35, 0.60), (0.64, 0.92)), tail=0.80,
+    ),
+    VehicleType.SUV: _Form(
+        ((_FRONT, 0.86, 0.88), (2.30, 0.98, 0.95), (1.30, 1.12, 0.98), (-2.10, 1.14, 0.98), (-_FRONT, 1.10, 0.95)),
+        (1.30, -2.42, 1.12, 1.13), (0.55, -2.15, 1.86), 0.78, ((0.06, 0.36), (0.40, 0.66), (0.70, 0.93)),
+        wheels=(1.52, -1.5, 0.38), tail=0.98,
+    ),
 }  # fmt: skip
 
 
@@ -115,8 +127,8 @@ def vehicle_form(kind: VehicleType) -> Mesh:
     return model.build()
 
 
-def painted_vehicle(form: Mesh, paint: Rgb, lamps: Lamps) -> Mesh:
-    """Returns a car with a colour, and with the given lamps on."""
+def painted_vehicle(form: Mesh, paint: Rgb, lamps: Lamps, plate: int) -> Mesh:
+    """Returns a car with a colour and a number plate, one of `PLATES`, and with the given lamps on."""
     brakes, lights = Lamps.BRAKES in lamps, Lamps.LIGHTS in lamps
     palette: Palette = {
         Part.PAINT: paint,
@@ -129,7 +141,12 @@ def painted_vehicle(form: Mesh, paint: Rgb, lamps: Lamps) -> Mesh:
         Part.BRAKE_LAMP: (255, 44, 34) if brakes else (176, 22, 22) if lights else (112, 14, 16),
     }
     on = {Part.HEAD_LAMP: lights, Part.BRAKE_LAMP: brakes or lights}
-    return dressed(form, palette, frozenset(slot for slot, glows in on.items() if glows))
+    painted = dressed(form, palette, frozenset(slot for slot, glows in on.items() if glows))
+    v_axes = painted.v_axes.copy()
+    plates = painted.textures == Texture.PLATE
+    v_axes[plates] /= PLATES  # the texture has all plates, one above the other
+    v_axes[plates, 3] += plate / PLATES
+    return painted._replace(v_axes=v_axes)
 
 
 def _ring(station: tuple[float, float, float], side: float) -> Array:

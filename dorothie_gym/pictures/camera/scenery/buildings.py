@@ -18,6 +18,7 @@ from dorothie_gym.pictures.camera.atlas import Texture
 from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, oriented
 from dorothie_gym.pictures.camera.patterns import BAYS
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance, free_of, rectangles
+from dorothie_gym.pictures.camera.scenery.houses import WALLS, add_roof, house_look
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on
 from dorothie_gym.pictures.maps.borders import BorderKind
 from dorothie_gym.pictures.maps.medians import held
@@ -34,6 +35,7 @@ STOREY = 3.2
 _SHOP = 3.8  # [m] height of a storey with shops
 _SHOP_BAY = 4.4  # [m] width of a shop
 _SETBACKS = np.array([3.4, 4.4, 5.6, 7.2, 9.5])  # [m] from the edge of the road to the front of a building
+_HOUSE_SETBACKS = np.array([6.4, 5.4, 7.6, 4.4, 3.4])  # [m] of houses, at first with a garden in front
 _SMALLER = np.array([1.0, 0.75, 0.55])  # sizes that are tried, relative to the desired one
 _TRY_AGAIN = 4.0  # [m] along the street
 _CENTRE, _RIM = 0.45, 0.9  # radii of the centre and of the suburbs, relative to that of the town
@@ -88,16 +90,20 @@ _MANNERS = {
     Quarter.SUBURB: _Manner((0.1, 0.12, 0.0, 0.0, 0.78), (1, 2), (9.0, 14.0), (8.0, 11.0), (5.0, 16.0), 0.65, 0.05),
 }
 _WALLS = {
-    Style.BRICK: (Texture.BRICK_WINDOWS, ((168, 98, 80), (150, 84, 68), (182, 126, 98), (134, 86, 76))),
+    Style.BRICK: (
+        Texture.BRICK_WINDOWS,
+        ((168, 98, 80), (150, 84, 68), (182, 126, 98), (134, 86, 76), (158, 112, 92), (188, 140, 116)),
+    ),
     Style.PLASTER: (
         Texture.PLASTER_WINDOWS,
-        ((228, 216, 192), (206, 210, 206), (218, 192, 160), (190, 200, 208), (232, 224, 212)),
+        ((228, 216, 192), (206, 210, 206), (218, 192, 160), (190, 200, 208), (232, 224, 212), (204, 176, 152)),
     ),
-    Style.OFFICE: (Texture.OFFICE, ((244, 248, 252), (206, 224, 234), (226, 226, 214))),
-    Style.PANELS: (Texture.PANELS, ((222, 218, 208), (206, 210, 214), (214, 204, 188))),
-    Style.HOUSE: (Texture.HOUSE, ((226, 210, 186), (202, 178, 158), (208, 214, 216), (222, 214, 178), (196, 204, 190))),
+    Style.OFFICE: (Texture.OFFICE, ((244, 248, 252), (206, 224, 234), (226, 226, 214), (196, 206, 204))),
+    Style.PANELS: (Texture.PANELS, ((222, 218, 208), (206, 210, 214), (214, 204, 188), (190, 180, 170))),
+    Style.HOUSE: (Texture.HOUSE, WALLS),
 }
-_ROOFS = ((152, 78, 60), (104, 98, 98), (128, 90, 72), (86, 90, 98))
+_FLAT_ROOFS = ((128, 126, 122), (104, 104, 106), (142, 130, 116), (118, 124, 112))
+_SHADES = 0.88, 0.03  # darkest shade of a colour, and the step between shades of neighbouring tones
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,11 @@ class Building:
         x, y = self.depth / 2.0, self.length / 2.0
         return oriented([(x, -y), (x, y), (-x, y), (-x, -y)], self.centre, self.heading)
 
+    def at(self, deep: float, right: float) -> tuple[float, float]:
+        """Returns the position (x, y) [m] of a place behind its front, to the right of the centre."""
+        ((x, y),) = oriented([(deep - self.depth / 2.0, right)], self.centre, self.heading).tolist()
+        return x, y
+
 
 def plan_buildings(layers: MapLayers, clearance: Clearance) -> list[Building]:
     """Returns buildings along all streets, clear of all that the map draws and of the lots of landmarks."""
@@ -137,30 +148,30 @@ def plan_buildings(layers: MapLayers, clearance: Clearance) -> list[Building]:
     placed = _Placed()
     quarters = _Quarters(layers.town, clearance)
     buildings: list[Building] = []
-    for frontage in _frontages(layers):
+    for frontage in frontages(layers):
         buildings += _along(frontage, rng, clearance, placed, quarters)
     return buildings
 
 
-class _Frontage(NamedTuple):
+class Frontage(NamedTuple):
     """Edge of a road: points (n, 2) [m], and the direction away from the road (n,) [rad]."""
 
     points: Array
     away: Array
 
 
-def _frontages(layers: MapLayers) -> Iterator[_Frontage]:
+def frontages(layers: MapLayers) -> Iterator[Frontage]:
     """Yields the edges of the roads, and then those of junctions: opposite to the mouth of a street, for instance."""
     for line in layers.borders.lines:
         if line.kind is BorderKind.EDGE:
             for run in held(line, layers.raised, wanted=False):
-                yield _Frontage(line.points[run, :2], line.heading[run] + line.sign * np.pi / 2.0)
+                yield Frontage(line.points[run, :2], line.heading[run] + line.sign * np.pi / 2.0)
     sign = layers.town.traffic.sign
     for lane in layers.town.lanes:
         if lane.in_junction and lane.length > _SHORTEST and not layers.raised.hold(lane.points).any():
             stations = sample(lane, 0.0, lane.length, 2.0)
             points = side_line(lane, stations, sign * widths_at(lane, stations) / 2.0)
-            yield _Frontage(points, np.interp(stations, lane.stations, lane.headings) + sign * np.pi / 2.0)
+            yield Frontage(points, np.interp(stations, lane.stations, lane.headings) + sign * np.pi / 2.0)
 
 
 class _Quarters:
@@ -206,7 +217,7 @@ class _Placed:
 
 
 def _along(
-    frontage: _Frontage, rng: np.random.Generator, clearance: Clearance, placed: _Placed, quarters: _Quarters
+    frontage: Frontage, rng: np.random.Generator, clearance: Clearance, placed: _Placed, quarters: _Quarters
 ) -> list[Building]:
     """Returns buildings beside an edge of a road, one after the other."""
     stations = polyline_stations(frontage.points)
@@ -227,8 +238,9 @@ def _along(
         if empty:
             at += length + gap
             continue
-        sizes = np.repeat(_SMALLER, len(_SETBACKS))
-        setbacks = np.tile(_SETBACKS, len(_SMALLER))
+        wanted = _HOUSE_SETBACKS if style is Style.HOUSE else _SETBACKS
+        sizes = np.repeat(_SMALLER, len(wanted))
+        setbacks = np.tile(wanted, len(_SMALLER))
         lengths, depths = length * sizes, depth * sizes
         middles = at + lengths / 2.0
         spots = np.stack([np.interp(middles, stations, column) for column in frontage.points.T], axis=-1)
@@ -269,7 +281,8 @@ def build_buildings(buildings: list[Building], ground: Heights) -> Mesh:
 def add_building(builder: MeshBuilder, building: Building, outline: Array, low: float, base: float) -> None:
     """Adds a building between the lowest height of the ground and its base, the highest one [m]."""
     texture, colours = _WALLS[building.style]
-    colour = np.array(colours[building.tone % len(colours)], dtype=np.float64)
+    shade = _SHADES[0] + _SHADES[1] * (building.tone // 512 % 8)
+    colour = np.array(colours[building.tone % len(colours)], dtype=np.float64) * shade
     if base - low > _EVEN:
         builder.prism(
             outline, low - _UNDER, base, colour=colour * 0.7, kind=ObjectClass.BUILDING, closed=(False, False)
@@ -281,20 +294,19 @@ def add_building(builder: MeshBuilder, building: Building, outline: Array, low: 
     top = foot + storeys * STOREY
     add_walls(builder, outline, foot, top, colour, texture, bay=STOREY, storeys=storeys)
     if building.style is Style.HOUSE:
-        roof = _ROOFS[building.tone // 7 % len(_ROOFS)]
-        add_gable(builder, building, top, roof)
-        front = oriented([(-building.depth / 2.0 - 0.03, 0.25 * building.length)], building.centre, building.heading)[0]
+        look = house_look(building.tone)
+        add_roof(
+            builder, look.roof, building.centre, building.heading, (building.depth, building.length), top,
+            tiles=look.tiles, gable=colour * 0.9,
+        )  # fmt: skip
+        front = building.at(-0.03, 0.25 * building.length)
         builder.panel(
-            (*front.tolist(), base + 1.05),
-            building.heading,
-            1.05,
-            2.1,
-            colour=(150, 110, 90),
-            kind=ObjectClass.BUILDING,
+            (*front, base + 1.05), building.heading, 1.05, 2.1, colour=look.door, kind=ObjectClass.BUILDING,
             texture=Texture.DOOR,
-        )
+        )  # fmt: skip
         return
-    builder.prism(outline, top, top + 0.6, colour=colour * 0.82, top_colour=(128, 126, 122), kind=ObjectClass.BUILDING)
+    flat = _FLAT_ROOFS[building.tone // 64 % len(_FLAT_ROOFS)]
+    builder.prism(outline, top, top + 0.6, colour=colour * 0.82, top_colour=flat, kind=ObjectClass.BUILDING)
 
 
 def add_walls(
@@ -314,18 +326,3 @@ def add_walls(
             repeats=(bays / BAYS, storeys / rows),
             texture=texture,
         )
-
-
-def add_gable(builder: MeshBuilder, building: Building, low: float, colour: tuple[int, int, int]) -> None:
-    """Adds a roof with its ridge along the street, which overhangs the walls."""
-    half, side, rise = building.depth / 2.0 + 0.4, building.length / 2.0 + 0.4, 0.3 * building.depth
-    feet = oriented([(half, -side), (half, side), (-half, side), (-half, -side)], building.centre, building.heading)
-    ends = oriented([(0.0, -side), (0.0, side)], building.centre, building.heading)
-    a, b, c, d = (np.array([*foot, low]) for foot in feet.tolist())
-    left, right = (np.array([*end, low + rise]) for end in ends.tolist())
-    tiles = (building.length / 3.2, building.depth / 4.0)
-    for corners in ([b, right, left, a], [d, left, right, c]):
-        builder.quad(corners, colour=colour, kind=ObjectClass.BUILDING, repeats=tiles, texture=Texture.ROOF_TILES)
-    tone = np.array(_WALLS[Style.HOUSE][1][building.tone % 5]) * 0.9
-    builder.triangles([[c, right, b], [a, left, d]], colour=tone, kind=ObjectClass.BUILDING)
-    builder.quad([a, d, c, b], colour=tone * 0.6, kind=ObjectClass.BUILDING)

@@ -17,6 +17,7 @@ from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
+from dorothie_gym.tasks.landmark_designs import site_key
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array, Site
@@ -147,7 +148,8 @@ class Clearance:
         chosen = int(np.argmax(free)) if free.any() else count - len(_BEHIND)
         x, y = fronts[chosen].tolist()
         taken.append(ground[chosen])
-        return Lot(site.id, site.position, heading, (x, y), float(length[chosen]), float(depth[chosen]))
+        key = site_key(self._layers.town.name, site.id)
+        return Lot(site.id, site.position, heading, (x, y), float(length[chosen]), float(depth[chosen]), key)
 
 
 def free_of(polygons: NDArray[np.object_], tree: shapely.STRtree) -> NDArray[np.bool_]:

@@ -15,8 +15,10 @@ from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.pictures.camera import atlas
 from dorothie_gym.pictures.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented
-from dorothie_gym.pictures.camera.models.people import STANDING, Look, Outfit, person_form
+from dorothie_gym.pictures.camera.models.people import HAIRS, SKINS, STANDING, Look, Outfit, person_form
 from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Part, Rgb, dressed
+from dorothie_gym.pictures.camera.scenery.gardens import Plot, add_garden
+from dorothie_gym.pictures.camera.scenery.houses import Roof, add_roof
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.pictures.camera.scenery.trees import tree_form
 from dorothie_gym.pictures.maps.shapes import disc
@@ -25,6 +27,7 @@ from dorothie_gym.tasks import landmark_designs
 from dorothie_gym.tasks.landmark_designs import (
     MIDDLE_STRIPE,
     STORES,
+    Garden,
     StoreDesign,
     Top,
     house_design,
@@ -45,6 +48,10 @@ PICTOGRAM = 3.2
 _WALL = 3.4  # [m] height of the glazed storey of a store
 _HOUSE_STOREY = 3.0  # [m] height of a storey of a house
 _TREE = 1.1, 0.9  # [m] radius of the tree beside a house, and distance of its trunk from the wall
+_HOUSE_DEPTH = 8.2  # [m] largest depth of a house
+_NEAREST, _FRONT_GARDEN = 0.8, 3.0  # [m] least and largest depth of its front garden
+_SLOPES = {1: 0.45, 2: 0.65, 3: 1.0}  # of the roof by storeys: visible above the eaves, and smaller than the walls
+_HIPPED = 2  # neighbours in a row with the same form of roof
 _METAL: Rgb = (178, 180, 182)
 _ROOF: Rgb = (128, 126, 124)
 
@@ -127,6 +134,11 @@ class _Works:
         foot = np.column_stack((place, feet_on(self._ground, place)))
         tree = stamped(tree_form(0), foot, np.array([self.lot.heading]), np.array([radius]))
         self._trees.append(tree)
+
+    def garden(self, garden: Garden, half: float, depth: float) -> None:
+        """Adds a garden in front of a house, of half a length along the street and a depth [m]."""
+        plot = Plot(self.lot.at(0.05, 0.0), self.lot.heading, half, depth - 0.1, self.lot.key)
+        add_garden(self.builder, garden, plot, self._ground, fine=True)
 
     def rectangle(self, deep: tuple[float, float], right: tuple[float, float]) -> Array:
         """Returns corners (4, 2) [m] of a rectangle between two depths and two places to the right."""
@@ -329,19 +341,24 @@ def _petrol_station(works: _Works, design: StoreDesign, texture: Texture, length
 
 
 def _house(works: _Works) -> None:
-    design = house_design(works.lot.site)
-    length, depth = min(works.lot.length, 11.0), min(works.lot.depth, 9.0)
+    lot, design = works.lot, house_design(works.lot.key)
+    length, behind = min(lot.length, 11.0), min(max(lot.depth - _HOUSE_DEPTH, _NEAREST), _FRONT_GARDEN)
     side, walls = length / 2.0, 0.3 + _HOUSE_STOREY * design.storeys
-    deep = (0.8, max(depth, 2.0))
+    deep = (behind, max(min(lot.depth, behind + _HOUSE_DEPTH), behind + 1.2))
     works.foundation(deep, (-side, side))
     works.box(deep, (-side, side), (0.0, walls), design.wall)
-    _gable(works, deep, side, walls, design.roof, design.trim)
+    add_roof(
+        works.builder, Roof.HIPPED if lot.key // _HIPPED % 2 else Roof.ALONG, lot.at((deep[0] + deep[1]) / 2.0, 0.0),
+        lot.heading, (deep[1] - deep[0], length), works.base + walls, tiles=design.roof,
+        gable=np.array(design.wall, dtype=np.float64), slope=_SLOPES[design.storeys],
+    )  # fmt: skip
     works.panel(deep[0] - 0.03, 0.0, 1.1, 1.2, 2.2, texture=Texture.DOOR)
     for storey in range(design.storeys):
         for right in (-0.6 * side, 0.6 * side) if storey == 0 else (-0.6 * side, 0.0, 0.6 * side):
             _window(works, deep[0], right, 1.7 + _HOUSE_STOREY * storey, design.trim)
-    if design.tree:
+    if design.garden is Garden.TREE:
         works.tree(deep[0] + _TREE[0], -side - _TREE[1], _TREE[0])
+    works.garden(design.garden, side, behind)
     works.sign(side + 0.9, 2.5, (PICTOGRAM, PICTOGRAM), Texture.HOUSE_SIGN, (24, 74, 168), deep=0.2)
 
 
@@ -357,8 +374,9 @@ def _person_sign(works: _Works) -> Mesh:
 
 def _waiting_person(lot: Lot, ground: Heights) -> Mesh:
     """Returns a person who waves to the street, at the place of the site."""
-    design = person_design(lot.site)
-    look = Look(Outfit.COAT, design.coat, design.trousers, (198, 148, 114), (40, 32, 28), design.coat)
+    design = person_design(lot.key)
+    skin, hair = SKINS[lot.key % len(SKINS)], HAIRS[lot.key // len(SKINS) % len(HAIRS)]
+    look = Look(Outfit.COAT, design.coat, design.trousers, skin, hair, design.coat)
     arm = ModelBuilder(ObjectClass.PEDESTRIAN)
     arm.limb((0.0, 0.22, 1.42), (0.08, 0.42, 1.68), (0.055, 0.05), Part.TOP)
     arm.limb((0.08, 0.42, 1.68), (0.06, 0.40, 2.0), (0.048, 0.04), Part.SKIN, closed=True)

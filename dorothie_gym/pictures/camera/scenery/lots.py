@@ -20,6 +20,7 @@ class Lot:
         front: centre of its front edge (x, y) [m].
         length: along the street [m].
         depth: away from the street [m].
+        key: number that determines the design of a house or person there (`site_key`).
     """
 
     site: int
@@ -28,6 +29,7 @@ class Lot:
     front: tuple[float, float]
     length: float
     depth: float
+    key: int
 
     def at(self, deep: float, right: float) -> tuple[float, float]:
         """Returns the world position (x, y) [m] of a place in the lot: behind its front, to the right of the centre."""

@@ -12,6 +12,7 @@ from dorothie_gym.pictures.camera.mesh import Mesh, joined
 from dorothie_gym.pictures.camera.scenery.buildings import build_buildings, plan_buildings
 from dorothie_gym.pictures.camera.scenery.clearance import Clearance
 from dorothie_gym.pictures.camera.scenery.guard_rails import build_rails, rail_lines
+from dorothie_gym.pictures.camera.scenery.lawns import build_lawns
 from dorothie_gym.pictures.camera.scenery.lenses import Lenses
 from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.scenery.signals import build_signals
@@ -57,12 +58,14 @@ def build_scenery(layers: MapLayers, ground: Heights) -> Scenery:
     lit = np.array([post.at for post in layers.posts]).reshape(-1, 2)
     corners = np.array([blade.at for blade in blades]).reshape(-1, 2)
     boards = plan_boards(layers, clearance, np.concatenate((lit, lamp_feet[:, :2], corners)))
+    buildings = plan_buildings(layers, clearance)
     parts = [
         lamps,
         build_blades(layers, blades, ground),
         build_boards(layers, boards, ground),
         build_rails(rail_lines(layers, clearance, ground)),
         build_trees(layers, ground),
-        build_buildings(plan_buildings(layers, clearance), ground),
+        build_buildings(buildings, ground),
+        build_lawns(layers, clearance, buildings, ground),
     ]
     return Scenery(joined(parts), signals, lenses, lights.astype(np.float32), clearance.lots)

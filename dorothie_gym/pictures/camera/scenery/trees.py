@@ -68,15 +68,15 @@ def tree_form(form: int) -> Mesh:
         disc((0.0, 0.0), 0.085, 4), -0.1, 1.3, top=disc((0.0, 0.0), 0.05, 4), colour=_BARK, kind=ObjectClass.VEGETATION,
         texture=Texture.BARK, closed=(False, False),
     )  # fmt: skip
-    _clump(builder, (0.0, 0.0, 1.75), (1.0, 0.85), colour, rng, sides=7)
+    add_clump(builder, (0.0, 0.0, 1.75), (1.0, 0.85), colour, rng, sides=7)
     for k in range(2):
         heading = 2.6 * k + form
         at = (0.42 * pn.cos(heading), 0.42 * pn.sin(heading), 2.25 + 0.2 * k)
-        _clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=5)
+        add_clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=5)
     return builder.build()
 
 
-def _clump(
+def add_clump(
     builder: MeshBuilder,
     centre: tuple[float, float, float],
     radii: tuple[float, float],
