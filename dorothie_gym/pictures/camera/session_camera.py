@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.town import LightColour, LightPhase
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
+from dorothie_gym.pictures.camera.body_snapshots import snapshot_of
 from dorothie_gym.pictures.camera.cells import is_in_view
-from dorothie_gym.pictures.camera.first_person_camera import CameraFrame, FirstPersonCamera
+from dorothie_gym.pictures.camera.first_person_camera import CameraFrame, EarlierView, FirstPersonCamera
 from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.pictures.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
 from dorothie_gym.pictures.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
 from dorothie_gym.pictures.camera.pose import CameraPose, View, pose_on_car
 from dorothie_gym.pictures.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows, lit_lenses
+from dorothie_gym.session.config import CameraOutput
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.sim.state.world_arrays import CAR_KEY
 from dorothie_gym.support import portable_math as pm
@@ -72,6 +74,31 @@ class Bodies(Protocol):
         ...
 
 
+class Moment(NamedTuple):
+    """A world at an earlier time.
+
+    Attributes:
+        x: x coordinate of the car [m].
+        y: y coordinate of the car [m].
+        height: z coordinate of the road below it [m].
+        heading: heading of the car [rad].
+        bodies: copy of the bodies.
+    """
+
+    x: float
+    y: float
+    height: float
+    heading: float
+    bodies: Bodies
+
+    @classmethod
+    def of(cls, world: World) -> Moment:
+        """Returns the present moment of a world."""
+        car = world.car
+        x, y = car.position.tolist()
+        return cls(x, y, float(car.height), float(car.heading), snapshot_of(world.actors.arrays))
+
+
 class SessionCamera:
     """Camera on the car of a session.
 
@@ -84,7 +111,7 @@ class SessionCamera:
     def __init__(self, scene: SessionScene, config: CameraConfig) -> None:
         self.scene, self.config = scene, config
         self.camera = FirstPersonCamera(scene.camera_scene, config, scene.overlay)
-        self._placed = empty_records(PlacementRecord, 256)
+        self._placed, self._placed_before = empty_records(PlacementRecord, 256), empty_records(PlacementRecord, 0)
         self._halos = lit_lenses(scene.town.lenses, scene.town.signals)
         self.camera.glow(self._halos)
         self._shown: NDArray[np.int64] | None = None
@@ -104,14 +131,15 @@ class SessionCamera:
         rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
         return pose_on_car(self.config.mount, x, y, z, heading, rise)
 
-    def render(self, world: World) -> CameraFrame:
-        """Returns the picture that the camera takes of a world."""
+    def render(self, world: World, before: Moment | None = None) -> CameraFrame:
+        """Returns the picture that the camera takes of a world; optical flow is measured from `before`."""
         car = world.car
         x, y = car.position.tolist()
         pose = self.pose_on(x, y, float(car.height), float(car.heading))
         return self.render_from(
-            pose, world.actors.arrays, world.weather, time=world.time, head_lights=world.ego.lights, faults=world.faults
-        )
+            pose, world.actors.arrays, world.weather, time=world.time, head_lights=world.ego.lights,
+            faults=world.faults, before=before,
+        )  # fmt: skip
 
     def render_from(
         self,
@@ -124,6 +152,7 @@ class SessionCamera:
         faults: Collection[Sensor] = (),
         own: int = CAR_KEY,
         traffic_lights: Mapping[int, LightColour] | None = None,
+        before: Moment | None = None,
     ) -> CameraFrame:
         """Returns the picture from a pose.
 
@@ -136,14 +165,21 @@ class SessionCamera:
             faults: faulty sensors.
             own: key of the vehicle that carries the camera, which it does not see.
             traffic_lights: their states by signal, dark where missing; by default those of their programmes.
+            before: moment from which optical flow is measured; None for none.
         """
         if traffic_lights is None:
             self._show_programmes(time)
         else:
             self._show_lights(traffic_lights)
         placed = self.placed(pose, bodies, weather, own=own)
+        earlier = None
+        if before is not None and CameraOutput.OPTICAL_FLOW in self.config.outputs:
+            earlier = EarlierView(
+                self.pose_on(before.x, before.y, before.height, before.heading),
+                self._places(pose, before.bodies, weather, own, before=True),
+            )
         return self.camera.render(
-            pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults)
+            pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults), earlier=earlier
         )
 
     def placed(
@@ -153,10 +189,22 @@ class SessionCamera:
 
         They are overwritten by the next call. Arguments are those of `render_from`.
         """
-        room = len(bodies.vehicles) + len(bodies.pedestrians) + len(bodies.props)
-        if room > len(self._placed):
-            self._placed = empty_records(PlacementRecord, room)
-        placed = argument(self._placed)
+        return self._places(pose, bodies, weather, own)
+
+    def _places(
+        self, pose: CameraPose, bodies: Bodies, weather: Weather, own: int, *, before: bool = False
+    ) -> RecordArray[PlacementRecord]:
+        """Returns the models of bodies, in one of two lists."""
+        room, records = len(bodies.vehicles) + len(bodies.pedestrians) + len(bodies.props), self._placed
+        if before:
+            records = self._placed_before
+        if room > len(records):
+            records = empty_records(PlacementRecord, room)
+            if before:
+                self._placed_before = records
+            else:
+                self._placed = records
+        placed = argument(records)
         town = self.scene.town
         count = _place_and_lift(
             argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props), self.camera.view_of(pose),
