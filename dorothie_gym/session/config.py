@@ -81,9 +81,7 @@ class CameraConfig:
 
     def __post_init__(self) -> None:
         check_whole(self, (("width", 8, 4096, "pixels"), ("height", 8, 4096, "pixels")))
-        check_bounds(
-            self, (("field_of_view", 10.0, 150.0, "degrees"), ("metres_per_pixel", 0.02, 5.0, "m"))
-        )
+        check_bounds(self, (("field_of_view", 10.0, 150.0, "degrees"), ("metres_per_pixel", 0.02, 5.0, "m")))
         if not isinstance(self.mount, CameraMount):
             raise ValueError(f"CameraConfig.mount is a {type(self.mount).__name__}; it must be a CameraMount")
         for name in ("antialiasing", "shadows"):
@@ -187,7 +185,9 @@ class EnvConfig:
 
     def _check_sensors(self) -> None:
         if not isinstance(self.cameras, Mapping):
-            raise ValueError(f"EnvConfig.cameras is a {type(self.cameras).__name__}; it must map names to CameraConfigs")
+            raise ValueError(
+                f"EnvConfig.cameras is a {type(self.cameras).__name__}; it must map names to CameraConfigs"
+            )
         for name, camera in self.cameras.items():
             if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name):
                 raise ValueError(f"EnvConfig.cameras has the name {name!r}; it must be a lower-case word, such as left")

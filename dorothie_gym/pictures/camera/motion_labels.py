@@ -155,9 +155,7 @@ def _direction(axes: Array, right: float, up: float) -> tuple[float, float, floa
 
 
 @inlined
-def _write_pixel(
-    before: View, dx: float, dy: float, dz: float, y: int, x: int, flow: NDArray[np.float32]
-) -> None:
+def _write_pixel(before: View, dx: float, dy: float, dz: float, y: int, x: int, flow: NDArray[np.float32]) -> None:
     """Writes the flow to a pixel from a position relative to the earlier camera."""
     axes = before.axes
     depth = dx * axes[2, 0] + dy * axes[2, 1] + dz * axes[2, 2]

@@ -64,7 +64,7 @@ class CameraPose:
     def _turned(self, mount: SensorMount) -> tuple[float, float, float]:
         """Returns heading, pitch and roll [rad] of a sensor that is turned relative to the car."""
         right, up, forward = axes_of(self.heading, self.pitch, self.roll)
-        sides, over, ahead = axes_of(*(math.radians(angle) for angle in (mount.yaw, mount.pitch, mount.roll)))
+        sides, _, ahead = axes_of(*(math.radians(angle) for angle in (mount.yaw, mount.pitch, mount.roll)))
         car = np.array([forward, right, up])  # the axes of the mount are given along these
         to_right, to_front = pn.matmul(np.array([sides, ahead]), car)
         heading = pm.atan2(float(to_front[1]), float(to_front[0]))
