@@ -203,6 +203,11 @@ class EnvConfig:
         return {**({} if self.camera is None else {"": self.camera}), **self.cameras}
 
     @property
+    def has_sensors(self) -> bool:
+        """Whether the car has a camera or another sensor."""
+        return self.camera is not None or bool(self.cameras) or self.sensors.is_on
+
+    @property
     def frames(self) -> int:
         """Number of physics frames between two decisions."""
         return round(FRAME_RATE / self.decision_frequency)
