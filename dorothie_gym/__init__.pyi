@@ -27,6 +27,11 @@ from .session.rewards import NavigationWeights as NavigationWeights
 from .session.rewards import RewardWeights as RewardWeights
 from .session.scenario import Scenario as Scenario
 from .session.scenario import draw_scenario as draw_scenario
+from .session.sensor_config import LidarConfig as LidarConfig
+from .session.sensor_config import LidarOutput as LidarOutput
+from .session.sensor_config import RadarConfig as RadarConfig
+from .session.sensor_config import SensorConfig as SensorConfig
+from .session.sensor_config import SensorMount as SensorMount
 from .session.spaces import SpaceLimits as SpaceLimits
 from .session.spaces import noop as noop
 from .sim.config import WorldConfig as WorldConfig

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
@@ -20,7 +20,7 @@ from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import ChannelKind, EnvConfig, PerceptionModel, RenderView, checked_view
-from dorothie_gym.session.providers import OBSERVERS, picture_spaces
+from dorothie_gym.session.providers import sensor_spaces
 from dorothie_gym.session.rewards import term_names
 from dorothie_gym.session.scenario import Scenario, scenario_option
 from dorothie_gym.session.session_batch import SessionBatch
@@ -142,11 +142,12 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         self._views = [SessionView(render_mode, frames_per_second=rate, render_view=view) for _ in range(views)]
 
     def _observed(self, role: Role) -> spaces.Dict:
-        """Returns the observation space of a role in one environment, with the pictures of its camera."""
-        space, camera = observation_space(role, self.limits, self.config.observe_acts), self.config.camera
-        if camera is None or role not in OBSERVERS:
-            return space
-        return spaces.Dict({**space.spaces, **picture_spaces(camera)})
+        """Returns the observation space of a role in one environment, with its cameras and sensors."""
+        space, sensors = (
+            observation_space(role, self.limits, self.config.observe_acts),
+            sensor_spaces(self.config, role),
+        )
+        return spaces.Dict({**space.spaces, **sensors}) if sensors else space
 
     def _spaces(self, single: Mapping[str, spaces.Dict]) -> tuple[dict[str, spaces.Dict], dict[str, spaces.Dict]]:
         """Returns spaces of one environment, and those of all, by agent."""
@@ -306,8 +307,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
                     for number, text in zip(batch.numbers, batch.views.texts[role][name], strict=True):
                         texts[number] = text
                 own[name] = tuple(texts)
-            if role in OBSERVERS:
-                own |= self._gathered([_copies_of(batch.pictures) for batch in self.batches])
+            if sensors := sensor_spaces(self.config, role):
+                own |= self._gathered([_copies_of(batch.pictures, sensors) for batch in self.batches])
         return found
 
     def _gathered(self, parts: Sequence[Mapping[str, NDArray[Any]]]) -> Stacked:
@@ -351,8 +352,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         return infos
 
 
-def _copies_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    return {name: array.copy() for name, array in arrays.items()}
+def _copies_of(arrays: Mapping[str, NDArray[Any]], names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    return {name: arrays[name].copy() for name in names}
 
 
 def _columns(names: Sequence[str], table: NDArray[np.generic], mask: Flags) -> Infos:

@@ -1,12 +1,15 @@
-"""Settings of a session: camera, perception, channel, and the views in which it is drawn."""
+"""Settings of a session: cameras, perception, channel, and the views in which it is drawn."""
 
 from __future__ import annotations
 
 import enum
+import re
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
 from dorothie_gym.dialogue.conversation import USUAL_WORD_ERROR_RATE, WORDS_PER_SECOND
 from dorothie_gym.session.rewards import RewardWeights
+from dorothie_gym.session.sensor_config import SensorConfig, SensorMount, check_bounds, check_outputs, check_whole
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
 
@@ -26,35 +29,26 @@ class CameraOutput(enum.StrEnum):
     """Key of the body (h, w) int32, 0 for none."""
     BOXES = "boxes"
     """Boxes around the visible pixels of each body."""
+    OPTICAL_FLOW = "optical_flow"
+    """Movement of the visible surface of each pixel since the picture of the previous decision [pixels], to the right
+    and down (h, w, 2) float32; 0 in the first picture, and for surfaces that were behind the camera."""
+    NORMALS = "normals"
+    """Unit normal of the surface towards the camera, as components to the right, down and forward (h, w, 3) float32;
+    0 for the sky."""
+    BIRDS_EYE = "birds_eye"
+    """`ObjectClass` of what is below each point of a square grid around the camera, seen from above (h, w) uint8: the
+    camera is in the centre and looks up the picture, `CameraConfig.metres_per_pixel`. Crowns of trees, and what hangs
+    above the car, such as bridges, are left out; 0 beyond the map."""
 
 
 @shared
 @dataclass(frozen=True, kw_only=True)
-class CameraMount:
-    """Place of the camera on the car.
-
-    Attributes:
-        forward: distance in front of the centre of the car [m].
-        up: above the road [m].
-        pitch: upwards [degrees].
-
-    Raises:
-        ValueError: a value is out of its range; names the field.
-    """
+class CameraMount(SensorMount):
+    """Place and direction of a camera on the car, by default behind the windscreen; see `SensorMount`."""
 
     forward: float = 0.35
     up: float = 1.45
     pitch: float = -2.0
-
-    def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("forward", -5.0, 5.0, "m"),
-            ("up", 0.2, 10.0, "m"),
-            ("pitch", -60.0, 60.0, "degrees"),
-        ):
-            value = getattr(self, name)
-            if not (isinstance(value, float | int) and low <= value <= high):
-                raise ValueError(f"CameraMount.{name} is {value}; it must be in {low:g}..{high:g} {unit}")
 
 
 @shared
@@ -70,6 +64,7 @@ class CameraConfig:
         outputs: parts of a picture; all but `CameraOutput.RGB` are privileged.
         antialiasing: whether edges are smoothed with 2 x 2 samples in a pixel.
         shadows: whether the sun casts shadows.
+        metres_per_pixel: width of a pixel of `CameraOutput.BIRDS_EYE` [m].
 
     Raises:
         ValueError: a value is out of its range; names the field.
@@ -82,29 +77,17 @@ class CameraConfig:
     outputs: tuple[CameraOutput, ...] = (CameraOutput.RGB,)
     antialiasing: bool = True
     shadows: bool = True
+    metres_per_pixel: float = 0.25
 
     def __post_init__(self) -> None:
-        for name in ("width", "height"):
-            value = getattr(self, name)
-            if not isinstance(value, int) or not 8 <= value <= 4096:
-                raise ValueError(f"CameraConfig.{name} is {value}; it must be a whole number in 8..4096 pixels")
-        if not (isinstance(self.field_of_view, float | int) and 10.0 <= self.field_of_view <= 150.0):
-            raise ValueError(f"CameraConfig.field_of_view is {self.field_of_view}; it must be in 10..150 degrees")
+        check_whole(self, (("width", 8, 4096, "pixels"), ("height", 8, 4096, "pixels")))
+        check_bounds(self, (("field_of_view", 10.0, 150.0, "degrees"), ("metres_per_pixel", 0.02, 5.0, "m")))
         if not isinstance(self.mount, CameraMount):
             raise ValueError(f"CameraConfig.mount is a {type(self.mount).__name__}; it must be a CameraMount")
         for name in ("antialiasing", "shadows"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"CameraConfig.{name} is {getattr(self, name)!r}; it must be True or False")
-        if not isinstance(self.outputs, tuple):
-            raise ValueError(
-                f"CameraConfig.outputs is a {type(self.outputs).__name__}; it must be a tuple of CameraOutput"
-            )
-        known = [output.value for output in CameraOutput]
-        for output in self.outputs:
-            if output not in known:
-                raise ValueError(f"CameraConfig.outputs contains {output!r}; it must be of {', '.join(known)}")
-        if not self.outputs or len(set(self.outputs)) < len(self.outputs):
-            raise ValueError(f"CameraConfig.outputs is {self.outputs}; it must name at least one output, each once")
+        check_outputs("CameraConfig", self.outputs, CameraOutput)
 
     @property
     def samples(self) -> int:
@@ -153,6 +136,9 @@ class EnvConfig:
         rewards: weights of the reward terms.
         camera: first-person camera on the car, observed by the participant and the Co-Wizard; None for no camera.
             It has no other effect on a session.
+        cameras: further cameras by name, such as `{"left": CameraConfig(mount=CameraMount(yaw=-90.0))}`: their fields
+            begin with the name ("left_camera"). Names are lower-case words.
+        sensors: further sensors of the car, observed by the Co-Wizard.
         perception: perception model of the participant and the Co-Wizard. With `PerceptionModel.CAMERA` they observe
             the objects that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The
             car's own safety functions are not affected.
@@ -169,6 +155,8 @@ class EnvConfig:
     world: WorldConfig = field(default_factory=WorldConfig)
     rewards: RewardWeights = field(default_factory=RewardWeights)
     camera: CameraConfig | None = None
+    cameras: Mapping[str, CameraConfig] = field(default_factory=dict, hash=False)
+    sensors: SensorConfig = SensorConfig()
     perception: PerceptionModel = PerceptionModel.SYMBOLIC
     channel: ChannelKind = ChannelKind.TEXT
 
@@ -187,12 +175,37 @@ class EnvConfig:
             raise ValueError(f"EnvConfig.word_error_rate is {self.word_error_rate}; it must be at least 0 and below 1")
         if self.camera is not None and not isinstance(self.camera, CameraConfig):
             raise ValueError(f"EnvConfig.camera is a {type(self.camera).__name__}; it must be a CameraConfig or None")
+        self._check_sensors()
         if self.perception not in (models := list(map(str, PerceptionModel))):
             raise ValueError(f"EnvConfig.perception is {self.perception!r}; it must be {' or '.join(models)}")
         object.__setattr__(self, "perception", PerceptionModel(self.perception))
         if self.channel not in (kinds := list(map(str, ChannelKind))):
             raise ValueError(f"EnvConfig.channel is {self.channel!r}; it must be {' or '.join(kinds)}")
         object.__setattr__(self, "channel", ChannelKind(self.channel))
+
+    def _check_sensors(self) -> None:
+        if not isinstance(self.cameras, Mapping):
+            raise ValueError(
+                f"EnvConfig.cameras is a {type(self.cameras).__name__}; it must map names to CameraConfigs"
+            )
+        for name, camera in self.cameras.items():
+            if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name):
+                raise ValueError(f"EnvConfig.cameras has the name {name!r}; it must be a lower-case word, such as left")
+            if not isinstance(camera, CameraConfig):
+                raise ValueError(f"EnvConfig.cameras[{name!r}] is a {type(camera).__name__}; it must be a CameraConfig")
+        object.__setattr__(self, "cameras", dict(self.cameras))
+        if not isinstance(self.sensors, SensorConfig):
+            raise ValueError(f"EnvConfig.sensors is a {type(self.sensors).__name__}; it must be a SensorConfig")
+
+    @property
+    def all_cameras(self) -> dict[str, CameraConfig]:
+        """All cameras by name; that of `camera` has the empty name."""
+        return {**({} if self.camera is None else {"": self.camera}), **self.cameras}
+
+    @property
+    def has_sensors(self) -> bool:
+        """Whether the car has a camera or another sensor."""
+        return self.camera is not None or bool(self.cameras) or self.sensors.is_on
 
     @property
     def frames(self) -> int:
@@ -202,11 +215,12 @@ class EnvConfig:
     def record(self) -> dict[str, object]:
         """Returns the settings in JSON types, for records.
 
-        They lack the camera, which has no effect on a session, and the usual perception and channel, so that records
-        are equal to those of versions without a choice.
+        They lack cameras and sensors, which have no effect on a session, and the usual perception and channel, so that
+        records are equal to those of versions without a choice.
         """
         settings = asdict(self)
-        del settings["camera"]
+        for name in ("camera", "cameras", "sensors"):
+            del settings[name]
         for name in ("perception", "channel"):
             value = settings.pop(name)
             if value is not getattr(EnvConfig, name):

@@ -17,7 +17,8 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
-from dorothie_gym.session.providers import Pictures, VisiblePerception, draw_pictures, see_by_camera
+from dorothie_gym.session.providers import VisiblePerception, see_by_camera
+from dorothie_gym.session.sensor_readings import SensorReadings
 from dorothie_gym.session.spaces.actions import NO_MOVE
 from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH, STORY_LENGTH, SpaceLimits, plain_text
 from dorothie_gym.session.spaces.observations import (
@@ -365,6 +366,7 @@ class SessionObserver:
     Attributes:
         delivered: speech and messages of the last decision; the session replaces it.
         camera_perception: content of the picture, if the roles perceive by the camera.
+        sensors: cameras and sensors of the car, if there are any.
     """
 
     def __init__(
@@ -379,9 +381,7 @@ class SessionObserver:
     ) -> None:
         self._world, self._scenario, self._task, self._beliefs = world, scenario, task, beliefs
         self._config, self._limits, self.delivered = config, limits, delivered
-        self._pictures: Pictures | None = (
-            None if config.camera is None else draw_pictures(world, scenario, config.camera)
-        )
+        self.sensors = SensorReadings(world, scenario, config) if config.has_sensors else None
         self.camera_perception: VisiblePerception | None = (
             see_by_camera(world, scenario) if config.perception is PerceptionModel.CAMERA else None
         )
@@ -426,13 +426,13 @@ class SessionObserver:
         observations = self._builder.build(self.delivered, roles)
         if self.camera_perception is not None:
             self.camera_perception.add_to(observations)
-        if self._pictures is not None:
-            self._pictures.add_to(observations, decision)
+        if self.sensors is not None:
+            self.sensors.add_to(observations, decision)
         return observations
 
-    def picture(self, decision: int) -> CameraFrame | None:
-        """Returns the picture of the camera on the car, boxes included; None without a camera."""
-        return None if self._pictures is None else self._pictures.frame(decision)
+    def picture(self, decision: int, name: str = "") -> CameraFrame | None:
+        """Returns the picture of a camera on the car, boxes included; None without such a camera."""
+        return None if self.sensors is None else self.sensors.picture(decision, name)
 
 
 # --- observations on demand -------------------------------------------------------------------------------------------

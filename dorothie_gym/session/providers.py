@@ -8,17 +8,22 @@ registration.
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.session.config import CameraConfig, CameraOutput
+from dorothie_gym.session.car_sensors import CrossedLines, car_sensor_fields
+from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
+from dorothie_gym.session.sensor_config import LidarConfig, LidarOutput, RadarConfig
+from dorothie_gym.session.spaces.fields import dict_space
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.conversation import Utterance
+    from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
     from dorothie_gym.session.dialogue_channel import CabinState
     from dorothie_gym.session.scenario import Scenario
@@ -30,6 +35,9 @@ if TYPE_CHECKING:
 PICTURES: Final = "dorothie_gym.pictures.camera.session_pictures:SessionPictures"
 """Entry point of the class that draws `Pictures`."""
 
+LANE_LINES: Final = "dorothie_gym.pictures.maps.lane_lines:lane_lines"
+"""Entry point of the function that finds the `CrossedLines` of a town."""
+
 PERCEPTION: Final = "dorothie_gym.pictures.camera.camera_perception:CameraPerception"
 """Entry point of the `VisiblePerception`."""
 
@@ -38,13 +46,16 @@ SPEECH: Final = "dorothie_gym.speech.spoken_dialogue:SpokenDialogue"
 
 
 class Pictures(Protocol):
-    """Pictures of the camera on the car of a session (`camera.session_pictures`)."""
+    """Pictures, lidar and radar of the car of a session (`camera.session_pictures`)."""
 
-    def frame(self, decision: int) -> CameraFrame:
-        """Returns the picture at the current decision with this number."""
+    def frame(self, decision: int, name: str = "") -> CameraFrame | None:
+        """Returns the picture of a camera at the current decision with this number; None for no such camera."""
 
-    def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
-        """Adds the pictures of the current decision to the observations of the roles that see them."""
+    def begin_decision(self) -> None:
+        """Notes the present, which optical flow is measured from, before the world is stepped."""
+
+    def readings(self, decision: int, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+        """Returns fields of observations at the current decision; callers must not write to them."""
 
 
 class VisiblePerception(Protocol):
@@ -96,10 +107,16 @@ class SpokenChannel(Protocol):
         """Returns the recognition of a completed utterance, the number-th of the session, in a car's noise."""
 
 
-def draw_pictures(world: World, scenario: Scenario, config: CameraConfig) -> Pictures:
-    """Returns the pictures of the camera on the car of a session."""
+def draw_pictures(world: World, scenario: Scenario, config: EnvConfig) -> Pictures:
+    """Returns the pictures of the cameras, and the turns of lidar and radar, on the car of a session."""
     pictures: Pictures = _make(PICTURES, world, scenario, config)
     return pictures
+
+
+def lines_of(town: Town) -> CrossedLines:
+    """Returns the lines along the lanes of a town."""
+    lines: CrossedLines = _make(LANE_LINES, town)
+    return lines
 
 
 def see_by_camera(world: World, scenario: Scenario) -> VisiblePerception:
@@ -137,17 +154,70 @@ FIELDS: Final[Mapping[CameraOutput, str]] = {
     CameraOutput.DEPTH: "depth",
     CameraOutput.SEMANTIC: "semantic",
     CameraOutput.INSTANCE: "instance",
+    CameraOutput.OPTICAL_FLOW: "optical_flow",
+    CameraOutput.NORMALS: "normals",
+    CameraOutput.BIRDS_EYE: "birds_eye",
 }
 """Field of the observation for each part of a picture; boxes are in `LiveSession.picture` only."""
 
+LIDAR_FIELDS: Final[Mapping[LidarOutput, str]] = {
+    LidarOutput.POINTS: "lidar",
+    LidarOutput.SEMANTIC: "lidar_semantic",
+    LidarOutput.INSTANCE: "lidar_instance",
+}
+"""Field of the observation for each part of a turn of the lidar."""
 
-def picture_spaces(config: CameraConfig) -> dict[str, spaces.Box]:
+RADAR_FIELD: Final = "radar"
+
+_KEYS = np.iinfo(np.int32)
+
+
+def field_of(output: CameraOutput, name: str = "") -> str:
+    """Returns the field of a part of the picture of a camera; further cameras have names."""
+    return f"{name}_{FIELDS[output]}" if name else FIELDS[output]
+
+
+def picture_spaces(config: CameraConfig, name: str = "") -> dict[str, spaces.Box]:
     """Returns the spaces of the fields that a camera adds to an observation."""
-    size, keys = (config.height, config.width), np.iinfo(np.int32)
+    size = config.height, config.width
     boxes: dict[CameraOutput, spaces.Box] = {
         CameraOutput.RGB: spaces.Box(0, 255, (*size, 3), np.uint8),
         CameraOutput.DEPTH: spaces.Box(0.0, np.inf, size, np.float32),
         CameraOutput.SEMANTIC: spaces.Box(0, 255, size, np.uint8),
-        CameraOutput.INSTANCE: spaces.Box(int(keys.min), int(keys.max), size, np.int32),
+        CameraOutput.INSTANCE: spaces.Box(int(_KEYS.min), int(_KEYS.max), size, np.int32),
+        CameraOutput.OPTICAL_FLOW: spaces.Box(-np.inf, np.inf, (*size, 2), np.float32),
+        CameraOutput.NORMALS: spaces.Box(-1.001, 1.001, (*size, 3), np.float32),
+        CameraOutput.BIRDS_EYE: spaces.Box(0, 255, size, np.uint8),
     }
-    return {FIELDS[output]: boxes[output] for output in config.outputs if output in boxes}
+    return {field_of(output, name): boxes[output] for output in config.outputs if output in boxes}
+
+
+def _lidar_spaces(config: LidarConfig) -> dict[str, spaces.Box]:
+    size = config.channels, config.columns
+    boxes: dict[LidarOutput, spaces.Box] = {
+        LidarOutput.POINTS: spaces.Box(-config.range, config.range, (*size, 4), np.float32),
+        LidarOutput.SEMANTIC: spaces.Box(0, 255, size, np.uint8),
+        LidarOutput.INSTANCE: spaces.Box(int(_KEYS.min), int(_KEYS.max), size, np.int32),
+    }
+    return {LIDAR_FIELDS[output]: boxes[output] for output in config.outputs}
+
+
+def _radar_spaces(config: RadarConfig) -> dict[str, spaces.Box]:
+    return {RADAR_FIELD: spaces.Box(-np.inf, np.inf, (config.rows * config.columns, 4), np.float32)}
+
+
+def sensor_spaces(config: EnvConfig, role: Role) -> dict[str, spaces.Space[Any]]:
+    """Returns the spaces of the fields that cameras and sensors add to the observation of a role.
+
+    Participant and Co-Wizard observe the pictures; the Co-Wizard also observes the sensors of the car.
+    """
+    found: dict[str, spaces.Space[Any]] = {}
+    if role in OBSERVERS:
+        for name, camera in config.all_cameras.items():
+            found |= picture_spaces(camera, name)
+    if role is Role.CO_WIZARD:
+        sensors = config.sensors
+        found |= {} if sensors.lidar is None else _lidar_spaces(sensors.lidar)
+        found |= {} if sensors.radar is None else _radar_spaces(sensors.radar)
+        found |= dict_space(car_sensor_fields(sensors, config.frames)).spaces
+    return found

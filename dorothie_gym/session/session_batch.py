@@ -1,6 +1,6 @@
 """Sessions of one town that are played together: dialogue in Python, worlds and observations in one call for all.
 
-Pictures of cameras are drawn on the same threads.
+Pictures of cameras are drawn on the same threads, and so are scans of lidar and radar.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.session.providers import FIELDS, picture_spaces
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.providers import sensor_spaces
 from dorothie_gym.session.session_engine import SessionEngine, StepOutcome
 from dorothie_gym.session.view_arrays import RoleArrays, turn_options
 from dorothie_gym.session.view_steps import EVERYTHING, observe_share
@@ -26,7 +27,6 @@ from dorothie_gym.support.copying import CachedViews, taken
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
-    from dorothie_gym.ontology.roles import Role
     from dorothie_gym.session.config import EnvConfig
     from dorothie_gym.session.scenario import Scenario
     from dorothie_gym.session.spaces.actions import ActionMapping, RoleAction
@@ -44,7 +44,7 @@ class SessionBatch(CachedViews):
         numbers: number of each session, for messages.
         engines: engine of each session; an engine of a batch is not stepped by itself.
         views: observations and masks of all sessions.
-        pictures: (sessions, ...) fields of the observations that the cameras of all sessions give.
+        pictures: (sessions, ...) fields of the observations that the cameras and sensors of all sessions give.
     """
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_worlds",)
@@ -70,8 +70,8 @@ class SessionBatch(CachedViews):
         ]
         self.views = RoleArrays(limits, config.observe_acts, len(numbers))
         self.pictures: dict[str, NDArray[np.generic]] = {
-            name: np.zeros((len(numbers), *box.shape), box.dtype)
-            for name, box in ({} if config.camera is None else picture_spaces(config.camera)).items()
+            name: np.zeros((len(numbers), *(space.shape or ())), space.dtype)
+            for name, space in sensor_spaces(config, Role.CO_WIZARD).items()
         }
         self._frames, self._threads = config.frames, max(1, min(threads, len(numbers)))
 
@@ -159,7 +159,7 @@ class SessionBatch(CachedViews):
         self._draw([row for row, engine in enumerate(self.engines) if engine.has_begun])
 
     def _draw(self, rows: Sequence[int]) -> None:
-        """Draws the pictures of the given sessions, if they have cameras."""
+        """Draws the pictures of the given sessions, and reads their sensors, if they have any."""
         if not self.pictures or not rows:
             return
         self._show(rows[0])  # here: threads would compile one after another
@@ -172,11 +172,10 @@ class SessionBatch(CachedViews):
         self._worlds.share(work)
 
     def _show(self, row: int) -> None:
-        picture = self.engines[row].session.picture
-        assert picture is not None  # the sessions have cameras
-        for output, name in FIELDS.items():
-            if name in self.pictures:
-                self.pictures[name][row] = getattr(picture, output.value)
+        session = self.engines[row].session
+        assert session.observer.sensors is not None  # the sessions have cameras or sensors
+        for name, value in session.observer.sensors.readings(session.decisions).items():
+            self.pictures[name][row] = value
 
     @property
     def infractions(self) -> NDArray[np.int64]:

@@ -23,7 +23,7 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.live_session import LiveSession, StepBegun
 from dorothie_gym.session.observations import LazyObservations, RoleMask
-from dorothie_gym.session.providers import OBSERVERS, picture_spaces
+from dorothie_gym.session.providers import OBSERVERS, sensor_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
 from dorothie_gym.session.rewards import RewardTerms, term_names
 from dorothie_gym.session.scenario import Scenario, draw_scenario, header_of, template_option
@@ -237,8 +237,8 @@ class SessionEngine(Restorable):
             if config.perception is PerceptionModel.CAMERA
             else {}
         )
-        pictures = {} if config.camera is None else picture_spaces(config.camera)
-        return spaces.Dict({**space.spaces, **seen, **pictures}) if seen or pictures else space
+        sensors = sensor_spaces(config, role)
+        return spaces.Dict({**space.spaces, **seen, **sensors}) if seen or sensors else space
 
     @property
     def observations(self) -> LazyObservations:

@@ -55,7 +55,7 @@ def copy_bodies(
             first, last = ranges[body.model, 0], ranges[body.model, 1]
             if count + last - first <= room:
                 for row in range(first, last):
-                    if _copy(view, bank, row, body, target, count):
+                    if copy_triangle(view, bank, row, body, target, count):
                         count += 1
             else:
                 count += last - first
@@ -74,7 +74,7 @@ def surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> N
 
 
 @inlined
-def _copy(view: View, bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) -> bool:
+def copy_triangle(view: View, bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) -> bool:
     """Writes a triangle unless it is seen from behind; returns whether it was written."""
     c, s = body.cos, body.sin
     if body.rise == 0.0:  # a quick look in the frame of the model

@@ -12,7 +12,7 @@ from dorothie_gym.support.compilation.records import Record, RecordArray, empty_
 from dorothie_gym.support.portable_math import wrap_radians
 
 if TYPE_CHECKING:
-    from dorothie_gym.pictures.camera.session_camera import Bodies
+    from dorothie_gym.pictures.camera.body_placing import Bodies
 
 _CONTINUOUS = ("x", "y", "height", "speed", "acceleration", "odometer")
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import PictureError
 from dorothie_gym.pictures.camera.atlas import AtlasArrays
+from dorothie_gym.pictures.camera.birds_eye import draw_birds_eye
 from dorothie_gym.pictures.camera.cells import CellOrder, CellTable, new_order, sorted_by_cell
 from dorothie_gym.pictures.camera.daylight import Daylight, daylight_of
 from dorothie_gym.pictures.camera.faces import new_faces
@@ -21,6 +22,7 @@ from dorothie_gym.pictures.camera.labels import find_boxes, new_labels, write_la
 from dorothie_gym.pictures.camera.lighting import LampMap, add_rain
 from dorothie_gym.pictures.camera.mesh import TOWN, Mesh, empty_mesh
 from dorothie_gym.pictures.camera.models.model_bank import ModelBank, PlacementRecord
+from dorothie_gym.pictures.camera.motion_labels import write_flow, write_normals
 from dorothie_gym.pictures.camera.optics import light_numbers, optics_of
 from dorothie_gym.pictures.camera.pose import CameraPose, View, view_from
 from dorothie_gym.pictures.camera.rasterizer import VisibilityBuffer, new_buffer
@@ -46,6 +48,10 @@ _NO_BODIES = empty_records(PlacementRecord, 0)
 
 _draw_scene, _shade, _write_labels = fixed(draw_scene), fixed(shade), fixed(write_labels)
 _draw_head_lights, _add_halos = direct(draw_head_lights), fixed(add_halos)
+_write_flow, _write_normals, _draw_birds_eye = fixed(write_flow), fixed(write_normals), fixed(draw_birds_eye)
+
+_FROM_ABOVE = CameraOutput.RGB, CameraOutput.BIRDS_EYE
+"""Outputs that need no buffer of labels."""
 
 
 @shared
@@ -83,6 +89,9 @@ class CameraFrame:
         semantic: (h, w) uint8 `ObjectClass`.
         instance: (h, w) int32 key of the body, 0 for none.
         boxes: boxes of the visible bodies.
+        optical_flow: (h, w, 2) float32, see `CameraOutput`, like the following.
+        normals: (h, w, 3) float32.
+        birds_eye: (h, w) uint8 `ObjectClass`.
     """
 
     view: View
@@ -91,6 +100,9 @@ class CameraFrame:
     semantic: NDArray[np.uint8] | None = None
     instance: NDArray[np.int32] | None = None
     boxes: Boxes | None = None
+    optical_flow: NDArray[np.float32] | None = None
+    normals: NDArray[np.float32] | None = None
+    birds_eye: NDArray[np.uint8] | None = None
 
     @property
     def colours(self) -> NDArray[np.uint8]:
@@ -111,6 +123,19 @@ class CameraFrame:
     def bodies(self) -> Boxes:
         """`boxes`."""
         return _drawn(self.boxes, CameraOutput.BOXES)
+
+
+@dataclass(frozen=True)
+class EarlierView:
+    """What optical flow is measured from.
+
+    Attributes:
+        pose: pose of the camera in the earlier picture.
+        bodies: places of the bodies then.
+    """
+
+    pose: CameraPose
+    bodies: RecordArray[PlacementRecord]
 
 
 def _drawn(part: T | None, output: CameraOutput) -> T:
@@ -153,7 +178,7 @@ class FirstPersonCamera:
         self._rows = np.argsort(order, kind="stable")  # of the overlay as given
         width, height, samples = config.width, config.height, config.samples
         self._draws_rgb = CameraOutput.RGB in config.outputs
-        self._labelled = any(output != CameraOutput.RGB for output in config.outputs)
+        self._labelled = any(output not in _FROM_ABOVE for output in config.outputs)
         self._bodies = empty_mesh(_ROOM)
         self._box = np.zeros((2, 3))
         self._samples = new_samples()
@@ -174,6 +199,9 @@ class FirstPersonCamera:
             self._label_buffer = new_buffer(width, height)
             self._label_orders = self._new_orders(width, height)
             self._labels = new_labels(width, height)
+        if CameraOutput.BIRDS_EYE in config.outputs:
+            self._map_buffer = new_buffer(width, height)
+            self._corners = np.zeros((4, 3))
 
     def _new_orders(self, width: int, height: int) -> tuple[CellOrder, CellOrder]:
         return new_order(self.scene.cells, width, height), new_order(self._overlay_cells, width, height)
@@ -207,6 +235,7 @@ class FirstPersonCamera:
         time: float = 0.0,
         head_lights: bool = False,
         faults: Collection[Sensor] = (),
+        earlier: EarlierView | None = None,
     ) -> CameraFrame:
         """Draws a picture.
 
@@ -217,6 +246,7 @@ class FirstPersonCamera:
             time: simulated seconds, which move the rain.
             head_lights: whether the car's headlights are on.
             faults: faulty sensors, which act on RGB.
+            earlier: what optical flow is measured from; None for a first picture, without movement.
         """
         config = self.config
         view = self.view_of(pose)
@@ -231,7 +261,7 @@ class FirstPersonCamera:
             if light.beams > 0.0:
                 _draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
-            optics = optics_of(view, self._light_numbers, self._shadows, pose.tilt)
+            optics = optics_of(view, self._light_numbers, self._shadows, pose)
             _shade(
                 view, optics, self._buffer, config.samples,
                 self.scene.town, self._overlay, self._bodies, self.scene.ground, self._textures, light,
@@ -246,8 +276,8 @@ class FirstPersonCamera:
             rgb = picture
         if self._labelled:
             self._draw(view, self._label_buffer, self._label_orders, bodies, placed)
-            return self._write_labels(view, rgb, bodies)
-        return CameraFrame(view, rgb)
+            return self._write_labels(view, rgb, bodies, earlier)
+        return CameraFrame(view, rgb, birds_eye=self._birds_eye(view, bodies))
 
     def _daylight(self, weather: Weather, head_lights: bool) -> Daylight:
         """Returns the light of a weather, and turns the maps of shadows, once as long as it stays."""
@@ -283,7 +313,11 @@ class FirstPersonCamera:
             self._bodies = empty_mesh(2 * count)
 
     def _write_labels(
-        self, view: View, rgb: NDArray[np.uint8] | None, bodies: RecordArray[PlacementRecord]
+        self,
+        view: View,
+        rgb: NDArray[np.uint8] | None,
+        bodies: RecordArray[PlacementRecord],
+        earlier: EarlierView | None,
     ) -> CameraFrame:
         labels, outputs = self._labels, self.config.outputs
         _write_labels(
@@ -310,7 +344,37 @@ class FirstPersonCamera:
             labels.semantic.copy() if CameraOutput.SEMANTIC in outputs else None,
             labels.instance.copy() if CameraOutput.INSTANCE in outputs else None,
             boxes,
+            self._flow(view, bodies, earlier) if CameraOutput.OPTICAL_FLOW in outputs else None,
+            self._normals(view) if CameraOutput.NORMALS in outputs else None,
+            self._birds_eye(view, bodies),
         )
+
+    def _flow(
+        self, view: View, bodies: RecordArray[PlacementRecord], earlier: EarlierView | None
+    ) -> NDArray[np.float32]:
+        flow = np.zeros((view.height, view.width, 2), np.float32)
+        if earlier is not None:
+            before = view_from(earlier.pose, view.width, view.height, self.config.field_of_view)
+            _write_flow(
+                view, before, self._label_buffer, self.scene.town, self._overlay, self._bodies, self._labels.depth,
+                bodies, argument(earlier.bodies), flow,
+            )  # fmt: skip
+        return flow
+
+    def _normals(self, view: View) -> NDArray[np.float32]:
+        normals = np.empty((view.height, view.width, 3), np.float32)
+        _write_normals(view, self._label_buffer, self.scene.town, self._overlay, self._bodies, normals)
+        return normals
+
+    def _birds_eye(self, view: View, bodies: RecordArray[PlacementRecord]) -> NDArray[np.uint8] | None:
+        if CameraOutput.BIRDS_EYE not in self.config.outputs:
+            return None
+        scene, classes = self.scene, np.empty((view.height, view.width), np.uint8)
+        _draw_birds_eye(
+            view, self.config.metres_per_pixel, self._map_buffer, scene.town, scene.cells, self._overlay,
+            self._overlay_cells, scene.bank.mesh, scene.bank.ranges, bodies, scene.ground, self._corners, classes,
+        )  # fmt: skip
+        return classes
 
     @property
     def nbytes(self) -> int:
@@ -320,4 +384,6 @@ class FirstPersonCamera:
             parts += [self._buffer, *self._orders, self._shadows, self._beams]
         if self._labelled:
             parts += [self._label_buffer, *self._label_orders, self._labels]
+        if CameraOutput.BIRDS_EYE in self.config.outputs:
+            parts += [self._map_buffer]
         return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))

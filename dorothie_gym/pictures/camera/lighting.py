@@ -96,8 +96,8 @@ def head_light(optics: Optics, x: float, y: float, z: float, slant: float) -> fl
         z: z coordinate of the surface relative to the camera [m].
         slant: cosine between the surface's normal and the direction to the camera.
     """
-    ahead = x * optics.right_y - y * optics.right_x
-    aside = abs(x * optics.right_x + y * optics.right_y)
+    ahead = x * optics.car_x + y * optics.car_y
+    aside = abs(y * optics.car_x - x * optics.car_y)
     if ahead < 1.0:
         return 0.0
     cone = max(0.0, 1.0 - aside / (1.6 + 0.38 * ahead))

@@ -10,7 +10,7 @@ from dorothie_gym.support.compilation.records import by_reference
 
 if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.daylight import Daylight
-    from dorothie_gym.pictures.camera.pose import View
+    from dorothie_gym.pictures.camera.pose import CameraPose, View
     from dorothie_gym.pictures.camera.shadows import ShadowMaps
 
 
@@ -31,6 +31,7 @@ class Optics(NamedTuple):
         air_r, air_g, air_b: colour.
         fog, fog_start, rain, wetness, lamps, head_lights, beams: see `Daylight`.
         rise: rise of the car per metre ahead.
+        car_x, car_y: direction of the car.
         shadows: whether the sun casts shadows.
         slope_x, slope_y: see `ShadowMaps.slope`.
         town_x, town_y, bodies_x, bodies_y: first squares of the maps of shadows.
@@ -72,6 +73,8 @@ class Optics(NamedTuple):
     head_lights: float
     beams: float
     rise: float
+    car_x: float
+    car_y: float
     shadows: bool
     slope_x: float
     slope_y: float
@@ -90,18 +93,19 @@ def light_numbers(light: Daylight) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, tilt: float = 0.0) -> Optics:
+def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, pose: CameraPose) -> Optics:
     """Returns the numbers of a picture whose shadows have been drawn.
 
     Args:
         view: projection.
         light: see `light_numbers`.
         maps: maps of shadows.
-        tilt: tilt of the car upwards [rad].
+        pose: pose of the camera on the car, whose headlights shine.
     """
+    heading = pose.heading - pose.yaw
     numbers = (
-        *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, pm.tan(tilt),
-        bool(maps.strength[0] > 0.0), *maps.slope.tolist(), *maps.window.tolist(),
+        *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, pm.tan(pose.tilt),
+        pm.cos(heading), pm.sin(heading), bool(maps.strength[0] > 0.0), *maps.slope.tolist(), *maps.window.tolist(),
     )  # fmt: skip
     return Optics._make(numbers)  # in the order of the fields
 

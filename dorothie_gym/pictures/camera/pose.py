@@ -19,13 +19,13 @@ from dorothie_gym.support.compilation.records import by_reference
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
-    from dorothie_gym.session.config import CameraMount
+    from dorothie_gym.session.sensor_config import SensorMount
 
 
 @shared
 @dataclass(frozen=True)
 class CameraPose:
-    """Place and direction of a camera, which does not roll.
+    """Place and direction of a camera or another sensor.
 
     Attributes:
         x: [m].
@@ -34,6 +34,8 @@ class CameraPose:
         heading: [rad].
         pitch: upwards [rad].
         tilt: upward tilt of the car, equal to that of the road [rad].
+        roll: clockwise as seen from behind [rad].
+        yaw: heading relative to that of the car [rad].
     """
 
     x: float
@@ -42,19 +44,45 @@ class CameraPose:
     heading: float
     pitch: float = 0.0
     tilt: float = 0.0
+    roll: float = 0.0
+    yaw: float = 0.0
 
-    def mounted(self, forward: float, up: float, pitch: float) -> Self:
-        """Returns the pose of a mount on a car with this pose.
-
-        Args:
-            forward: distance in front of the centre of the car [m].
-            up: above the road, at a right angle to it [m].
-            pitch: relative to the car [rad].
-        """
+    def mounted(self, mount: SensorMount) -> Self:
+        """Returns the pose of a sensor on a car with this pose."""
         c, s = pm.cos(self.pitch), pm.sin(self.pitch)
-        ahead, rise = forward * c - up * s, forward * s + up * c
-        x, y = self.x + ahead * pm.cos(self.heading), self.y + ahead * pm.sin(self.heading)
-        return type(self)(x, y, self.z + rise, self.heading, self.pitch + pitch, self.pitch)
+        ahead, rise = mount.forward * c - mount.up * s, mount.forward * s + mount.up * c
+        cos, sin = pm.cos(self.heading), pm.sin(self.heading)
+        x, y = self.x + ahead * cos, self.y + ahead * sin
+        if mount.right:
+            x, y = x - mount.right * sin, y + mount.right * cos
+        if not (mount.yaw or mount.roll):
+            pitch = self.pitch + math.radians(mount.pitch)
+            return type(self)(x, y, self.z + rise, self.heading, pitch, self.pitch)
+        heading, pitch, roll = self._turned(mount)
+        return type(self)(x, y, self.z + rise, heading, pitch, self.pitch, roll, heading - self.heading)
+
+    def _turned(self, mount: SensorMount) -> tuple[float, float, float]:
+        """Returns heading, pitch and roll [rad] of a sensor that is turned relative to the car."""
+        right, up, forward = axes_of(self.heading, self.pitch, self.roll)
+        sides, _, ahead = axes_of(*(math.radians(angle) for angle in (mount.yaw, mount.pitch, mount.roll)))
+        car = np.array([forward, right, up])  # the axes of the mount are given along these
+        to_right, to_front = pn.matmul(np.array([sides, ahead]), car)
+        heading = pm.atan2(float(to_front[1]), float(to_front[0]))
+        pitch = pm.atan2(float(to_front[2]), pm.hypot(float(to_front[0]), float(to_front[1])))
+        level_right, level_up, _ = axes_of(heading, pitch)
+        roll = pm.atan2(-float((to_right * level_up).sum()), float((to_right * level_right).sum()))
+        return heading, pitch, roll
+
+
+def axes_of(heading: float, pitch: float, roll: float = 0.0) -> Array:
+    """Returns the unit vectors to the right, up and forward (3, 3) of a pose by its angles [rad]."""
+    c, s = pm.cos(heading), pm.sin(heading)
+    cp, sp = pm.cos(pitch), pm.sin(pitch)
+    axes = np.array([[-s, c, 0.0], [-sp * c, -sp * s, cp], [cp * c, cp * s, sp]])
+    if roll:
+        cr, sr = pm.cos(roll), pm.sin(roll)
+        axes[:2] = [cr * axes[0] - sr * axes[1], sr * axes[0] + cr * axes[1]]
+    return axes
 
 
 @by_reference
@@ -94,18 +122,18 @@ class View(NamedTuple):
         return np.column_stack((x, y)), depth
 
 
-def pose_on_car(mount: CameraMount, x: float, y: float, z: float, heading: float, rise: float = 0.0) -> CameraPose:
-    """Returns the pose of a camera on a car.
+def pose_on_car(mount: SensorMount, x: float, y: float, z: float, heading: float, rise: float = 0.0) -> CameraPose:
+    """Returns the pose of a camera or another sensor on a car.
 
     Args:
-        mount: place of the camera on the car.
+        mount: place of the sensor on the car.
         x: x coordinate of the car [m].
         y: y coordinate of the car [m].
         z: z coordinate of the road below it [m].
         heading: heading of the car [rad].
         rise: rise of the road per metre ahead.
     """
-    return CameraPose(x, y, z, heading, pm.atan(rise)).mounted(mount.forward, mount.up, math.radians(mount.pitch))
+    return CameraPose(x, y, z, heading, pm.atan(rise)).mounted(mount)
 
 
 def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -> View:
@@ -117,8 +145,6 @@ def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -
         height: [pixels].
         field_of_view: horizontal [degrees].
     """
-    c, s = pm.cos(pose.heading), pm.sin(pose.heading)
-    cp, sp = pm.cos(pose.pitch), pm.sin(pose.pitch)
-    axes = np.array([[-s, c, 0.0], [-sp * c, -sp * s, cp], [cp * c, cp * s, sp]])
+    axes = axes_of(pose.heading, pose.pitch, pose.roll)
     focal = 0.5 * width / pm.tan(0.5 * math.radians(field_of_view))
     return View(np.array([pose.x, pose.y, pose.z]), axes, focal, width, height)

@@ -209,14 +209,14 @@ def draw_collected(view: View, buffer: VisibilityBuffer, mesh: Mesh, count: int,
         down = -(nx * axes[1, 0] + ny * axes[1, 1] + nz * axes[1, 2]) * step
         middle = (nx * axes[2, 0] + ny * axes[2, 1] + nz * axes[2, 2]) * scale - right * wide - down * high
         if values[_CHOICE + k] == _WHOLE:
-            _fill(
+            fill_triangle(
                 buffer, values[_AX + k], values[_AY + k], values[_BX + k], values[_BY + k], values[_CX + k],
                 values[_CY + k], middle, right, down, row + shift,
             )  # fmt: skip
         else:
             cut = buffer.cut
             for j in range(1, _cut_off(view, mesh, row, buffer.corners, cut) - 1):
-                _fill(
+                fill_triangle(
                     buffer, cut[0, 0], cut[0, 1], cut[j, 0], cut[j, 1], cut[j + 1, 0], cut[j + 1, 1], middle,
                     right, down, row + shift,
                 )  # fmt: skip
@@ -304,7 +304,7 @@ def _row(y: float, height: int) -> int:
 
 
 @compiled
-def _fill(
+def fill_triangle(
     buffer: VisibilityBuffer, ax: float, ay: float, bx: float, by: float, cx: float, cy: float, middle: float,
     right: float, down: float, number: int,
 ) -> None:  # fmt: skip

@@ -4,72 +4,61 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.town import LightColour, LightPhase
-from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
-from dorothie_gym.pictures.camera.cells import is_in_view
-from dorothie_gym.pictures.camera.first_person_camera import CameraFrame, FirstPersonCamera
-from dorothie_gym.pictures.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
-from dorothie_gym.pictures.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
-from dorothie_gym.pictures.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
-from dorothie_gym.pictures.camera.pose import CameraPose, View, pose_on_car
-from dorothie_gym.pictures.camera.road_slopes import RoadSlopes, rise_at
+from dorothie_gym.pictures.camera.body_placing import Bodies, BodyPlacer
+from dorothie_gym.pictures.camera.body_snapshots import snapshot_of
+from dorothie_gym.pictures.camera.first_person_camera import CameraFrame, EarlierView, FirstPersonCamera
+from dorothie_gym.pictures.camera.pose import CameraPose, pose_on_car
+from dorothie_gym.pictures.camera.road_slopes import rise_at
 from dorothie_gym.pictures.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows, lit_lenses
+from dorothie_gym.session.config import CameraOutput
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.sim.state.world_arrays import CAR_KEY
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.compilation import concurrent, fixed, inlined
-from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records
+from dorothie_gym.support.compilation.records import RecordArray
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.model import Array
+    from dorothie_gym.ontology.world_exceptions import Sensor
+    from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
     from dorothie_gym.pictures.camera.town_scene import SessionScene
     from dorothie_gym.session.config import CameraConfig
-    from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord
     from dorothie_gym.sim.weather import Weather
     from dorothie_gym.sim.world import World
 
-REACH = 250.0
-"""Distance up to which bodies are drawn [m]: a car is then two pixels high in a picture of 480 x 320."""
-
-SHADED = 120.0
-"""Distance up to which bodies out of view are listed, for their shadows and headlights [m]."""
-
-LIGHTS_BELOW = 6.0
-"""Altitude of the sun below which cars drive with their lights on [degrees]; also in rain and fog."""
-
-_LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # minimum precipitation and density of fog for this [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
 _PAINTS = np.zeros((2, max(Colour) + 1, 3), np.uint8)  # of lenses that are off and on, by `Colour`
 for _colour in Colour:
     _PAINTS[0, _colour], _PAINTS[1, _colour] = LENS_OFF[_colour], LENS_ON[_colour]
-_RAISED = np.array([LOOKS[material].relief in (Relief.RAISED, Relief.SLOPE) for material in Material])
-_AROUND, _HIGH = 12.0, 6.0  # [m] sizes that no body has, beside and above its place
-_BELOW = -1.0  # [m] height of the people in tunnels
-_FIRST_LIFTED, _FIRST_LEFT, _NOTHING = FIRST_PERSON, FIRST_PROP, int(Material.NOTHING)
 
 
-class Bodies(Protocol):
-    """Bodies of a world, such as its arrays."""
+class Moment(NamedTuple):
+    """A world at an earlier time.
 
-    @property
-    def vehicles(self) -> RecordArray[VehicleRecord]:
-        """Cars and cyclists; rows of the kind `Kind.EMPTY` are free."""
-        ...
+    Attributes:
+        x: x coordinate of the car [m].
+        y: y coordinate of the car [m].
+        height: z coordinate of the road below it [m].
+        heading: heading of the car [rad].
+        bodies: copy of the bodies.
+    """
 
-    @property
-    def pedestrians(self) -> RecordArray[PedestrianRecord]:
-        """People on foot; rows of the state `Walk.EMPTY` are free."""
-        ...
+    x: float
+    y: float
+    height: float
+    heading: float
+    bodies: Bodies
 
-    @property
-    def props(self) -> RecordArray[PropRecord]:
-        """Bodies on the road; rows that are not present are free."""
-        ...
+    @classmethod
+    def of(cls, world: World) -> Moment:
+        """Returns the present moment of a world."""
+        car = world.car
+        x, y = car.position.tolist()
+        return cls(x, y, float(car.height), float(car.heading), snapshot_of(world.actors.arrays))
 
 
 class SessionCamera:
@@ -84,13 +73,12 @@ class SessionCamera:
     def __init__(self, scene: SessionScene, config: CameraConfig) -> None:
         self.scene, self.config = scene, config
         self.camera = FirstPersonCamera(scene.camera_scene, config, scene.overlay)
-        self._placed = empty_records(PlacementRecord, 256)
+        self._placer, self._placer_before = BodyPlacer(scene.town), BodyPlacer(scene.town)
         self._halos = lit_lenses(scene.town.lenses, scene.town.signals)
         self.camera.glow(self._halos)
         self._shown: NDArray[np.int64] | None = None
         self._phases: list[LightPhase] | None = None  # that the lenses show, if those of the programmes
         self._steady = 0.0, 0.0  # [s] from when until when they stay
-        self._box = np.zeros((2, 3))
 
     def pose_on(self, x: float, y: float, z: float, heading: float) -> CameraPose:
         """Returns the pose of the camera on a car, which stands tilted on slopes.
@@ -104,14 +92,15 @@ class SessionCamera:
         rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
         return pose_on_car(self.config.mount, x, y, z, heading, rise)
 
-    def render(self, world: World) -> CameraFrame:
-        """Returns the picture that the camera takes of a world."""
+    def render(self, world: World, before: Moment | None = None) -> CameraFrame:
+        """Returns the picture that the camera takes of a world; optical flow is measured from `before`."""
         car = world.car
         x, y = car.position.tolist()
         pose = self.pose_on(x, y, float(car.height), float(car.heading))
         return self.render_from(
-            pose, world.actors.arrays, world.weather, time=world.time, head_lights=world.ego.lights, faults=world.faults
-        )
+            pose, world.actors.arrays, world.weather, time=world.time, head_lights=world.ego.lights,
+            faults=world.faults, before=before,
+        )  # fmt: skip
 
     def render_from(
         self,
@@ -124,6 +113,7 @@ class SessionCamera:
         faults: Collection[Sensor] = (),
         own: int = CAR_KEY,
         traffic_lights: Mapping[int, LightColour] | None = None,
+        before: Moment | None = None,
     ) -> CameraFrame:
         """Returns the picture from a pose.
 
@@ -136,14 +126,21 @@ class SessionCamera:
             faults: faulty sensors.
             own: key of the vehicle that carries the camera, which it does not see.
             traffic_lights: their states by signal, dark where missing; by default those of their programmes.
+            before: moment from which optical flow is measured; None for none.
         """
         if traffic_lights is None:
             self._show_programmes(time)
         else:
             self._show_lights(traffic_lights)
         placed = self.placed(pose, bodies, weather, own=own)
+        earlier = None
+        if before is not None and CameraOutput.OPTICAL_FLOW in self.config.outputs:
+            earlier = EarlierView(
+                self.pose_on(before.x, before.y, before.height, before.heading),
+                self._placer_before.place(self.camera.view_of(pose), before.bodies, weather, own=own),
+            )
         return self.camera.render(
-            pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults)
+            pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults), earlier=earlier
         )
 
     def placed(
@@ -153,16 +150,7 @@ class SessionCamera:
 
         They are overwritten by the next call. Arguments are those of `render_from`.
         """
-        room = len(bodies.vehicles) + len(bodies.pedestrians) + len(bodies.props)
-        if room > len(self._placed):
-            self._placed = empty_records(PlacementRecord, room)
-        placed = argument(self._placed)
-        town = self.scene.town
-        count = _place_and_lift(
-            argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props), self.camera.view_of(pose),
-            own, drives_with_lights(weather), town.ground.arrays, town.slopes, placed, self._box,
-        )  # fmt: skip
-        return placed[:count]
+        return self._placer.place(self.camera.view_of(pose), bodies, weather, own=own)
 
     def _show_programmes(self, time: float) -> None:
         """Paints the lenses in the colours that the programmes of the lights have at a time."""
@@ -197,67 +185,3 @@ class SessionCamera:
         rows = lens_rows(lenses, changed)
         counts = np.diff(lenses.ranges[changed], axis=1)[:, 0]
         self.camera.paint(rows, np.repeat(_PAINTS[lit[changed].astype(int), lenses.colours[changed]], counts, axis=0))
-
-
-def drives_with_lights(weather: Weather) -> bool:
-    """Returns whether other cars have their lights on: in the dark, in rain and in fog."""
-    values = weather.values
-    return (
-        values[WeatherParameter.SUN_ALTITUDE_ANGLE] < LIGHTS_BELOW
-        or values[WeatherParameter.PRECIPITATION] >= _LIGHTS_IN_RAIN
-        or values[WeatherParameter.FOG_DENSITY] >= _LIGHTS_IN_FOG
-    )
-
-
-@concurrent
-def _place(
-    vehicles: RecordArray[VehicleRecord], pedestrians: RecordArray[PedestrianRecord], props: RecordArray[PropRecord],
-    view: View, own: int, lights: bool, ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[PlacementRecord],
-    box: Array,
-) -> int:  # fmt: skip
-    """Lists bodies as `place_bodies` does, with people on top of kerbs, and vehicles with all wheels on the road.
-
-    The simulation has the height of the road for people. Distant bodies out of view are left out. Returns the number
-    of bodies.
-    """
-    count = place_bodies(vehicles, pedestrians, props, view.origin, REACH, own, lights, placed)
-    kept = 0
-    for k in range(count):
-        if not _is_near_or_in_view(view, placed[k], box):
-            continue
-        if kept < k:
-            _copy_placement(placed[k], placed[kept])
-        body = placed[kept]
-        kept += 1
-        if body.model < _FIRST_LIFTED:
-            body.rise = rise_at(slopes, body.x, body.y, body.z, body.cos, body.sin)
-        if _FIRST_LIFTED <= body.model < _FIRST_LEFT:
-            raised = _RAISED[material_at(ground, GROUND_SHEET, body.x, body.y)]
-            for sheet in range(1, len(ground.outside)):
-                material = material_at(ground, sheet, body.x, body.y)
-                if ground.outside[sheet] == _NOTHING:  # a bridge, on which there are no kerbs
-                    raised &= material == _NOTHING
-                else:  # a tunnel, with kerbs below the structures above it
-                    raised |= _RAISED[material] and body.z < _BELOW
-            if raised:
-                body.z += KERB_HEIGHT
-    return kept
-
-
-@inlined
-def _is_near_or_in_view(view: View, body: PlacementRecord, box: Array) -> bool:
-    x, y = body.x - view.origin[0], body.y - view.origin[1]
-    if x * x + y * y <= SHADED * SHADED:
-        return True
-    box[0, 0], box[0, 1], box[0, 2] = body.x - _AROUND, body.y - _AROUND, body.z - _HIGH
-    box[1, 0], box[1, 1], box[1, 2] = body.x + _AROUND, body.y + _AROUND, body.z + _HIGH
-    return is_in_view(view, box[0], box[1])
-
-
-@inlined
-def _copy_placement(body: PlacementRecord, target: PlacementRecord) -> None:
-    target.x, target.y, target.z, target.cos, target.sin = body.x, body.y, body.z, body.cos, body.sin
-    target.model, target.key, target.rise = body.model, body.key, body.rise
-
-
-_place_and_lift = fixed(_place)

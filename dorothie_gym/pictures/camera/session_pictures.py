@@ -1,31 +1,41 @@
-"""Pictures of the camera on the car of a session, for its observations and for spectators."""
+"""Pictures of the cameras on the car of a session, for its observations and for spectators, and scans."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.pictures.camera.range_sensors import CarState, Lidar, Radar
 from dorothie_gym.pictures.camera.scene_cache import town_scene
-from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.session_camera import Moment, SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
-from dorothie_gym.session.providers import FIELDS, OBSERVERS
+from dorothie_gym.session.providers import FIELDS, LIDAR_FIELDS, RADAR_FIELD, field_of
 from dorothie_gym.support.copying import CachedViews
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
     from dorothie_gym.session.scenario import Scenario
-    from dorothie_gym.session.spaces.observations import Observation
     from dorothie_gym.sim.world import World
+
+T = TypeVar("T")
 
 
 def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCamera:
     """Returns a camera on the car of a session."""
+    return SessionCamera(scene_of(town, scenario), config)
+
+
+def scene_of(town: Town, scenario: Scenario) -> SessionScene:
+    """Returns the scene of a session."""
     names = [name.label for name in scenario.street_names]
-    return SessionCamera(SessionScene(town_scene(town), names, scenario.storyboard.landmarks), config)
+    return SessionScene(town_scene(town), names, scenario.storyboard.landmarks)
 
 
 def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: tuple[int, int]) -> SessionCamera:
@@ -35,32 +45,88 @@ def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: t
 
 
 class SessionPictures(CachedViews):
-    """Pictures of a session, each drawn at its first use from the world's state; copies of a session draw their own."""
+    """Pictures and scans of a session, each made at its first use from the world's state; copies make their own."""
 
-    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_camera", "_taken")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_scene", "_cameras", "_lidar", "_radar", "_taken")
 
-    _taken: tuple[int, CameraFrame] | None = None
-
-    def __init__(self, world: World, scenario: Scenario, config: CameraConfig) -> None:
+    def __init__(self, world: World, scenario: Scenario, config: EnvConfig) -> None:
         self._world, self._scenario, self._config = world, scenario, config
+        self._needs_before = any(CameraOutput.OPTICAL_FLOW in camera.outputs for camera in config.all_cameras.values())
+        self._before: Moment | None = None
 
     @cached_property
-    def _camera(self) -> SessionCamera:
-        return camera_of(self._world.town, self._scenario, self._config)
+    def _scene(self) -> SessionScene:
+        return scene_of(self._world.town, self._scenario)
 
-    def frame(self, decision: int) -> CameraFrame:
-        """Returns the picture at the current decision, of this number."""
-        if self._taken is None or self._taken[0] != decision:
-            self._taken = decision, self._camera.render(self._world)
-        return self._taken[1]
+    @cached_property
+    def _cameras(self) -> dict[str, SessionCamera]:
+        return {name: SessionCamera(self._scene, config) for name, config in self._config.all_cameras.items()}
 
-    def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
-        """Adds the pictures of the current decision to the observations of the roles that see them."""
-        for role in OBSERVERS:
-            if role in observations:
-                observations[role].update(self._fields(decision))
+    @cached_property
+    def _lidar(self) -> Lidar | None:
+        return None if self._config.sensors.lidar is None else Lidar(self._scene, self._config.sensors.lidar)
 
-    def _fields(self, decision: int) -> dict[str, Any]:
-        frame = self.frame(decision)
-        parts = {FIELDS[output]: getattr(frame, output.value) for output in self._config.outputs if output in FIELDS}
-        return {name: part.copy() for name, part in parts.items()}
+    @cached_property
+    def _radar(self) -> Radar | None:
+        return None if self._config.sensors.radar is None else Radar(self._scene, self._config.sensors.radar)
+
+    @cached_property
+    def _taken(self) -> dict[str, tuple[int, Any]]:
+        """Last picture of each camera, and last readings of each other sensor, with the numbers of their decisions."""
+        return {}
+
+    def begin_decision(self) -> None:
+        """Notes the present, which optical flow is measured from, before the world is stepped."""
+        if self._needs_before:
+            self._before = Moment.of(self._world)
+
+    def frame(self, decision: int, name: str = "") -> CameraFrame | None:
+        """Returns the picture of a camera at the current decision, of this number; None for no such camera."""
+        if name not in self._config.all_cameras:
+            return None
+        return self._read(f"camera {name}", decision, lambda: self._cameras[name].render(self._world, self._before))
+
+    def readings(self, decision: int, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+        """Returns fields of observations at the current decision; callers must not write to them."""
+        found: dict[str, NDArray[np.generic]] = {}
+        for name, config in self._config.all_cameras.items():
+            fields = {field_of(output, name): output for output in config.outputs if output in FIELDS}
+            if any(field in names for field in fields):
+                frame = self.frame(decision, name)
+                found |= {field: getattr(frame, output.value) for field, output in fields.items() if field in names}
+        if self._lidar is not None and any(field in names for field in LIDAR_FIELDS.values()):
+            found |= self._read("lidar", decision, lambda: self._turn(decision))
+        if self._radar is not None and RADAR_FIELD in names:
+            found |= self._read("radar", decision, self._detect)
+        return found
+
+    def _read(self, sensor: str, decision: int, read: Callable[[], T]) -> T:
+        """Returns the reading of a sensor at a decision, which is made once."""
+        known = self._taken.get(sensor)
+        if known is None or known[0] != decision:
+            known = self._taken[sensor] = decision, read()
+        reading: T = known[1]
+        return reading
+
+    def _turn(self, decision: int) -> dict[str, NDArray[np.generic]]:
+        """Returns the fields of the turn of the lidar that ends at a decision."""
+        lidar, world = self._lidar, self._world
+        assert lidar is not None
+        swept = lidar.config.rate / self._config.decision_frequency  # turns in a decision
+        found = lidar.turn(
+            car_state(world), world.actors.arrays, world.weather, faults=world.faults,
+            sector=((decision - 1) * swept, decision * swept),
+        )  # fmt: skip
+        return {LIDAR_FIELDS[output]: getattr(found, output.value) for output in lidar.config.outputs}
+
+    def _detect(self) -> dict[str, NDArray[np.generic]]:
+        assert self._radar is not None
+        world = self._world
+        return {RADAR_FIELD: self._radar.detections(car_state(world), world.actors.arrays, world.weather)}
+
+
+def car_state(world: World) -> CarState:
+    """Returns the state of the car that its range sensors need."""
+    car = world.car
+    x, y = car.position.tolist()
+    return CarState(x, y, float(car.height), float(car.heading), float(car.speed))

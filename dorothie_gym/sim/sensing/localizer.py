@@ -182,6 +182,7 @@ def switch_on(world: WorldArrays, rng: np.random.Generator) -> None:
     scale, bias = rng.standard_normal(2)
     record["estimate"] = car["x"], car["y"], car["heading"], 1.0, 0.0
     record["covariance"] = _FIRST_COVARIANCE
+    record["fix"], record["fixed_at"] = (car["x"], car["y"]), 0
     record["truth"] = 1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias
     begin_stream(world.localizer[0], rng)
 
@@ -206,6 +207,7 @@ def localize(world: WorldArrays, dt: float) -> None:
         if now % FIX_EVERY == 0 and now >= record.gps_from:
             for axis in range(2):
                 fix = track[k + 1, axis] + GPS_SIGMA * record.draws[ODOMETRY_DRAWS + axis]
+                record.fix[axis], record.fixed_at = fix, now
                 correct(record.estimate, record.covariance, axis, fix)
 
 

@@ -230,6 +230,8 @@ class LocalizerRecord:
     step_high: UInt64
     step_low: UInt64
     gps_from: Int64  # frame before which there is no GPS
+    fix: Annotated[NDArray[np.float64], "f8", (2,)]  # the last fix: x, y [m]; at first the place of departure
+    fixed_at: Int64  # its frame
 
 
 class LineMarkRecord:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.town import LightColour
 from dorothie_gym.ontology import ObjectClass, WeatherParameter
+from dorothie_gym.pictures.camera.body_placing import REACH, SHADED
 from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.pose import CameraPose, pose_on_car
 from dorothie_gym.pictures.camera.scene_building import build_town_scene
 from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
-from dorothie_gym.pictures.camera.session_camera import REACH, SHADED, SessionCamera
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
