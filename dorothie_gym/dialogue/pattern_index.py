@@ -33,7 +33,11 @@ class PatternIndex:
         """Begins with the patterns, without flags; None stands for one that matches nothing."""
         parts = [frozenset[str]() if pattern is None else required_parts(pattern.pattern) for pattern in patterns]
         self._always = sum(1 << number for number, each in enumerate(parts) if each is None)
-        self._parts = [(number, each) for number, each in enumerate(parts) if each]
+        self._with_part: dict[str, int] = {}
+        for number, each in enumerate(parts):
+            for part in each or ():
+                self._with_part[part] = self._with_part.get(part, 0) | 1 << number
+        self._longest = max(map(len, self._with_part), default=0)
         self._of_word = functools.lru_cache(maxsize=8192)(self._patterns_of)
 
     def possible(self, words: Iterable[str]) -> int:
@@ -48,7 +52,11 @@ class PatternIndex:
         return found
 
     def _patterns_of(self, word: str) -> int:
-        return sum(1 << number for number, parts in self._parts if any(part in word for part in parts))
+        found, end = 0, len(word)
+        for begin in range(end - _LEAST + 1):
+            for behind in range(begin + _LEAST, min(begin + self._longest, end) + 1):
+                found |= self._with_part.get(word[begin:behind], 0)
+        return found
 
 
 def bits(number: int) -> Iterator[int]:
