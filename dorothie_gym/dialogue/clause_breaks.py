@@ -143,12 +143,14 @@ def with_breaks(text: str, *, answering: bool = True) -> str:
     if len(raw) < 3:
         return text
     words = [plain_word(word) for word in raw]
+    if not answering and words[0] not in _YES_AND_NO:
+        return with_breaks(text)
     begin = 0
     changed = False
     for place in range(1, len(raw)):
         if raw[place - 1].endswith(_MARKS):
             begin = place
-        elif _begins_clause(words, begin, place) and (answering or begin or words[0] not in _YES_AND_NO):
+        elif _begins_clause(words, begin, place) and (answering or begin):
             raw[place - 1] += ","
             begin, changed = place, True
     if raw[-1][-1] not in _MARKS and _asks_for_agreement(words):

@@ -22,6 +22,7 @@ from dorothie_gym.dialogue.move_decision import (
     stand_apart,
 )
 from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.dialogue.pattern_index import PatternIndex, bits
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import behind_signs
 from dorothie_gym.dialogue.span_features import span_features
@@ -190,6 +191,21 @@ class MoveCues:
     small_talk: frozenset[str]
     reports: frozenset[str]
 
+    @functools.cached_property
+    def masked(self) -> PatternIndex:
+        """Index of the rules by their patterns over masked words."""
+        return PatternIndex([rule.masked for rule in self.rules])
+
+    @functools.cached_property
+    def acted(self) -> PatternIndex:
+        """Index of the rules by their patterns over words with actions masked."""
+        return PatternIndex([rule.acted for rule in self.rules])
+
+    @functools.cached_property
+    def by_domain(self) -> int:
+        """Rules for which any word of the driving domain is a cue, as the index numbers them."""
+        return sum(1 << number for number, rule in enumerate(self.rules) if rule.domain)
+
 
 @functools.lru_cache(maxsize=4096)
 def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
@@ -246,9 +262,10 @@ def _behind_signs(parsed: ParsedText, move: DialogueMove, after: DialogueMove | 
     return move if found in _OF_SIGNS else found
 
 
-def _plain_words(text: str) -> list[str]:
+@functools.lru_cache(maxsize=2048)
+def _plain_words(text: str) -> Sequence[str]:
     lists = word_lists()
-    return without_asides(without_vocative(split_words(text), lists), lists)
+    return tuple(without_asides(without_vocative(split_words(text), lists), lists))
 
 
 def _is_bare_place(parsed: ParsedText) -> bool:
@@ -262,15 +279,17 @@ def _move_of(parsed: ParsedText) -> DialogueMove:
     sentence, acted = parsed.masked.strip(" ,"), parsed.acted.strip(" ,")
     if _is_small_talk(parsed):
         return DialogueMove.IRRELEVANT
-    words = set(sentence.split())
-    for rule in _cues().rules:
+    words, cues = set(sentence.split()), _cues()
+    masked_cues, acted_cues = cues.masked.possible(words), cues.acted.possible(acted.split())
+    for number in bits(masked_cues | acted_cues | cues.by_domain):
+        rule = cues.rules[number]
         if rule.words and words.isdisjoint(rule.words):
             continue
-        if rule.masked is not None and rule.masked.search(sentence):
+        if rule.masked is not None and masked_cues >> number & 1 and rule.masked.search(sentence):
             return rule.move
-        if rule.acted is not None and rule.acted.search(acted):
+        if rule.acted is not None and acted_cues >> number & 1 and rule.acted.search(acted):
             return rule.move
-        if rule.domain and not words.isdisjoint(_cues().domain):
+        if rule.domain and not words.isdisjoint(cues.domain):
             return rule.move
     return _by_form(parsed, sentence)
 

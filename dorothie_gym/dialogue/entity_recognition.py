@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from rapidfuzz import fuzz, process
 
@@ -111,14 +112,14 @@ def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Men
         The mentions in order, and the words with each mention replaced by "#landmark", "#street", "#object" or
         "#status", or by "#what" for a queried value.
     """
-    index, known = _index(), known_words()
+    first_words, known = _first_words(), known_words()
     words = tuple(words)
     mentions: list[Mention] = []
     masked: list[str] = []
     place = 0
     while place < len(words):
         word = words[place]
-        if word not in index and word in known:
+        if word in known and word not in first_words:
             masked.append(word)
             place += 1
             continue
@@ -126,7 +127,7 @@ def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Men
         if value is None:
             masked += words[place : place + length]
         else:
-            guessed = word not in index and word.removesuffix("'s") not in index
+            guessed = word not in first_words and word.removesuffix("'s") not in first_words
             contracted = words[place + length - 1].endswith("'s")
             mentions.append(Mention(value, len(masked), guessed=guessed, first=word, contracted=contracted))
             masked.append("#what" if value.label == "Queried" else f"#{value.slot.label.lower()}")
@@ -137,14 +138,10 @@ def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Men
 
 
 def _at(words: tuple[str, ...], place: int, statuses: bool) -> tuple[SlotValue | None, int]:
-    for name, value in _index().get(words[place], ()):
-        if not statuses and value is not None and value.slot is Slot.STATUS:
-            continue
-        if words[place : place + len(name)] == name:
-            return value, len(name)
-        if len(name) > 1 and value is not None and value.slot is Slot.LANDMARK:
-            if words[place : place + len(name)] == (*name[:-1], f"{name[-1]}'s"):
-                return value, len(name)
+    for length, names in _index(statuses).get(words[place], ()):
+        name = words[place : place + length]
+        if name in names:
+            return names[name], length
     word = words[place].removesuffix("'s")
     if word != words[place] and (word,) in load_lexicon().names:
         return load_lexicon().names[word,], 1
@@ -171,14 +168,30 @@ def nearest_name(word: str) -> SlotValue | None:
 
 
 @functools.cache
-def _index() -> Mapping[str, tuple[tuple[tuple[str, ...], SlotValue | None], ...]]:
-    """Returns the names by their first word, the longest first; the value None marks phrases to ignore."""
-    found: dict[str, list[tuple[tuple[str, ...], SlotValue | None]]] = defaultdict(list)
+def _first_words() -> frozenset[str]:
+    """Returns the first words of names, and of phrases to ignore."""
+    return frozenset(_index(True))
+
+
+_Names: TypeAlias = Mapping[tuple[str, ...], SlotValue | None]
+
+
+@functools.cache
+def _index(statuses: bool) -> Mapping[str, tuple[tuple[int, _Names], ...]]:
+    """Returns the names by first word and number of words, the longest first; the value None marks phrases to ignore.
+
+    Landmarks of several words have a form in "'s" as well.
+    """
+    found: dict[str, dict[int, dict[tuple[str, ...], SlotValue | None]]] = defaultdict(lambda: defaultdict(dict))
     for name in load_lexicon().ignored:
-        found[name[0]].append((name, None))
+        found[name[0]][len(name)][name] = None
     for name, value in load_lexicon().names.items():
-        found[name[0]].append((name, value))
-    return {first: tuple(sorted(named, key=lambda item: -len(item[0]))) for first, named in found.items()}
+        if statuses or value.slot is not Slot.STATUS:
+            same = found[name[0]][len(name)]
+            same.setdefault(name, value)
+            if len(name) > 1 and value.slot is Slot.LANDMARK:
+                same.setdefault((*name[:-1], f"{name[-1]}'s"), value)
+    return {first: tuple(sorted(named.items(), reverse=True)) for first, named in found.items()}
 
 
 @functools.cache

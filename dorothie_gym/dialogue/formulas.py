@@ -37,6 +37,8 @@ _SENT_ON: Final = re.compile(r"\byou (?:can|may|could) (?:go|carry|drive) (?:on|
 def formula_move(words: Sequence[str]) -> DialogueMove | None:
     """Returns the move of words that consist of formulas only ("right, okay, thank you"); None of other words."""
     words = [word for word in words if word != ","]
+    if not words or not _formulas().may_begin(words[0]):
+        return None
     if _SENT_ON.search(" ".join(words)):
         return None
     formulas, place = _formulas(), 0

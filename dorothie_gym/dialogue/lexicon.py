@@ -93,10 +93,16 @@ def split_words(text: str) -> list[str]:
 
     Spellings of speech and of dialects become plain words, see data/spoken_forms.yaml.
     """
+    return list(_tokens(text))
+
+
+@functools.lru_cache(maxsize=4096)
+def _tokens(text: str) -> tuple[str, ...]:
     plain = _STOP.sub(" , ", _fluent(text.lower().translate(_APOSTROPHES)).translate(_TYPOGRAPHY))
-    return [part for word in _WORD.findall(plain) for part in _spoken(word)]
+    return tuple(part for word in _WORD.findall(plain) for part in _spoken(word))
 
 
+@functools.lru_cache(maxsize=8192)
 def plain_word(word: str) -> str:
     """Returns a word of a text in lower case, without marks around it and with its plain spelling."""
     word = _fluent(word.lower().translate(_APOSTROPHES)).strip(_EDGES)

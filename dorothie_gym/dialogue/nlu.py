@@ -14,6 +14,7 @@ from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.named_values import meant_values
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, may_be_speed, read_cardinals
+from dorothie_gym.dialogue.pattern_index import PatternIndex, bits
 from dorothie_gym.dialogue.plan_fields import named_actions, planned_change, planned_number, planned_turns
 from dorothie_gym.dialogue.plan_parser import PlanParse
 from dorothie_gym.dialogue.plan_reading import read_plan, with_plain_lights
@@ -235,7 +236,8 @@ def understand(text: str) -> ParsedText:
         question="?" in words,
         asked=_first("questions", "asks", masked),
         about_hearing="?" in words and _HEARING.search(spoken) is not None,
-        told=_first("statements", "says", _stated(masked)) or _first("statements", "says", _stated(spoken)),
+        told=_first("statements", "says", _stated(masked))
+        or (None if masked == spoken else _first("statements", "says", _stated(spoken))),
         plan=parse.plan,
         parse=parse,
     )
@@ -336,8 +338,8 @@ def _question_patterns() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
 
 
 @functools.cache
-def _propositions(table: str, key: str) -> tuple[tuple[re.Pattern[str], Proposition], ...]:
-    """Returns the patterns of a table of cues.yaml, with their propositions; the first that fits decides."""
+def _propositions(table: str, key: str) -> tuple[Sequence[tuple[re.Pattern[str], Proposition]], PatternIndex]:
+    """Returns the patterns of a table of cues.yaml with their propositions, of which the first that fits decides."""
     found = []
     for number, row in enumerate(read_data("cues.yaml").get(table, [])):
         where = f"cues.yaml: {table}[{number}]"
@@ -346,12 +348,14 @@ def _propositions(table: str, key: str) -> tuple[tuple[re.Pattern[str], Proposit
             found.append((pattern, Proposition.from_json(row[key], f"{where}.{key}")))
         except (re.error, ValueError) as error:
             raise PhraseFileError(f"{where}: {error}") from error
-    return tuple(found)
+    return found, PatternIndex([pattern for pattern, _ in found])
 
 
 def _first(table: str, key: str, masked: str) -> Proposition | None:
     sentence = masked.strip(" ,?")
-    return next((said for pattern, said in _propositions(table, key) if pattern.search(sentence)), None)
+    rows, index = _propositions(table, key)
+    possible = (rows[number] for number in bits(index.possible(sentence.split())))
+    return next((said for pattern, said in possible if pattern.search(sentence)), None)
 
 
 _QUESTION_WORDS = frozenset({"what", "which", "where", "what's", "where's", "how", "wheres", "whats", "where'd"})

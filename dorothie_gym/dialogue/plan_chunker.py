@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Final
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, TypeAlias
 
 from dorothie_gym.dialogue.clause_moods import is_participle
 from dorothie_gym.dialogue.contingencies import find_contingency
-from dorothie_gym.dialogue.plan_directions import DirectionReader
+from dorothie_gym.dialogue.plan_directions import DirectionReader, begins_direction
 from dorothie_gym.dialogue.plan_items import (
     SIDES,
     ActionItem,
@@ -22,9 +23,10 @@ from dorothie_gym.dialogue.plan_items import (
     UnitItem,
     VerbItem,
     WordItem,
+    begins_ordinal,
 )
-from dorothie_gym.dialogue.plan_nouns import NounReader
-from dorothie_gym.dialogue.plan_quantities import QuantityReader
+from dorothie_gym.dialogue.plan_nouns import NounReader, begins_noun_phrase
+from dorothie_gym.dialogue.plan_quantities import QuantityReader, begins_quantity
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
 from dorothie_gym.dialogue.routes import ConditionRelation
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
@@ -53,6 +55,8 @@ _STATES: Final = frozenset(
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
+_CANCELLING: Final = frozenset({"forget", "drop", "dropping", "lose", "remove", "scrub", "ditch"})
+"""First words of giving up an errand or a turn."""
 _RANKS: Final = {"first": "advance", "beforehand": "advance", "last": "defer"}
 """Adverbs behind an errand that put it in front of, or behind the others."""
 _BEHIND_RANKS: Final = frozenset({"", ",", "?", "and", "then", "please", "though", "but"})
@@ -115,28 +119,18 @@ def read_items(
 
 class _Reader(DirectionReader, NounReader, QuantityReader):
     def read(self) -> list[Item]:
-        place = 0
-        rules = (
-            self._comma,
-            self._contingency,
-            self._cancelled,
-            self._stop_noun,
-            self._ranked,
-            self.read_direction,
-            self.read_quantity,
-            self._phrase,
-            self._noun,
-            self._unknown,
-        )
+        place, subjects = 0, self.grammar.subjects
         while place < len(self.words):
-            self._new_clause(place)
-            place = next(end for rule in rules if (end := rule(place)) > place)
+            word = self.words[place]
+            if word in subjects:
+                self._new_clause(place)
+            place = next(end for rule in _rules_from(word) if (end := rule(self, place)) > place)
         return self.items
 
     def _new_clause(self, place: int) -> None:
         """Adds the border before a subject with its verb: "go on | there's nothing coming"."""
         before = self.words[place - 1] if place else ","
-        if self.words[place] in self.grammar.subjects and before not in (*self.grammar.subordinators, ",", "?"):
+        if before not in self.grammar.subordinators and before not in (",", "?"):
             self.items.append(BoundaryItem("and", place))
 
     def _unknown(self, place: int) -> int:
@@ -149,6 +143,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
 
     def _stop_noun(self, place: int) -> int:
         """Skips "the next stop", which is an errand and no order to stop."""
+        if "stop" not in self.words:
+            return place
         number, behind = self.ordinal(place)
         if (number is not None or self.words[place] in ("last", "only")) and self.word_at(
             max(behind, place + 1)
@@ -166,8 +162,6 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         return place + 1
 
     def _comma(self, place: int) -> int:
-        if self.words[place] not in (",", "?"):
-            return place
         self.items.append(BoundaryItem(",", place + 1))
         return place + 1
 
@@ -294,8 +288,6 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         word, end = self.words[place], place + 2
         if word == "forget" and self.word_at(place + 1) in ("that", "it"):
             return self.word_at(end) in SIDES or end in self.names or self.word_at(end) in ("turn", "one", "stop")
-        if word not in ("drop", "dropping", "lose", "remove", "scrub", "ditch"):
-            return False
         behind = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
         named = isinstance(self.names.get(behind), LandmarkName) and self.names[behind] is not LandmarkName.PERSON
         return named and self.word_at(behind + 1) in (
@@ -392,3 +384,31 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return place
         self.items.append(found)
         return behind
+
+
+_Rule: TypeAlias = Callable[[_Reader, int], int]
+"""Reads what begins at a token; returns the token behind it, or the token itself if the rule does not apply."""
+
+_STOPS: Final = frozenset({"last", "only"})
+"""Words that count stops as ordinals do."""
+
+
+@functools.lru_cache(maxsize=4096)
+def _rules_from(word: str) -> tuple[_Rule, ...]:
+    """Returns the rules, in order, that may apply to words of which this is the first; the last one always does."""
+    grammar = route_grammar()
+    if word in (",", "?"):
+        return (_Reader._comma,)
+    counts = begins_ordinal(word, grammar)
+    rules: tuple[tuple[_Rule, bool], ...] = (
+        (_Reader._contingency, grammar.contingencies.may_begin(word)),
+        (_Reader._cancelled, word in _CANCELLING),
+        (_Reader._stop_noun, counts or word in _STOPS),
+        (_Reader._ranked, word in _RANKS),
+        (_Reader.read_direction, counts or begins_direction(word, grammar)),
+        (_Reader.read_quantity, begins_quantity(word)),
+        (_Reader._phrase, grammar.terminals.may_begin(word)),
+        (_Reader._noun, counts or begins_noun_phrase(word, grammar)),
+        (_Reader._unknown, True),
+    )
+    return tuple(rule for rule, may_apply in rules if may_apply)

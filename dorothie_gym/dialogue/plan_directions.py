@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dorothie_gym.dialogue.plan_items import SIDES, ActionItem, LaneItem, SideItem, TokenReader, TurnItem
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ObjectClass
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.route_grammar import RouteGrammar
 
 _SIDE_WORDS: Final = frozenset({"on", "at", "to", "in", "into", "onto", "along", "down"})
 _BESIDE: Final = frozenset({"on", "at", "along", "down"})
@@ -62,6 +65,8 @@ class DirectionReader(TokenReader):
 
     def read_direction(self, place: int) -> int:
         """Reads a direction with the words around it: a turn, a lane, or a side."""
+        if SIDES.keys().isdisjoint(self.words):
+            return place
         found = self._direction(place)
         if found is None:
             return place
@@ -157,3 +162,8 @@ class DirectionReader(TokenReader):
             rest = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
             return rest + 1 if self.word_at(rest) in ("street", "road", "car") else place
         return place
+
+
+def begins_direction(word: str, grammar: RouteGrammar) -> bool:
+    """Returns whether a word that counts nothing may begin what `DirectionReader.read_direction` reads."""
+    return word in SIDES or word in _SIDE_WORDS or word in _DEGREES or word in grammar.determiners

@@ -172,3 +172,10 @@ class TokenReader:
             counts = read_cardinals([word])
             number = counts[0] if counts and 2 <= counts[0] <= 9 else None
         return (None, start) if number is None else (number, place + 1)
+
+
+def begins_ordinal(word: str, grammar: RouteGrammar) -> bool:
+    """Returns whether a word may begin what `TokenReader.ordinal` reads."""
+    base = word.removesuffix("'s")
+    counted = base == "following" or read_ordinal(base) is not None or base in NUMBER_WORDS or base[:1].isdigit()
+    return counted or word in grammar.determiners or word == "very"

@@ -9,7 +9,7 @@ from dorothie_gym.dialogue.routes import Anaphor, PlaceReference
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.route_grammar import Match
+    from dorothie_gym.dialogue.route_grammar import Match, RouteGrammar
 
 _ONE: Final = frozenset({"a", "one", "another"})
 _POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
@@ -125,3 +125,9 @@ class NounReader(TokenReader):
         street = self.names.get(place + 1) if self.word_at(place) in _POSTPOSITIONS else None
         named = isinstance(street, StreetName) and street is not StreetName.QUERIED
         return (street, place + 2) if named and isinstance(street, StreetName) else (None, place)
+
+
+def begins_noun_phrase(word: str, grammar: RouteGrammar) -> bool:
+    """Returns whether a word that counts nothing may begin what `NounReader.noun_phrase` reads."""
+    named = word.startswith("#") or word.endswith("'s") or word in grammar.modifiers or word in _ONE
+    return named or grammar.references.may_begin(word) or grammar.opportunities.may_begin(word)

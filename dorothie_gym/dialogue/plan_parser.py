@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -144,23 +144,6 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         super().__init__()
         self.turned = False  # whether anything names a turn
         self.sided = False  # whether anything names a lane or a side
-        self._rules: dict[type, Callable[[Any], None]] = {
-            ActionItem: self._action,
-            VerbItem: self._verb,
-            TurnItem: self.read_turn,
-            LaneItem: self.read_lane,
-            SideItem: self.read_side,
-            ConditionItem: self.read_condition,
-            ContingencyItem: self._contingency,
-            NounPhrase: self.read_place,
-            DistanceItem: self.read_distance,
-            SpeedItem: self.read_speed,
-            BoundaryItem: self._boundary,
-            RepairItem: self._repair,
-            NegationItem: self._negate,
-            UnitItem: self.read_unit,
-            WordItem: self._word,
-        }
 
     def read(self, sentence: Sentence) -> None:
         """Reads a sentence; it begins a clause."""
@@ -174,7 +157,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
             counted = self.counting
             self.turned = self.turned or isinstance(item, TurnItem)
             self.sided = self.sided or isinstance(item, SideItem | LaneItem)
-            self._rules[type(item)](item)
+            _RULES[type(item)](self, item)
             self.counting = self.counting and not counted
 
     def _clause(self, place: int, *, new: bool) -> None:
@@ -470,3 +453,23 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         if frame is not None and frame.bare and not self.fresh and frame is self.frames[-1]:
             if item.word in route_grammar().finite or item.word in _PAST or item.word.endswith(("ed", "'s")):
                 frame.mood, frame.bare = ClauseMood.STATEMENT, False
+
+
+_RULES: Final[Mapping[type, Callable[[_Builder, Any], None]]] = {
+    ActionItem: _Builder._action,
+    VerbItem: _Builder._verb,
+    TurnItem: _Builder.read_turn,
+    LaneItem: _Builder.read_lane,
+    SideItem: _Builder.read_side,
+    ConditionItem: _Builder.read_condition,
+    ContingencyItem: _Builder._contingency,
+    NounPhrase: _Builder.read_place,
+    DistanceItem: _Builder.read_distance,
+    SpeedItem: _Builder.read_speed,
+    BoundaryItem: _Builder._boundary,
+    RepairItem: _Builder._repair,
+    NegationItem: _Builder._negate,
+    UnitItem: _Builder.read_unit,
+    WordItem: _Builder._word,
+}
+"""What is done with an item, by its class."""

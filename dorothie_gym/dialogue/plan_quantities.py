@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from dorothie_gym.dialogue.numerals import CAR_LENGTH, may_be_speed, read_cardinals
 from dorothie_gym.dialogue.plan_items import ActionItem, DistanceItem, SpeedItem, TokenReader
-
-if TYPE_CHECKING:
-    pass
 
 _BEHIND_SPEED: Final = frozenset(
     {
@@ -31,6 +28,10 @@ _BEHIND_SPEED: Final = frozenset(
     }
 )
 """Words behind a number that is a speed."""
+_AIMING: Final = frozenset({"to", "at", "down", "of", "under", "below", "above", "over"})
+"""Words in front of a speed to drive at."""
+_ROUGH: Final = frozenset({"a", "an", "another", "half", "quarter", "couple", "few", "hundred"})
+"""First words of numbers beside cardinals."""
 _LEAST_SPEED: Final = 5
 _LENGTHS: Final = frozenset({"length", "lengths"})
 _THOUSANDS: Final = frozenset({"k", "ks", "k's"})
@@ -45,7 +46,7 @@ class QuantityReader(TokenReader):
 
     def read_quantity(self, place: int) -> int:
         """Reads a distance or a speed."""
-        begin, aimed = place, self.word_at(place) in ("to", "at", "down", "of", "under", "below", "above", "over")
+        begin, aimed = place, self.word_at(place) in _AIMING
         number, end = self._number(place + aimed)
         if number is None:
             return place
@@ -151,3 +152,8 @@ class QuantityReader(TokenReader):
                 break
             length += 1
         return length
+
+
+def begins_quantity(word: str) -> bool:
+    """Returns whether a word may begin what `QuantityReader.read_quantity` reads."""
+    return word in _AIMING or word in _ROUGH or bool(read_cardinals([word]))

@@ -92,8 +92,14 @@ class PhraseIndex:
         self._nodes: dict[frozenset[_Position], _Node] = {}
         self._start = _Node(frozenset(), None)
 
+    def may_begin(self, word: str) -> bool:
+        """Returns whether a phrase may begin with a word."""
+        return word in self._beginning
+
     def longest(self, words: Sequence[str], place: int, stop: int | None = None) -> Match | None:
         """Returns the longest phrase that begins at a place of `words` and ends before `stop`; None without any."""
+        if place >= len(words) or words[place] not in self._beginning:
+            return None
         node, ended, length, known = self._start, None, 0, self._words
         for number in range(place, len(words) if stop is None else stop):
             word = words[number]

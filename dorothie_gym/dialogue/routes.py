@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -113,14 +114,14 @@ class PlanPart:
     """
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if value is not None or field.default is dataclasses.MISSING:
-                _check(f"{type(self).__name__}.{field.name}", field.name, value)
+        for name, required in _fields_of(type(self)):
+            value = getattr(self, name)
+            if value is not None or required:
+                _check(f"{type(self).__name__}.{name}", name, value)
 
     def to_json(self) -> dict[str, JsonValue]:
         """Returns the fields that are given, in JSON types; `from_json` is the inverse."""
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        values = {name: getattr(self, name) for name, _ in _fields_of(type(self))}
         return {name: _plain(value) for name, value in values.items() if value is not None}
 
     @classmethod
@@ -154,6 +155,12 @@ class PlanPart:
             return cls(**values)
         except OntologyError as error:
             raise OntologyError(f"{where}: {error}") from None
+
+
+@functools.cache
+def _fields_of(part: type[PlanPart]) -> tuple[tuple[str, bool], ...]:
+    """Returns the names of the fields of a class, each with whether it must be given."""
+    return tuple((field.name, field.default is dataclasses.MISSING) for field in dataclasses.fields(part))
 
 
 @shared

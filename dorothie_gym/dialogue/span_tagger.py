@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.dialogue.span_inputs import MASKS, SIGNS, SpanFeatures
+from dorothie_gym.dialogue.span_inputs import MASKS, SpanFeatures
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.spellings import parse_move
 from dorothie_gym.support.compilation import compiled
@@ -139,21 +139,23 @@ class SpanTagger:
         number = len(features.words)
         places = np.zeros(number, np.int64)
         places[0], places[-1] = 1, 2
-        signs = np.array(features.signs, np.int32).reshape(number, SIGNS) << INPUT_BITS
-        return np.ascontiguousarray(
-            np.concatenate(
-                (
-                    np.stack([_word_vector(self, word) for word in features.words]),
-                    self.marks[list(features.marks)],
-                    self.begins[[int(begins) for begins in features.begins]],
-                    self.rules[[self.moves.index(move) for move in features.moves]],
-                    self.places[places],
-                    signs,
-                ),
-                axis=1,
+        return np.concatenate(
+            (
+                np.array([_word_vector(self, word) for word in features.words]),
+                self.marks[list(features.marks)],
+                self.begins[[int(begins) for begins in features.begins]],
+                self.rules[[self.moves.index(move) for move in features.moves]],
+                self.places[places],
+                np.array([_sign_vector(signs) for signs in features.signs]),
             ),
-            dtype=np.int32,
+            axis=1,
         )
+
+
+@functools.lru_cache(maxsize=1024)
+def _sign_vector(signs: tuple[int, ...]) -> Whole:
+    """Returns the vector of the signs of a span."""
+    return np.array(signs, np.int32) << INPUT_BITS
 
 
 @functools.lru_cache(maxsize=16384)

@@ -15,6 +15,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.labelled_enums import check_complete
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
+from dorothie_gym.policies.decision_random import decision_random
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
@@ -276,7 +277,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
     def step(self, observation: ObservationMapping, state: AdWizardState) -> tuple[ActionDict, AdWizardState]:
         """Plays a trick, undoes one, or does nothing."""
         state = state.advanced()
-        rng = np.random.default_rng((state.seed, state.count))
+        rng = decision_random(state.seed, state.count)
         now = scalar(observation, "time")
         action, state = _restore(state, observation, now)
         if action is None and self.plays_tasks and plays_every_exception(observation["story"]):

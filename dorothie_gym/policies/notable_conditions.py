@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,7 +17,7 @@ from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
-from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
+from dorothie_gym.policies.observation_parser import SeenObject, scalar
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.speech import Remark, intend
@@ -183,13 +184,18 @@ def notice(
 
 def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tuple[W, bool]]:
     """Yields the parameters that have become conspicuous (True), or are no longer (False), since they were noted."""
-    now = {parameter: weather(observation, parameter) for parameter in W}
-    for parameter, measure in CONSPICUOUS.items():
-        value = measure(now)
+    for parameter, value in _conspicuousness(tuple(observation["weather"].tolist())):
         if value >= 1.0 and parameter not in noted:
             yield parameter, True
         elif value < OVER and parameter in noted:
             yield parameter, False
+
+
+@functools.lru_cache(maxsize=256)
+def _conspicuousness(values: tuple[float, ...]) -> tuple[tuple[W, float], ...]:
+    """Returns the conspicuousness of each parameter in a weather; most decisions have the same."""
+    now = dict(zip(W, values, strict=True))
+    return tuple((parameter, measure(now)) for parameter, measure in CONSPICUOUS.items())
 
 
 def crowds_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> list[ObjectClass]:

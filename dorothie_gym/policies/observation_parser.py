@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
 PARAMETERS = tuple(WeatherParameter)
+_WEATHER_COLUMN = {parameter: column for column, parameter in enumerate(PARAMETERS)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,23 +188,24 @@ def _rows(table: bytes, columns: int) -> list[list[float]]:
 def read_objects(observation: ObservationMapping) -> tuple[SeenObject, ...]:
     """Returns the rows of `objects` in use, nearest first."""
     column = ObjectColumn
+    rows: list[list[float]] = observation["objects"].tolist()
     return tuple(
         SeenObject(
             kind=ObjectClass(int(row[column.KIND])),
-            x=float(row[column.X]),
-            y=float(row[column.Y]),
-            distance=float(row[column.DISTANCE]),
-            length=float(row[column.LENGTH]),
-            width=float(row[column.WIDTH]),
+            x=row[column.X],
+            y=row[column.Y],
+            distance=row[column.DISTANCE],
+            length=row[column.LENGTH],
+            width=row[column.WIDTH],
         )
-        for row in observation["objects"]
+        for row in rows
         if row[column.KIND] > 0
     )
 
 
 def weather(observation: ObservationMapping, parameter: WeatherParameter) -> float:
     """Returns a parameter of the weather, in its own unit."""
-    return float(observation["weather"][PARAMETERS.index(parameter)])
+    return float(observation["weather"][_WEATHER_COLUMN[parameter]])
 
 
 def is_foggy(observation: ObservationMapping) -> bool:
@@ -223,7 +225,10 @@ def is_dark(observation: ObservationMapping) -> bool:
 
 def scalar(observation: ObservationMapping, name: str) -> float:
     """Returns the value of a field of one number."""
-    return float(np.asarray(observation[name]).reshape(-1)[0])
+    value = observation[name]
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return float(value.item())
+    return float(np.asarray(value).reshape(-1)[0])
 
 
 def place_on_lanes(

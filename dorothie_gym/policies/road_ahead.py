@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -173,12 +174,13 @@ def _straight_lanes(town: Town, lane: int, reach: float) -> Iterator[int]:
                 return
             lane = beside
             continue
-        beside = next((other for other in lanes_beside(town, lane) if way in town.exits(other)), None)
-        if way not in town.exits(lane) and beside is not None:
+        beside = _turned_from(town, lane)
+        if beside is not None:
             yield beside
         lane = way.connector
 
 
+@lru_cache(maxsize=8192)
 def _onward(town: Town, lane: int) -> Exit | None:
     """Returns how a road goes on behind a lane: straight across a junction, or as the only way leads."""
     exits = town.exits(lane)
@@ -190,6 +192,16 @@ def _onward(town: Town, lane: int) -> Exit | None:
     return exits[0] if len(exits) == 1 and not _parts(town, lane) else None
 
 
+@lru_cache(maxsize=8192)
+def _turned_from(town: Town, lane: int) -> int | None:
+    """Returns the lane beside a lane from which the road goes on; None where it does so from the lane itself."""
+    way = _onward(town, lane)
+    if way in town.exits(lane):
+        return None
+    return next((other for other in lanes_beside(town, lane) if way in town.exits(other)), None)
+
+
+@lru_cache(maxsize=8192)
 def _parts(town: Town, lane: int) -> bool:
     """Returns whether the lanes beside a lane lead to another road behind the junction than the lane itself."""
     roads = {town.lanes[way.lane].road_id for one in (lane, *lanes_beside(town, lane)) for way in town.exits(one)}
@@ -197,12 +209,18 @@ def _parts(town: Town, lane: int) -> bool:
 
 
 def _crossing_at(town: Town, lane: int, distance: float) -> tuple[Crossing, ...]:
+    return tuple(crossing._replace(distance=max(distance, 0.0)) for crossing in _crossing_behind(town, lane))
+
+
+@lru_cache(maxsize=8192)
+def _crossing_behind(town: Town, lane: int) -> tuple[Crossing, ...]:
+    """Returns the junction at the end of a lane, at the distance 0; none if it has one way only."""
     exits = tuple(way for one in (lane, *lanes_beside(town, lane)) for way in town.exits(one))
     junction = max((way.junction_id for way in exits), default=-1)
     if junction < 0 or town.lanes[lane].in_junction or not _parts(town, lane):
         return ()
     lights = town.light(lane, 0.0) is not None
-    return (Crossing(lane, max(distance, 0.0), junction, lights, exits),)
+    return (Crossing(lane, 0.0, junction, lights, exits),)
 
 
 def turned(town: Town, before: int, after: Place) -> float:

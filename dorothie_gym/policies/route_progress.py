@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import PolicyStateError
-from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.model import Exit, IntArray, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, place_records
 from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
 from dorothie_gym.maps.routing_graph import LANE_ENTRIES
@@ -174,13 +177,22 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
 
 def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
     """Returns the adjacent lanes of the same direction, the nearest first."""
-    found: list[int] = []
-    for side in (town.traffic.to_middle, town.traffic.to_kerb):
-        beside = town.neighbour(lane, side)
-        while beside is not None and beside not in found and beside != lane:
-            found.append(beside)
-            beside = town.neighbour(beside, side)
-    return tuple(found)
+    return _lanes_beside(town)[lane]
+
+
+@lru_cache(maxsize=16)
+def _lanes_beside(town: Town) -> tuple[tuple[int, ...], ...]:
+    """Returns the adjacent lanes of each lane of a town."""
+    rows = []
+    for lane in range(len(town.lanes)):
+        found: list[int] = []
+        for side in (town.traffic.to_middle, town.traffic.to_kerb):
+            beside = town.neighbour(lane, side)
+            while beside is not None and beside not in found and beside != lane:
+                found.append(beside)
+                beside = town.neighbour(beside, side)
+        rows.append(tuple(found))
+    return tuple(rows)
 
 
 def find_exit(
@@ -358,6 +370,6 @@ def first_new_street(
     return next((name for name in names if name not in (here, StreetName.UNKNOWN)), None)
 
 
-def streets_named(street_names: Iterable[int], name: StreetName) -> frozenset[int]:
+def streets_named(street_names: Sequence[int] | IntArray, name: StreetName) -> frozenset[int]:
     """Returns the indices of the streets with a name."""
-    return frozenset(k for k, value in enumerate(street_names) if int(value) == name.value)
+    return frozenset(k for k, value in enumerate(np.asarray(street_names).tolist()) if value == name.value)

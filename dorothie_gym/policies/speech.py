@@ -6,7 +6,6 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
 
@@ -21,6 +20,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import SlotValue
+from dorothie_gym.policies.decision_random import decision_random
 from dorothie_gym.policies.mood import Happening, Mood
 from dorothie_gym.policies.persona import Persona
 from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
@@ -318,6 +318,8 @@ class SpeechState:
         Returns:
             The utterance, or None, and the new state.
         """
+        if not self.queue:
+            return None, self
         queue = _alive(self.queue, now)
         if not queue:
             return None, replace(self, queue=())
@@ -417,7 +419,7 @@ def _alive(queue: tuple[Remark, ...], now: float) -> tuple[Remark, ...]:
         dropped = item.expires < now or (item.joined and dropped)
         if not dropped:
             kept.append(item)
-    return tuple(kept)
+    return queue if len(kept) == len(queue) else tuple(kept)
 
 
 # --- state of a speaking agent ----------------------------------------------------------------------------------------
@@ -465,9 +467,10 @@ class SpeakingState(Generic[StyleT, ConfigT]):
 
     def next_decision(self) -> tuple[Self, np.random.Generator]:
         """Returns a copy of the state that counts another decision, and the random generator of that decision."""
-        updated = copy(self)
+        updated = object.__new__(type(self))
+        updated.__dict__.update(self.__dict__)
         updated.count += 1
-        return updated, np.random.default_rng((updated.seed, updated.count))
+        return updated, decision_random(updated.seed, updated.count)
 
     def feel(self, happening: Happening, now: float) -> None:
         """Moves the mood by an event at a time [s], and with it the style."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,8 +44,6 @@ class CoWizardView:
         lights: whether the headlights are on.
         choice: next junction with a choice.
         landmarks: landmarks on the map.
-        objects: objects in sight.
-        waypoints: points of the planned path (n, 2) [m].
     """
 
     raw: ObservationMapping
@@ -63,14 +61,11 @@ class CoWizardView:
     lights: bool
     choice: Choice | None
     landmarks: tuple[SeenLandmark, ...]
-    objects: tuple[SeenObject, ...]
-    waypoints: np.ndarray
 
     @classmethod
     def read(cls, observation: ObservationMapping, town: Town) -> CoWizardView:
         """Reads an observation."""
         manoeuvre = int(observation["manoeuvre"])
-        waypoints = observation["waypoints"]
         view = cls(
             raw=observation,
             time=scalar(observation, "time"),
@@ -87,10 +82,19 @@ class CoWizardView:
             lights=bool(observation["lights"]),
             choice=None,
             landmarks=read_landmarks(observation, town),
-            objects=read_objects(observation),
-            waypoints=waypoints[np.any(waypoints != 0.0, axis=1)],
         )
         return _located(view, town)
+
+    @cached_property
+    def objects(self) -> tuple[SeenObject, ...]:
+        """Objects in sight."""
+        return read_objects(self.raw)
+
+    @cached_property
+    def waypoints(self) -> np.ndarray:
+        """Points of the planned path (n, 2) [m]."""
+        points = self.raw["waypoints"]
+        return points[np.any(points != 0.0, axis=1)]
 
     @property
     def position(self) -> tuple[float, float]:
@@ -134,11 +138,11 @@ class CoWizardView:
 def _located(view: CoWizardView, town: Town) -> CoWizardView:
     """Corrects lane and station by the turn options ahead, which are known even where the position has drifted."""
     believed = next_choice(town, view.lane, view.station)
-    rows = [row for row in view.raw["exits"] if row[ExitColumn.PRESENT]]
+    rows = [row for row in view.raw["exits"].tolist() if row[ExitColumn.PRESENT]]
     if not rows:
         return replace(view, choice=believed)
     exits = tuple(sorted(int(row[ExitColumn.LANE]) for row in rows))
-    distance = float(rows[0][ExitColumn.DISTANCE])
+    distance = rows[0][ExitColumn.DISTANCE]
     candidates = _lanes_by_exits(town).get(exits, ())
     if believed is not None and (believed.lane in candidates or not candidates):
         return replace(view, choice=replace(believed, distance=distance))

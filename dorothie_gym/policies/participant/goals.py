@@ -43,6 +43,8 @@ def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Ge
     before, tasks = state.task, str(view.raw["tasks"])
     state.speech = state.speech.hold(view.time + seconds_to_take_in(view))
     state.task = state.task.with_subgoals(view.subgoals, tasks)
+    if view.subgoals is before.subgoals and tasks == before.listed:
+        return
     for old, new in zip(before.subgoals, view.subgoals, strict=False):
         if new.reached and not old.reached:
             state.feel(Happening.DONE, view.time)

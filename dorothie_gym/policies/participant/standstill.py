@@ -22,13 +22,15 @@ TURN_TIME = 4.0
 def excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
     """Excuses a standstill before a red light and right after it has turned green."""
     progress, config = state.route.progress, state.config
+    if not view.standing or view.time - state.motion.moved_at > config.red_light_time:
+        return
     last_stretch = (
         state.guidance.guiding
         and progress is not None
         and progress.left(view.station) < config.last_stretch
         and progress.next_crossing(state.town, view.station) is None
     )
-    if not view.standing or last_stretch or view.time - state.motion.moved_at > config.red_light_time:
+    if last_stretch:
         return
     if light_ahead(state.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology.slots import LandmarkName
@@ -42,7 +43,6 @@ class ParticipantView:
         other_speaking: whether the other speaker is talking.
         landmarks: all landmarks.
         subgoals: all subgoals.
-        objects: objects in sight.
         turning: whether the car stands across its lane.
     """
 
@@ -55,7 +55,6 @@ class ParticipantView:
     other_speaking: bool
     landmarks: tuple[SeenLandmark, ...]
     subgoals: tuple[SeenSubgoal, ...]
-    objects: tuple[SeenObject, ...]
     turning: bool
 
     @classmethod
@@ -73,9 +72,13 @@ class ParticipantView:
             other_speaking=bool(observation["other_speaking"][0]),
             landmarks=read_landmarks(observation, town),
             subgoals=read_subgoals(observation),
-            objects=read_objects(observation),
             turning=pm.cos(across) < ACROSS_LANE,
         )
+
+    @cached_property
+    def objects(self) -> tuple[SeenObject, ...]:
+        """Objects in sight."""
+        return read_objects(self.raw)
 
     @property
     def position(self) -> tuple[float, float]:

@@ -321,7 +321,7 @@ def heard_acts(observation: ObservationMapping, speaker: Role) -> tuple[Dialogue
         return None
     slots = observation[f"{speaker}_slots"]
     return tuple(
-        DialogueAct(move=DialogueMove(int(move)), slots=decode_slots(row))
-        for move, row in zip(moves, slots, strict=True)
+        DialogueAct(move=DialogueMove(move), slots=decode_slots(row))
+        for move, row in zip(moves.tolist(), slots, strict=True)
         if move != NO_MOVE
     )
