@@ -14,6 +14,7 @@ DorothieGymError
 ├── SessionError         a recorded session or corpus cannot be read or written
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
+├── EndpointError        the endpoint of a language model rejects all calls
 ├── PolicyStateError     the state of a policy lacks what a part of the policy needs
 ├── PredictionError      predictions cannot be scored
 ├── FeatureStoreError    cached features are damaged
@@ -136,6 +137,10 @@ class OutputFolderError(DorothieGymError, RuntimeError):
 
 class PolicyLoadError(DorothieGymError, ValueError):
     """A policy name or file cannot be resolved; the message gives the reason and the accepted values."""
+
+
+class EndpointError(DorothieGymError, RuntimeError):
+    """The endpoint of a language model rejects the calls of a session; the message has the words of the server."""
 
 
 class PolicyStateError(DorothieGymError, RuntimeError):

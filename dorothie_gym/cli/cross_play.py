@@ -14,12 +14,14 @@ from dorothie_gym.cli.language_model import (
     AnswerTime,
     LanguageModelOptions,
     LlmCassette,
+    LlmParameters,
     LlmPrices,
     LlmReplay,
     LlmTime,
     LlmTimeout,
     LlmTokens,
     LlmUrl,
+    warn_of_usage,
 )
 from dorothie_gym.cli.options import AdWizard, AsJson, MaxSeconds, Players, Ray, WordErrors, env_config, find_cast
 from dorothie_gym.cli.output import (
@@ -89,7 +91,8 @@ def cross_play(
     word_errors: WordErrors = None,
     llm_url: LlmUrl = None,
     llm_timeout: LlmTimeout = 30.0,
-    llm_tokens: LlmTokens = 300,
+    llm_tokens: LlmTokens = None,
+    llm_parameters: LlmParameters = "",
     llm_time: LlmTime = AnswerTime.WAITS,
     llm_cassette: LlmCassette = None,
     llm_replay: LlmReplay = False,
@@ -110,6 +113,7 @@ def cross_play(
             url=llm_url,
             timeout=llm_timeout,
             tokens=llm_tokens,
+            parameters=llm_parameters,
             time=llm_time,
             pictures=False,
             cassette=llm_cassette,
@@ -137,6 +141,8 @@ def cross_play(
             write_atomically(folder / closed_loop.RESULT_NAME, recording.to_page(result.to_json()))
         if page is not None:
             page.write_text(result.page(), encoding="utf-8")
+    for cell in result.cells.values():
+        warn_of_usage(closed_loop.usage_warnings(cell.usage()))
     if as_json:
         print_json(result.to_json())
         return

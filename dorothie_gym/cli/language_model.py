@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +12,7 @@ from typing import Annotated
 import typer
 
 from dorothie_gym.cli.options import needs
-from dorothie_gym.cli.output import fail
+from dorothie_gym.cli.output import fail, stderr
 from dorothie_gym.policies import language_model as asked
 
 _PANEL = "Language models (llm:MODEL)"
@@ -37,7 +38,22 @@ LlmTimeout = Annotated[
     float, typer.Option(min=0.1, max=3600.0, help="Longest time of a call, retry included [s].", rich_help_panel=_PANEL)
 ]
 LlmTokens = Annotated[
-    int, typer.Option(min=16, max=100_000, help="Largest number of tokens of an answer.", rich_help_panel=_PANEL)
+    int | None,
+    typer.Option(
+        min=16,
+        max=100_000,
+        help="Largest number of tokens of an answer; default: that of the profile, usually 300.",
+        rich_help_panel=_PANEL,
+    ),
+]
+LlmParameters = Annotated[
+    str,
+    typer.Option(
+        metavar="PROFILE|NAME=VALUE|no-NAME,...",
+        help="Parameters of requests: a profile (usual, completion-tokens, reasoning, plain), values, and those that "
+        "are not sent; or a JSON object.",
+        rich_help_panel=_PANEL,
+    ),
 ]
 LlmTime = Annotated[
     AnswerTime,
@@ -74,7 +90,8 @@ class LanguageModelOptions:
 
     url: str | None
     timeout: float
-    tokens: int
+    tokens: int | None
+    parameters: str
     time: AnswerTime
     pictures: bool
     cassette: Path | None
@@ -87,11 +104,13 @@ class LanguageModelOptions:
         if not url and not self.replay:
             fail(f"llm:MODEL needs an endpoint: give --llm-url, or set the variable {asked.URL_VARIABLE}")
         try:
+            parameters, tokens = asked.parse_parameters(self.parameters, self.tokens)
             return asked.LanguageModelConfig(
                 model="MODEL",
                 url=url,
                 timeout=self.timeout,
-                max_tokens=self.tokens,
+                max_tokens=tokens,
+                parameters=parameters,
                 time=asked.SimulatedTime(self.time.value),
                 pictures=self.pictures,
                 cassette=self.cassette,
@@ -109,3 +128,9 @@ class LanguageModelOptions:
         except ValueError:
             fail(f"--llm-prices is {self.prices!r}; give two numbers separated by a comma, such as 0.15,0.60")
         return first, second
+
+
+def warn_of_usage(warnings: Sequence[str]) -> None:
+    """Prints warnings about language models (`closed_loop.usage_warnings`) on standard error."""
+    for line in warnings:
+        stderr().print(f"Warning: {line}", style="yellow", markup=False, soft_wrap=True)

@@ -160,7 +160,8 @@ def _plan(
     asked = LanguageModelOptions(
         url=None,
         timeout=30.0,
-        tokens=300,
+        tokens=None,
+        parameters="",
         time=AnswerTime.WAITS,
         pictures=False,
         cassette=None,

@@ -15,6 +15,7 @@ from dorothie_gym.cli.language_model import (
     AnswerTime,
     LanguageModelOptions,
     LlmCassette,
+    LlmParameters,
     LlmPictures,
     LlmPrices,
     LlmReplay,
@@ -22,6 +23,7 @@ from dorothie_gym.cli.language_model import (
     LlmTimeout,
     LlmTokens,
     LlmUrl,
+    warn_of_usage,
 )
 from dorothie_gym.cli.options import (
     AdWizard,
@@ -79,7 +81,8 @@ def rollout(
     speech: Speech = False,
     llm_url: LlmUrl = None,
     llm_timeout: LlmTimeout = 30.0,
-    llm_tokens: LlmTokens = 300,
+    llm_tokens: LlmTokens = None,
+    llm_parameters: LlmParameters = "",
     llm_time: LlmTime = AnswerTime.WAITS,
     llm_pictures: LlmPictures = False,
     llm_cassette: LlmCassette = None,
@@ -97,6 +100,7 @@ def rollout(
             url=llm_url,
             timeout=llm_timeout,
             tokens=llm_tokens,
+            parameters=llm_parameters,
             time=llm_time,
             pictures=llm_pictures,
             cassette=llm_cassette,
@@ -111,6 +115,7 @@ def rollout(
         config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures)
         settings = closed_loop.RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
         result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
+    warn_of_usage(closed_loop.usage_warnings(result.usage()))
     if as_json:
         print_json(result.to_json())
         return

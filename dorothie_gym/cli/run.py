@@ -17,6 +17,7 @@ from dorothie_gym.cli.language_model import (
     AnswerTime,
     LanguageModelOptions,
     LlmCassette,
+    LlmParameters,
     LlmPictures,
     LlmPrices,
     LlmReplay,
@@ -24,6 +25,7 @@ from dorothie_gym.cli.language_model import (
     LlmTimeout,
     LlmTokens,
     LlmUrl,
+    warn_of_usage,
 )
 from dorothie_gym.cli.options import (
     AdWizard,
@@ -50,6 +52,7 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.session.config import PerceptionModel, RenderView
@@ -115,7 +118,8 @@ def run(
     speech: Speech = False,
     llm_url: LlmUrl = None,
     llm_timeout: LlmTimeout = 30.0,
-    llm_tokens: LlmTokens = 300,
+    llm_tokens: LlmTokens = None,
+    llm_parameters: LlmParameters = "",
     llm_time: LlmTime = AnswerTime.WAITS,
     llm_pictures: LlmPictures = False,
     llm_cassette: LlmCassette = None,
@@ -155,6 +159,7 @@ def run(
             url=llm_url,
             timeout=llm_timeout,
             tokens=llm_tokens,
+            parameters=llm_parameters,
             time=llm_time,
             pictures=llm_pictures,
             cassette=llm_cassette,
@@ -215,6 +220,8 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
             _exit_interrupted(engine, plan)
     filming, waiting = film.seconds if film is not None else 0.0, pace.seconds if pace is not None else 0.0
     wall = time.perf_counter() - begun - filming - waiting
+    if "usage" in ending:
+        warn_of_usage(closed_loop.usage_warnings(closed_loop.usage_from_json(ending["usage"])))
     if plan.picture is not None:
         draw_session(engine, plan.picture)
     return _facts(engine, ending, wall, plan.out)

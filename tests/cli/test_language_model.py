@@ -89,3 +89,49 @@ def test_wrong_options_end_with_one_line(arguments: tuple[str, ...], message: st
 def test_model_without_a_name_is_refused() -> None:
     done = invoke("run", "--co-wizard", "llm:", "--llm-url", "http://localhost/v1")
     assert done.exit_code != 0 and "give the name of a model" in done.stderr
+
+
+@pytest.mark.parametrize("command", [("run", "--max-seconds", 60), ("rollout", "--sessions", 4, "--workers", 1)])
+def test_endpoint_that_rejects_all_calls_ends_the_command(command: tuple[object, ...]) -> None:
+    with serving() as server:
+        server.fault = "unknown model"
+        towns = ("--towns", "brookside") if "rollout" in command else ()
+        done = invoke(*command, *towns, "--co-wizard", "llm:m", "--llm-url", server.url)
+        asked = len(server.requests)
+    assert done.exit_code == 2
+    assert "The model `m` does not exist" in done.stderr and "status 404" in done.stderr
+    assert asked == 3
+
+
+def test_endpoint_that_rejects_calls_of_another_process_ends_the_rollout() -> None:
+    with serving() as server:
+        server.fault = "wrong key"
+        done = invoke("rollout", "--co-wizard", "llm:m", "--towns", "brookside", "--sessions", 2, "--workers", 2,
+                      "--llm-url", server.url)  # fmt: skip
+    assert done.exit_code == 2 and "wrong key" in done.stderr
+
+
+def test_refused_parameters_and_other_models_are_told() -> None:
+    with serving() as server:
+        server.refuses, server.fault = ("max_tokens",), "other model"
+        done = invoke("run", *SHORT, "--llm-url", server.url, "--json", "--llm-parameters", "no-seed")
+    assert done.exit_code == 0, done.output
+    usage = json.loads(done.stdout)["usage"]["co_wizard"]
+    assert usage["refused"] == ["max_tokens"] and usage["served"] == ["m-2026-11"]
+    assert usage["answers"] == usage["calls"] > 0
+    assert "refused or changed these parameters: max_tokens" in done.stderr and "m-2026-11" in done.stderr
+
+
+def test_rollout_with_silent_actions_is_marked_on_the_board() -> None:
+    for name, calls in (("good", 0), ("silent", 4)):
+        with serving() as server:
+            server.fault, server.fault_calls = "html", calls
+            done = invoke("rollout", "--co-wizard", f"llm:{name}", "--max-seconds", 60, "--sessions", 1, "--towns",
+                          "brookside", "--workers", 1, "--out", name, "--llm-url", server.url)  # fmt: skip
+            assert done.exit_code == 0, done.output
+            assert ("ended in a silent action" in done.stderr) == (name == "silent")
+    assert invoke("leaderboard", "silent", "good").exit_code == 0
+    page = Path("leaderboard.md").read_text()
+    assert "more than 2 % of the calls" in page
+    rows = [line for line in page.splitlines() if line.startswith("| llm:")]
+    assert rows[0].startswith("| llm:good (sessions") and "silent in many calls" in rows[1]

@@ -52,11 +52,12 @@ def read_annotations(folder: Path) -> None:
 
 def make_cassette(folder: Path) -> None:
     from dorothie_gym.policies.language_model.cassette import Cassette, Reply
+    from dorothie_gym.policies.language_model.chat_endpoint import Tokens
     from dorothie_gym.policies.language_model.faults import Fault
     from dorothie_gym.policies.language_model.usage import ModelUsage
 
     tape = Cassette(folder / "tape.jsonl")
-    tape.add({"model": "m", "seed": 1}, Reply(answer='{"drive": "Stop"}', tokens=(900, 20), latency=0.5))
+    tape.add({"model": "m", "seed": 1}, Reply(answer='{"drive": "Stop"}', tokens=Tokens(900, 20), latency=0.5))
     tape.add({"model": "m", "seed": 2}, Reply(fault=Fault.TIMEOUT, reason="no answer", retried=True, latency=30.0))
     usage = ModelUsage(model="m", calls=2, answers=1, cost=0.01, silences={"timeout": 1})
     (folder / "usage.json").write_text(json.dumps({"co_wizard": usage.to_json()}))

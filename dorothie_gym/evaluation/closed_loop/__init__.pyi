@@ -53,3 +53,5 @@ from .session_record import talk_of as talk_of
 from .task_progress import TaskRecord as TaskRecord
 from .task_progress import task_after as task_after
 from .task_progress import task_at_end as task_at_end
+from .usage import usage_from_json as usage_from_json
+from .usage import usage_warnings as usage_warnings

@@ -104,6 +104,9 @@ def can_play(player: Player) -> bool:
 
 _SETTINGS: Final = frozenset(RolloutSettings().to_json())
 _LANGUAGE_MODELS: Final = "language_models"
+_OPTIONAL: Final = frozenset({"prices", "parameters"})
+"""Settings of a language model that are recorded where they are given."""
+
 _COSTS: Final = frozenset({"steps", "seconds"})
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
 _MAX_NAME: Final = 200
@@ -163,9 +166,9 @@ def _faults_of_language_model(settings: Mapping[str, Any], name: str) -> Iterato
         if models is not None:
             yield f"settings, {_LANGUAGE_MODELS}: {name} is no language model"
         return
-    wanted = LanguageModelConfig(model="any", url="http://localhost/v1", prices=(0.0, 0.0)).record()
+    wanted = LanguageModelConfig(model="any", url="http://localhost/v1").record()
     page = models.get(str(Role.CO_WIZARD)) if isinstance(models, Mapping) else None
     if not isinstance(models, Mapping) or not isinstance(page, Mapping) or len(models) != 1:
         yield f"settings, {_LANGUAGE_MODELS} is {short_repr(models)}; it must have the settings of the co_wizard alone"
-    elif page.keys() | {"prices"} != wanted.keys():
+    elif page.keys() - _OPTIONAL != wanted.keys():
         yield f"settings, {_LANGUAGE_MODELS}, co_wizard: must have the fields {', '.join(wanted)}"

@@ -24,9 +24,11 @@ from dorothie_gym.evaluation.closed_loop.results import (
 from dorothie_gym.evaluation.closed_loop.running import command_of, fold_of_towns
 from dorothie_gym.evaluation.closed_loop.session_record import Amount
 from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, SubmissionCheck, check_submission
+from dorothie_gym.evaluation.closed_loop.usage import tokens_text
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
+from dorothie_gym.policies.language_model.usage import SILENT_SHARE
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, raising, read_json
 
@@ -111,6 +113,8 @@ class LeaderboardEntry:
             others.append(f"channel {channel}")
         if self.shortened:
             others.append(f"sessions of at most {self.time_limit:g} s")
+        if self.silent:
+            others.append("silent in many calls")
         return f"{name} ({', '.join(others)})" if others else name
 
     @property
@@ -130,6 +134,11 @@ class LeaderboardEntry:
         return self.time_limit < EnvConfig().max_seconds
 
     @property
+    def silent(self) -> bool:
+        """Whether a language model left more of its calls unanswered than `usage.SILENT_SHARE`."""
+        return not all(usage.mostly_answered for usage in self.result.usage().values())
+
+    @property
     def part(self) -> str:
         """Part of the page, a key of `PART_TITLES`."""
         towns = self.result.settings["towns"]
@@ -138,9 +147,9 @@ class LeaderboardEntry:
 
     @property
     def rank(self) -> tuple[bool, float, float, str]:
-        """Sort key: complete sessions before shortened ones; success, then driving score, best first; then the name."""
+        """Sort key: neither shortened nor silent first; success, then driving score, best first; then the name."""
         success, score = (self.table.figures[key]["mean"] for key in ("success", "driving_score"))
-        return self.shortened, -(success or 0.0), -(score or 0.0), self.policy
+        return self.shortened or self.silent, -(success or 0.0), -(score or 0.0), self.policy
 
 
 def read_entries(folders: Sequence[Path | str]) -> tuple[LeaderboardEntry, ...]:
@@ -256,6 +265,12 @@ def leaderboard_page(
             "",
             f"Rollouts with sessions shorter than {usual} are marked and ranked after the others:",
             "a session that is cut off can reach fewer subgoals, and meets fewer difficulties.",
+        ]
+    if any(entry.silent for entry in entries):
+        lines += [
+            "",
+            f"Rollouts in which more than {100 * SILENT_SHARE:g} % of the calls of a language model ended in a silent",
+            "action are marked and ranked after the others: they do not show what the model can do.",
         ]
     if any(len(entry.result.rows) < ENOUGH for entry in entries):
         lines += ["", f"Rows of fewer than {ENOUGH} sessions have wide intervals; they are no basis for a ranking."]
@@ -381,8 +396,8 @@ def _language_models(entries: Sequence[LeaderboardEntry], labels: Mapping[str, s
                     entry.part,
                     role.replace("_", "-"),
                     f"{usage.calls:,}",
-                    f"{100 * usage.answers / calls:.1f} %",
-                    f"{usage.prompt_tokens:,}, {usage.completion_tokens:,}",
+                    f"{100 * usage.answers / calls:.1f} %{'' if usage.mostly_answered else ' (!)'}",
+                    tokens_text(usage),
                     f"{usage.latency / calls:.2f}",
                     "-" if usage.cost is None else f"{usage.cost / max(entry.table.sessions, 1):.4f} $",
                 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -148,6 +149,8 @@ def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str
             words += [option, f"{found[name]}"]
     if found["pictures"]:
         words += ["--llm-pictures"]
+    if parameters := found.get("parameters"):
+        words += ["--llm-parameters", json.dumps(parameters, sort_keys=True)]
     return words
 
 
@@ -204,7 +207,7 @@ def roll_out(
 
     The result depends neither on the number of workers nor on interruptions: a finished session is measured but not
     played again. An interrupted run writes the result of the sessions finished so far. A session whose policy fails
-    becomes a row with an error; the next run plays it again.
+    becomes a row with an error; the next run plays it again. An endpoint that rejects all calls ends the run.
 
     Args:
         settings: settings of the rollout.
@@ -216,6 +219,7 @@ def roll_out(
     Raises:
         ValueError: there are no workers.
         SessionError: the folder contains other files, or another process holds its lock.
+        EndpointError: the endpoint of a language model rejects all calls.
         ProcessError: a process died, or there is no such cluster.
         OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.

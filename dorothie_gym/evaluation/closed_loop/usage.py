@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from rich.table import Table
 
@@ -31,7 +31,7 @@ def read_usage(folder: Path) -> dict[str, ModelUsage]:
         return usage_from_json(checked(read_json(file, MAX_SMALL_JSON), dict[str, UsagePage], file))
 
 
-def usage_from_json(page: Mapping[str, UsagePage]) -> dict[str, ModelUsage]:
+def usage_from_json(page: Mapping[str, Any]) -> dict[str, ModelUsage]:
     """Parses the output of `usage_to_json`."""
     return {role: ModelUsage.from_json(each) for role, each in page.items()}
 
@@ -49,6 +49,29 @@ def total_usage(sessions: Sequence[SessionUsage]) -> dict[str, ModelUsage]:
         if parts:
             found[role] = ModelUsage.total(parts)
     return found
+
+
+def usage_warnings(usage: SessionUsage) -> list[str]:
+    """Returns what a reader of figures with language models must know, a line each; empty if there is nothing."""
+    found = []
+    for role, each in usage.items():
+        if not each.mostly_answered:
+            silences = ", ".join(f"{count} x {name}" for name, count in sorted(each.silences.items()))
+            found.append(
+                f"{role}: {100 * each.silent_share:.1f} % of {each.calls} calls to {each.model} ended in a silent "
+                f"action ({silences}); the figures do not show what the model can do"
+            )
+        if each.refused:
+            found.append(f"{role}: the endpoint refused or changed these parameters: {', '.join(each.refused)}")
+        if each.served:
+            found.append(f"{role}: {each.model} was requested, and answered by {', '.join(each.served)}")
+    return found
+
+
+def tokens_text(usage: ModelUsage) -> str:
+    """Returns the numbers of tokens of prompts and answers, with those of cached prompts."""
+    cached = f" ({usage.cached_tokens:,} cached)" if usage.cached_tokens else ""
+    return f"{usage.prompt_tokens:,}{cached}, {usage.completion_tokens:,}"
 
 
 def usage_table(usage: SessionUsage, sessions: int) -> Table:
@@ -73,7 +96,7 @@ def usage_table(usage: SessionUsage, sessions: int) -> Table:
             f"{share:.1f} %",
             str(each.retries),
             silences,
-            f"{each.prompt_tokens}, {each.completion_tokens}",
+            tokens_text(each),
             f"{each.latency / max(each.calls, 1):.2f} (at most {each.slowest:.2f})",
             cost,
         )

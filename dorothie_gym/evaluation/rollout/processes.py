@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Generic, TypeVar
 
-from dorothie_gym.errors import ProcessError
+from dorothie_gym.errors import EndpointError, ProcessError
 from dorothie_gym.support.interruption import starting_process
 
 Task = TypeVar("Task")
@@ -38,6 +38,7 @@ def run_tasks(
         workers: number of processes; 1 runs the tasks in the calling process.
 
     Raises:
+        EndpointError: the endpoint of a language model rejects the calls of a task.
         ProcessError: a task failed in another process, or its process died.
         OSError: a file cannot be read or written.
     """
@@ -96,7 +97,7 @@ class _Worker(Generic[Task, Result]):
         except (EOFError, ConnectionResetError):
             self._raise_death()
         if not done:
-            if isinstance(result, OSError):
+            if isinstance(result, OSError | EndpointError):
                 raise result
             raise ProcessError(f"{self._task}: {result}")
         found: Result = result
@@ -121,10 +122,12 @@ def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result
             task = connection.recv()
         except (EOFError, ConnectionResetError):
             return
-        answer: tuple[bool, Result | str | OSError]
+        answer: tuple[bool, Result | str | OSError | EndpointError]
         try:
             work = work or prepare()
             answer = True, work(task)
+        except EndpointError as error:
+            answer = False, error
         except Exception as error:  # any error is reported to the caller
             if isinstance(error, OSError) and error.filename is not None:
                 answer = False, OSError(error.errno, error.strerror, str(error.filename))

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
-from dorothie_gym.errors import InputFileError, OutputFolderError, ProcessError, SessionError
+from dorothie_gym.errors import EndpointError, InputFileError, OutputFolderError, ProcessError, SessionError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
 from dorothie_gym.evaluation.rollout.play import play_session
@@ -192,6 +192,7 @@ def run_sessions(
     Raises:
         ValueError: there are no workers.
         SessionError: the folder contains other files, or another process holds its lock.
+        EndpointError: the endpoint of a language model rejects all calls.
         ProcessError: a session failed in another process, a process died, or the cluster cannot be reached.
         OutputFolderError: the folder was deleted or replaced during the run.
         OSError: the folder cannot be written.
@@ -234,8 +235,8 @@ class _SessionTask(Generic[Result]):
         begun = time.process_time()
         try:
             session, folder, played = self._maker(plan)
-        except (SessionError, OutputFolderError, OSError):
-            raise  # errors of the folder, not of the session
+        except (SessionError, OutputFolderError, EndpointError, OSError):
+            raise  # errors of the folder or of the endpoint, not of the session
         except Exception as error:
             if not self._job.keep_errors:
                 raise

@@ -5,4 +5,5 @@ from .config import LanguageModelConfig as LanguageModelConfig
 from .config import SimulatedTime as SimulatedTime
 from .faults import Fault as Fault
 from .policy import LanguageModelPolicy as LanguageModelPolicy
+from .request_parameters import parse_parameters as parse_parameters
 from .usage import ModelUsage as ModelUsage

@@ -94,15 +94,18 @@ class AnswerSchema:
     name: str
     fields: tuple[AnswerField, ...]
 
-    def response_format(self) -> dict[str, Any]:
-        """Returns the request's `response_format`: a strict JSON schema."""
-        schema = {
+    def json_schema(self) -> dict[str, Any]:
+        """Returns the JSON schema of an answer, which requires every field."""
+        return {
             "type": "object",
             "properties": {field.name: field.schema() for field in self.fields},
             "required": [field.name for field in self.fields],
             "additionalProperties": False,
         }
-        return {"type": "json_schema", "json_schema": {"name": self.name, "strict": True, "schema": schema}}
+
+    def response_format(self) -> dict[str, Any]:
+        """Returns the request's `response_format`: a strict JSON schema."""
+        return {"type": "json_schema", "json_schema": {"name": self.name, "strict": True, "schema": self.json_schema()}}
 
     def read(self, text: str) -> dict[str, str]:
         """Returns the value of each field of an answer.

@@ -1,8 +1,8 @@
 """Cassette: calls recorded in a JSONL file by the hash of their request, which replay without network.
 
 A line has the fields `key` (SHA-256 of the request), `request` (pictures replaced by their hashes), `answer` or `fault`
-with `reason`, `tokens` (prompt and answer), `retried` and `latency` [s]. Headers, and thus the key of the endpoint, are
-never part of it.
+with `reason`, `tokens` (prompt, answer, cached), `retried` and `latency` [s]; also `refused` and `model` if there are
+any. Headers, and thus the key of the endpoint, are never part of it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym.errors import InputFileError, PolicyLoadError
-from dorothie_gym.policies.language_model.chat_endpoint import canonical
+from dorothie_gym.policies.language_model.chat_endpoint import Tokens, canonical
 from dorothie_gym.policies.language_model.faults import Fault
 from dorothie_gym.support.input_files import MAX_SESSION_TEXT, parse_json, read_text
 
@@ -34,17 +34,21 @@ class Reply:
         answer: text of the answer; None after a fault.
         fault: the fault; None for an answer.
         reason: fault; empty for an answer.
-        tokens: number of tokens of prompts and answers, of both attempts.
+        tokens: number of tokens of both attempts.
         retried: whether a second attempt was made.
         latency: time of the call [s].
+        refused: parameters that the endpoint has refused, in order of their names; the call was made without them.
+        model: name of the model that has answered; empty if the endpoint does not say.
     """
 
     answer: str | None = None
     fault: Fault | None = None
     reason: str = ""
-    tokens: tuple[int, int] = (0, 0)
+    tokens: Tokens = Tokens()
     retried: bool = False
     latency: float = 0.0
+    refused: tuple[str, ...] = ()
+    model: str = ""
 
 
 def request_key(request: Mapping[str, object]) -> str:
@@ -80,6 +84,7 @@ class Cassette:
         else:
             page |= {"fault": str(reply.fault), "reason": reply.reason}
         page |= {"tokens": list(reply.tokens), "retried": reply.retried, "latency": reply.latency}
+        page |= {name: value for name, value in (("refused", list(reply.refused)), ("model", reply.model)) if value}
         line = json.dumps(page, separators=(",", ":")) + "\n"
         with self._path.open("a", encoding="utf-8") as file:
             if sys.platform != "win32":
@@ -125,14 +130,16 @@ def _read_line(page: Any, where: str) -> tuple[str, Reply]:
     try:
         fault = Fault(page["fault"]) if "fault" in page else None
         answer = None if fault is not None else page["answer"]
-        first, second = page["tokens"]
+        first, second, *cached = map(int, page["tokens"])  # two numbers in files of versions before 0.3
         reply = Reply(
             answer=answer,
             fault=fault,
             reason=str(page.get("reason", "")),
-            tokens=(int(first), int(second)),
+            tokens=Tokens(first, second, *cached),
             retried=bool(page["retried"]),
             latency=float(page["latency"]),
+            refused=tuple(map(str, page.get("refused", ()))),
+            model=str(page.get("model", "")),
         )
         if answer is not None and not isinstance(answer, str):
             raise TypeError

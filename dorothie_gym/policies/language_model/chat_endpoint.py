@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from dorothie_gym.errors import InputFileError, PolicyLoadError, one_line
+from dorothie_gym.policies.language_model.event_stream import is_event_stream, joined_completion
 from dorothie_gym.policies.language_model.faults import CallError, Fault
+from dorothie_gym.policies.language_model.request_parameters import refused_parameter
 from dorothie_gym.support.input_files import parse_json
 
 if TYPE_CHECKING:
@@ -25,8 +27,29 @@ KEY_VARIABLE: Final = "OPENAI_API_KEY"
 _LARGEST_ANSWER: Final = 4_000_000
 """Largest body that is read [bytes]."""
 
+MAX_NAME: Final = 100
+"""Longest name of a model that is kept [characters]."""
+
 _LONGEST_WAIT: Final = 3600.0
 """Longest `Retry-After` that is believed [s]."""
+
+
+class Tokens(NamedTuple):
+    """Numbers of tokens of one or more calls, as the endpoint counts them; 0 if it does not.
+
+    Attributes:
+        prompt: tokens of the prompts.
+        completion: tokens of the answers, reasoning included.
+        cached: tokens of the prompts that the endpoint has taken from its cache.
+    """
+
+    prompt: int = 0
+    completion: int = 0
+    cached: int = 0
+
+    def plus(self, other: Tokens) -> Tokens:
+        """Returns the sum of two numbers of tokens."""
+        return Tokens(*(one + another for one, another in zip(self, other, strict=True)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,11 +58,25 @@ class Completion:
 
     Attributes:
         text: the answer.
-        tokens: number of tokens of prompt and answer, as the endpoint counts them; 0 if it does not.
+        tokens: number of tokens of the call.
+        model: name of the model that has answered; empty if the endpoint does not say.
     """
 
     text: str
-    tokens: tuple[int, int]
+    tokens: Tokens
+    model: str = ""
+
+
+class RefusedParameterError(CallError):
+    """The endpoint does not take a parameter of the request, and names it.
+
+    Attributes:
+        name: the parameter.
+    """
+
+    def __init__(self, reason: str, name: str) -> None:
+        super().__init__(Fault.REJECTED, reason)
+        self.name = name
 
 
 class IncompleteError(CallError):
@@ -49,7 +86,7 @@ class IncompleteError(CallError):
         tokens: as in `Completion`.
     """
 
-    def __init__(self, fault: Fault, reason: str, tokens: tuple[int, int]) -> None:
+    def __init__(self, fault: Fault, reason: str, tokens: Tokens) -> None:
         super().__init__(fault, reason)
         self.tokens = tokens
 
@@ -89,6 +126,7 @@ class ChatEndpoint:
             timeout: time in which the answer must be complete [s].
 
         Raises:
+            RefusedParameterError: the endpoint names a parameter of the request that it does not take.
             CallError: there is no answer; the reason never contains the key.
         """
         exchange = _Exchange(self._httpx, self._url, request, timeout)
@@ -97,7 +135,10 @@ class ChatEndpoint:
         if exchange.is_alive():
             exchange.cancel()
             raise CallError(Fault.TIMEOUT, f"no answer within {timeout:.1f} s")
-        return _completion(*exchange.result())
+        status, answered, body = exchange.result()
+        if name := refused_parameter(status, body, request.keys()):
+            raise RefusedParameterError(_status_error(status, answered, body).reason, name)
+        return _completion(status, answered, body)
 
 
 class _Exchange(threading.Thread):
@@ -163,7 +204,7 @@ def _completion(status: int, headers: Mapping[str, str], body: bytes) -> Complet
     if status != 200:
         raise _status_error(status, headers, body)
     try:
-        page = parse_json(body.decode("utf-8"), "the completion", unique=False)
+        page = _page(headers, body)
     except (InputFileError, UnicodeDecodeError):
         raise CallError(Fault.NOT_A_COMPLETION, f"the server sent no JSON: {_shown(body)}") from None
     tokens, choice = _tokens(page), _first_choice(page)
@@ -177,7 +218,16 @@ def _completion(status: int, headers: Mapping[str, str], body: bytes) -> Complet
         raise IncompleteError(Fault.CUT_OFF, "the answer was too long and was cut off", tokens)
     if not isinstance(text, str) or not text.strip():
         raise IncompleteError(Fault.REFUSED, "the answer is empty", tokens)
-    return Completion(text=text, tokens=tokens)
+    model = page.get("model") if isinstance(page, Mapping) else None
+    return Completion(text=text, tokens=tokens, model=one_line(model, MAX_NAME) if isinstance(model, str) else "")
+
+
+def _page(headers: Mapping[str, str], body: bytes) -> JsonValue:
+    """Returns the completion in a body; raises `InputFileError` or `UnicodeDecodeError` if there is none."""
+    text = body.decode("utf-8")
+    if is_event_stream(headers, body):
+        return joined_completion(text)
+    return parse_json(text, "the completion", unique=False)
 
 
 def _first_choice(page: JsonValue) -> Mapping[str, JsonValue]:
@@ -196,14 +246,18 @@ def _status_error(status: int, headers: Mapping[str, str], body: bytes) -> CallE
     return CallError(fault, f"status {status}: {_shown(body)}", wait)
 
 
-def _tokens(page: object) -> tuple[int, int]:
+def _tokens(page: object) -> Tokens:
+    """Returns the numbers of tokens in a completion; endpoints differ in where they count cached ones."""
     usage = page.get("usage") if isinstance(page, Mapping) else None
-    counts = [usage.get(name) if isinstance(usage, Mapping) else None for name in _TOKEN_FIELDS]
-    first, second = (count if type(count) is int and 0 <= count < 2**31 else 0 for count in counts)
-    return first, second
+    if not isinstance(usage, Mapping):
+        return Tokens()
+    details = usage.get("prompt_tokens_details")
+    cached = details.get("cached_tokens") if isinstance(details, Mapping) else usage.get("prompt_cache_hit_tokens")
+    return Tokens(*(_count(value) for value in (usage.get("prompt_tokens"), usage.get("completion_tokens"), cached)))
 
 
-_TOKEN_FIELDS: Final = ("prompt_tokens", "completion_tokens")
+def _count(value: object) -> int:
+    return value if type(value) is int and 0 <= value < 2**31 else 0
 
 
 def _shown(body: bytes) -> str:

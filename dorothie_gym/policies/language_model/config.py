@@ -5,12 +5,15 @@ from __future__ import annotations
 import enum
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
+from dorothie_gym.policies.language_model.request_parameters import USUAL_TOKENS, check_parameters
 from dorothie_gym.support.copying import shared
+from dorothie_gym.support.files import JsonValue
 
 URL_VARIABLE: Final = "OPENAI_BASE_URL"
 """Environment variable with the address of the endpoint if none is given, as in OpenAI's client."""
@@ -44,6 +47,8 @@ class LanguageModelConfig:
         cassette: file in which calls are recorded and from which recorded calls are answered; None if there is none.
         offline: whether only recorded calls are answered; a call that is not in the cassette is an error.
         prices: price of a million tokens of prompts and of answers [US dollars]; None if unknown.
+        parameters: further parameters of the requests, or other values of the usual ones; None leaves one out. See
+            `request_parameters.parse_parameters`.
 
     Raises:
         ValueError: a field is out of range; names the field.
@@ -52,7 +57,7 @@ class LanguageModelConfig:
     model: str
     url: str = ""
     timeout: float = 30.0
-    max_tokens: int = 300
+    max_tokens: int = USUAL_TOKENS
     temperature: float = 0.0
     quiet_time: float = 10.0
     time: SimulatedTime = SimulatedTime.WAITS
@@ -60,6 +65,7 @@ class LanguageModelConfig:
     cassette: Path | None = None
     offline: bool = False
     prices: tuple[float, float] | None = None
+    parameters: Mapping[str, JsonValue] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.model or not self.model.isprintable():
@@ -76,6 +82,7 @@ class LanguageModelConfig:
             raise ValueError(f"max_tokens is {self.max_tokens}; it must be in 16..100000")
         if self.prices is not None and not all(0.0 <= price < math.inf for price in self.prices):
             raise ValueError(f"prices are {self.prices}; they must be at least 0")
+        check_parameters(self.parameters)
         object.__setattr__(self, "time", SimulatedTime(self.time))
 
     @classmethod
@@ -100,6 +107,7 @@ class LanguageModelConfig:
             "timeout": self.timeout,
             "pictures": self.pictures,
             **({} if self.prices is None else {"prices": list(self.prices)}),
+            **({"parameters": dict(self.parameters)} if self.parameters else {}),
         }
 
 

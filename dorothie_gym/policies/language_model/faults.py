@@ -39,6 +39,10 @@ WORTH_REPEATING = ABOUT_THE_ANSWER | {Fault.RATE_LIMITED, Fault.SERVER_ERROR, Fa
 """Faults after which a second attempt is made, if there is time."""
 
 
+REJECTIONS = frozenset({Fault.REJECTED, Fault.NO_CONNECTION})
+"""Faults of the settings rather than of a moment; they end a session that begins with them."""
+
+
 class CallError(Exception):
     """A call has brought no usable answer.
 

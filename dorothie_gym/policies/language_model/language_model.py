@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final
 
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
 from dorothie_gym.policies.language_model.cassette import Cassette, Reply
-from dorothie_gym.policies.language_model.chat_endpoint import ChatEndpoint, IncompleteError, httpx_module
+from dorothie_gym.policies.language_model.chat_endpoint import (
+    ChatEndpoint,
+    IncompleteError,
+    RefusedParameterError,
+    Tokens,
+    httpx_module,
+)
 from dorothie_gym.policies.language_model.faults import ABOUT_THE_ANSWER, WORTH_REPEATING, CallError
+from dorothie_gym.policies.language_model.request_parameters import with_parameters, without_parameter
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
@@ -19,17 +26,6 @@ if TYPE_CHECKING:
 
 _LEAST_TIME: Final = 0.05
 """Time below which no further attempt is made [s]."""
-
-
-class ChatRequest(TypedDict):
-    """Body of a request to a chat endpoint, as its interface names the fields."""
-
-    model: str
-    messages: list[dict[str, object]]
-    response_format: dict[str, Any]
-    temperature: float
-    max_tokens: int
-    seed: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,15 +46,15 @@ class Prompt:
     picture: str = ""
     seed: int = 0
 
-    def request(self, config: LanguageModelConfig) -> ChatRequest:
-        """Returns the body of the request."""
+    def request(self, config: LanguageModelConfig) -> dict[str, Any]:
+        """Returns the body of the request, as the interface names its fields."""
         content: object = self.text
         if self.picture:
             content = [
                 {"type": "text", "text": self.text},
                 {"type": "image_url", "image_url": {"url": self.picture}},
             ]
-        return {
+        usual = {
             "model": config.model,
             "messages": [{"role": "system", "content": self.system}, {"role": "user", "content": content}],
             "response_format": self.schema.response_format(),
@@ -66,6 +62,7 @@ class Prompt:
             "max_tokens": config.max_tokens,
             "seed": self.seed,
         }
+        return with_parameters(usual, config.parameters)
 
 
 @shared
@@ -83,6 +80,7 @@ class LanguageModel:
     def __init__(self, config: LanguageModelConfig, clock: Callable[[], float] = time.monotonic) -> None:
         self._config, self._clock = config, clock
         self._cassette = None if config.cassette is None else Cassette(config.cassette)
+        self._refused: list[str] = []  # parameters that the endpoint does not take, in the order of its refusals
         if not config.offline:
             httpx_module()
 
@@ -108,42 +106,50 @@ class LanguageModel:
             self._cassette.add(request, reply)
         return reply
 
-    def _call(self, request: ChatRequest, schema: AnswerSchema) -> Reply:
-        """Makes a call of at most two attempts, the second after a requested delay or with the model's error."""
+    def _call(self, request: Mapping[str, Any], schema: AnswerSchema) -> Reply:
+        """Makes a call of at most two attempts, the second after a requested delay or with the model's error.
+
+        A request whose parameter the endpoint refuses is no attempt: it is sent once more without the parameter, and so
+        are later ones.
+        """
         endpoint, begun = ChatEndpoint(self._config.url), self._clock()
-        tokens, retried = (0, 0), False
+        tokens, retried = Tokens(), False
+        for name in self._refused:
+            request = without_parameter(request, name, self._refused, schema)
         while True:
-            left = self._config.timeout - (self._clock() - begun)
-            text = ""
+            text, model = "", ""
             try:
-                completion = endpoint.complete(request, left)
-                tokens, text = _added(tokens, completion.tokens), completion.text
+                completion = endpoint.complete(request, self._left(begun))
+                tokens, text, model = tokens.plus(completion.tokens), completion.text, completion.model
                 schema.read(text)
-                return Reply(answer=text, tokens=tokens, retried=retried, latency=self._since(begun))
+                return self._reply(begun, tokens, answer=text, retried=retried, model=model)
             except CallError as error:
                 fault = error
+            if isinstance(fault, RefusedParameterError) and fault.name not in self._refused:
+                self._refused.append(fault.name)
+                request = without_parameter(request, fault.name, self._refused, schema)
+                if self._left(begun) >= _LEAST_TIME:
+                    continue
             if isinstance(fault, IncompleteError):
-                tokens = _added(tokens, fault.tokens)
-            left = self._config.timeout - (self._clock() - begun)
-            if retried or fault.fault not in WORTH_REPEATING or left - fault.wait < _LEAST_TIME:
-                return Reply(
-                    fault=fault.fault, reason=fault.reason, tokens=tokens, retried=retried, latency=self._since(begun)
-                )
+                tokens = tokens.plus(fault.tokens)
+            if retried or fault.fault not in WORTH_REPEATING or self._left(begun) - fault.wait < _LEAST_TIME:
+                return self._reply(begun, tokens, fault=fault.fault, reason=fault.reason, retried=retried, model=model)
             retried = True
             if fault.wait:
                 time.sleep(fault.wait)
             if fault.fault in ABOUT_THE_ANSWER:
                 request = _with_error(request, text, fault)
 
-    def _since(self, begun: float) -> float:
-        return round(self._clock() - begun, 3)
+    def _reply(self, begun: float, tokens: Tokens, **outcome: Any) -> Reply:
+        latency = round(self._clock() - begun, 3)
+        return Reply(tokens=tokens, latency=latency, refused=tuple(sorted(self._refused)), **outcome)
+
+    def _left(self, begun: float) -> float:
+        """Returns the time that is left for a call [s]."""
+        return self._config.timeout - (self._clock() - begun)
 
 
-def _added(first: tuple[int, int], second: tuple[int, int]) -> tuple[int, int]:
-    return first[0] + second[0], first[1] + second[1]
-
-
-def _with_error(request: ChatRequest, text: str, error: CallError) -> ChatRequest:
+def _with_error(request: Mapping[str, Any], text: str, error: CallError) -> dict[str, Any]:
     """Returns the request of the second attempt: the conversation is continued by the answer and its error."""
     messages = list(request["messages"])
     if text:

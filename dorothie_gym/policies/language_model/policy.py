@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dorothie_gym.errors import EndpointError
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.ad_wizard import AdWizardInterface
+from dorothie_gym.policies.language_model.chat_endpoint import KEY_VARIABLE
 from dorothie_gym.policies.language_model.co_wizard import CoWizardInterface
 from dorothie_gym.policies.language_model.config import LanguageModelConfig, SimulatedTime
+from dorothie_gym.policies.language_model.faults import REJECTIONS
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
 from dorothie_gym.policies.language_model.participant import ParticipantInterface
 from dorothie_gym.policies.language_model.role_interface import Memory, RoleInterface
@@ -36,6 +39,9 @@ _INTERFACES: Final[Mapping[Role, type[RoleInterface[Any]]]] = {
     Role.CO_WIZARD: CoWizardInterface,
     Role.AD_WIZARD: AdWizardInterface,
 }
+
+REJECTED_CALLS: Final = 3
+"""Number of rejected calls at the beginning of a session that end it: none of the later ones would be answered."""
 
 _LARGEST_SEED: Final = 2**31
 """Bound of the seeds of sampling: endpoints take signed numbers of 32 bits."""
@@ -118,7 +124,11 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
         return dict(state.usage.to_json())
 
     def step(self, observation: ObservationMapping, state: LanguageModelState) -> tuple[ActionDict, LanguageModelState]:
-        """Processes the observation, calls the model after an event, and acts on its last answer."""
+        """Processes the observation, calls the model after an event, and acts on its last answer.
+
+        Raises:
+            EndpointError: the endpoint has rejected the first calls of the session.
+        """
         now = scalar(observation, "time")
         memory, events = self._interface.attend(observation, state.memory, state.delay)
         state = replace(state, memory=memory, events=(*state.events, *events))
@@ -151,13 +161,14 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
         state = replace(
             state,
             memory=memory,
-            usage=self._with_reply(state.usage, reply),
+            usage=state.usage.with_call(reply, self._config.prices),
             events=(),
             asked_at=now,
             delay=charged,
             busy_until=now + charged,
         )
         if reply.answer is None:
+            _check_beginning(state.usage, reply)
             _LOG.info("%s at %.1f s: silent action (%s): %s", self.role, now, reply.fault, reply.reason)
             return state
         answer = schema.read(reply.answer)
@@ -171,13 +182,13 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
         memory, expired = self._interface.accept(observation, state.memory, answer)
         return _with_expired(replace(state, memory=memory), expired)
 
-    def _with_reply(self, usage: ModelUsage, reply: Reply) -> ModelUsage:
-        return usage.with_call(
-            fault=reply.fault,
-            retried=reply.retried,
-            tokens=reply.tokens,
-            latency=reply.latency,
-            prices=self._config.prices,
+
+def _check_beginning(usage: ModelUsage, reply: Reply) -> None:
+    """Raises `EndpointError` if the endpoint has rejected the first calls of a session."""
+    if usage.calls == REJECTED_CALLS and sum(usage.silences.get(str(fault), 0) for fault in REJECTIONS) == usage.calls:
+        raise EndpointError(
+            f"llm:{usage.model}: the first {usage.calls} calls of a session were rejected ({reply.fault}: "
+            f"{reply.reason}); check --llm-url, the name of the model, the key in {KEY_VARIABLE}, and --llm-parameters"
         )
 
 

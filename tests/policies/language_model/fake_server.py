@@ -25,6 +25,8 @@ class FakeServer(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", port), _Handler)
         self.answerer = answerer
         self.fault, self.fault_calls = "", 10**9
+        self.refuses: tuple[str, ...] = ()  # parameters of requests that it does not take
+        self.words = "Unsupported parameter: '{name}' is not supported with this model."
         self.requests: MutableSequence[dict[str, Any]] = []
         self.headers: MutableSequence[dict[str, str]] = []
         self.over = threading.Event()
@@ -47,6 +49,10 @@ class _Handler(BaseHTTPRequestHandler):
             self.server.requests.append(request)
             self.server.headers.append(dict(self.headers))
             number = len(self.server.requests)
+        for name in self.server.refuses:
+            if name in request:
+                self._refuse(name)
+                return
         fault = self.server.fault if number <= self.server.fault_calls else ""
         getattr(self, f"_{fault.replace(' ', '_') or 'fine'}")(request)
 
@@ -59,13 +65,14 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
-    def _complete(self, text: str | None, ended: str = "stop", **message: str) -> None:
-        answer = {"role": "assistant", "content": text, **message}
+    def _complete(self, text: str | None, ended: str = "stop", refusal: str | None = None, **fields: Any) -> None:
+        answer = {"role": "assistant", "content": text, "refusal": refusal}
         page = {
             "id": "x",
             "object": "chat.completion",
             "usage": {"prompt_tokens": 100, "completion_tokens": 7},
             "choices": [{"index": 0, "message": answer, "finish_reason": ended}],
+            **fields,
         }
         self._send(json.dumps(page).encode())
 
@@ -74,6 +81,40 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _fences(self, request: Mapping[str, Any]) -> None:
         self._complete(f"```json\n{json.dumps(self.server.answerer(request))}\n```")
+
+    def _refuse(self, name: str) -> None:
+        message = self.server.words.format(name=name)
+        self._send(json.dumps({"error": {"message": message, "type": "invalid_request_error"}}).encode(), 400)
+
+    def _unknown_model(self, request: Mapping[str, Any]) -> None:
+        self._send(b'{"error": {"message": "The model `m` does not exist", "code": "model_not_found"}}', 404)
+
+    def _streams_only(self, request: Mapping[str, Any]) -> None:
+        if not request.get("stream"):
+            self._send(b'{"error": {"message": "Only streaming is supported: set stream to true"}}', 400)
+            return
+        self._streams(request)
+
+    def _streams(self, request: Mapping[str, Any]) -> None:
+        text = json.dumps(self.server.answerer(request))
+        parts = [{"choices": [{"delta": {"content": letter}}]} for letter in text]
+        parts.append({"choices": [{"delta": {}, "finish_reason": "stop"}]})
+        parts.append({"choices": [], "usage": {"prompt_tokens": 100, "completion_tokens": 7}})
+        lines = [f"data: {json.dumps(part)}\n\n" for part in parts]
+        self._send("".join([": hello\n\n", *lines, "data: [DONE]\n\n"]).encode(), kind="text/event-stream")
+
+    def _cached(self, request: Mapping[str, Any]) -> None:
+        usage = {"prompt_tokens": 100, "completion_tokens": 7, "prompt_tokens_details": {"cached_tokens": 64}}
+        self._complete(json.dumps(self.server.answerer(request)), usage=usage)
+
+    def _other_usage(self, request: Mapping[str, Any]) -> None:
+        self._complete(json.dumps(self.server.answerer(request)), usage={"total_tokens": None, "prompt_tokens": "many"})
+
+    def _no_usage(self, request: Mapping[str, Any]) -> None:
+        self._complete(json.dumps(self.server.answerer(request)), usage=None)
+
+    def _other_model(self, request: Mapping[str, Any]) -> None:
+        self._complete(json.dumps(self.server.answerer(request)), model="m-2026-11")
 
     def _rate_limit(self, request: Mapping[str, Any]) -> None:
         self._send(b'{"error": {"message": "slow down"}}', 429, Retry_After="0.05")

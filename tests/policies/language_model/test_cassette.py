@@ -5,18 +5,20 @@ from __future__ import annotations
 import json
 import socket
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from dorothie_gym.archive import compare_folders
-from dorothie_gym.errors import PolicyLoadError
+from dorothie_gym.errors import EndpointError, PolicyLoadError
 from dorothie_gym.evaluation.closed_loop import RolloutSettings, roll_out
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, find_player
 from dorothie_gym.policies.language_model import LanguageModelConfig, SimulatedTime
 from dorothie_gym.policies.language_model.cassette import Cassette, Reply
+from dorothie_gym.policies.language_model.chat_endpoint import Tokens
 from dorothie_gym.session.config import EnvConfig
 from tests.policies.language_model.fake_server import serving
 from tests.policies.language_model.sessions import play
@@ -93,22 +95,24 @@ def test_key_is_sent_and_never_recorded(
     with serving() as server:
         server.fault = fault
         config = LanguageModelConfig(model="m", url=server.url, cassette=tmp_path / "tape.jsonl")
-        roll_out(rollout_of(config), tmp_path / "rollout")
+        with pytest.raises(EndpointError, match="wrong key") if fault else nullcontext() as raised:
+            roll_out(rollout_of(config), tmp_path / "rollout")
         assert server.headers[0]["Authorization"] == f"Bearer {SECRET}"
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert len(files) > 8
+    assert len(files) > (3 if fault else 8)
     assert not [path for path in files if SECRET.encode() in path.read_bytes()]
     assert SECRET not in caplog.text and SECRET not in repr(config)
     if fault:
+        assert raised is not None and SECRET not in str(raised.value)
         assert "status 401: wrong key: Bearer [key]" in (tmp_path / "tape.jsonl").read_text()
 
 
 def test_cut_off_last_line_does_not_count_and_other_damage_is_reported(tmp_path: Path) -> None:
     tape = tmp_path / "tape.jsonl"
-    Cassette(tape).add({"model": "m"}, Reply(answer="{}", latency=0.25, tokens=(3, 4)))
+    Cassette(tape).add({"model": "m"}, Reply(answer="{}", latency=0.25, tokens=Tokens(3, 4)))
     Cassette(tape).add({"model": "n"}, Reply(answer="{}"))
     tape.write_text(tape.read_text()[:-20])
-    assert Cassette(tape).find({"model": "m"}) == Reply(answer="{}", latency=0.25, tokens=(3, 4))
+    assert Cassette(tape).find({"model": "m"}) == Reply(answer="{}", latency=0.25, tokens=Tokens(3, 4))
     assert Cassette(tape).find({"model": "n"}) is None
     for damage in ("{}\n", "no json\n", '{"key": 1, "tokens": [1], "answer": "", "retried": false, "latency": 0}\n'):
         tape.write_text(damage)

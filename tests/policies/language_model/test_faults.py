@@ -80,7 +80,7 @@ def test_model_is_told_what_was_wrong_with_its_answer(server: FakeServer) -> Non
     assert second[: len(first)] == first
     assert second[-2] == {"role": "assistant", "content": '{"drive": "Fly"}'}
     assert 'drive is \'Fly\'; it must be one of "left", "right"' in second[-1]["content"]
-    assert reply.tokens == (200, 14)  # the tokens of both attempts are paid for
+    assert reply.tokens[:2] == (200, 14)  # the tokens of both attempts are paid for
 
 
 def test_server_is_asked_again_only_when_it_wants(server: FakeServer) -> None:
