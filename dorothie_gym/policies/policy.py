@@ -10,7 +10,7 @@ Last of the five files that explain the package. docs/architecture.md continues 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dataclasses import replace as replace
 
     from dorothie_gym.maps.town import Town
-    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.actions import ActionDict, AnyAction, RoleAction
     from dorothie_gym.session.spaces.observations import ObservationMapping
 else:
 
@@ -101,6 +101,33 @@ class Policy(ABC, Generic[State]):
         """
 
 
+class TypedPolicy(Policy[State]):
+    """Policy that chooses typed actions, which the engine of a session takes as they are.
+
+    Where policies and engine run in one loop (`decide`), nothing is encoded and decoded, and observations are not
+    copied. A class that defines a `step` of its own is played by that `step`.
+    """
+
+    def step(self, observation: ObservationMapping, state: State) -> tuple[ActionDict, State]:
+        """Chooses an action, see `Policy.step`."""
+        action, state = self.act(observation, state)
+        return action.encode(self.limits), state
+
+    @abstractmethod
+    def act(self, observation: ObservationMapping, state: State) -> tuple[RoleAction, State]:
+        """Chooses a typed action.
+
+        Args:
+            observation: as for `step`. Its arrays may change with the next decision: the state must hold none of them.
+            state: as for `step`.
+        """
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether `step` is that of this class, so that `act` can be called in its place."""
+        return type(self).step is TypedPolicy.step and "step" not in vars(self)
+
+
 AnyPolicy: TypeAlias = Policy[Any]
 """Policy whose state type is not known statically."""
 
@@ -139,6 +166,10 @@ class RoleObservations(Protocol):
         """Returns the observations of the given roles by agent."""
         ...
 
+    def views(self, roles: Sequence[Role]) -> Mapping[str, ObservationMapping]:
+        """Returns the observations of the given roles by agent, as views that the next step changes."""
+        ...
+
 
 class ObservedSession(Protocol):
     """Session whose roles observe and are given action masks, such as a `SessionEngine`."""
@@ -162,9 +193,40 @@ def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) 
         session: session in progress.
         policies: policies by role.
     """
-    seen = session.observations.of([role for role, policy in policies.items() if policy.observes])
+    return _inputs(session, policies, session.observations.of(_observers(policies)))
+
+
+def _observers(policies: Mapping[Role, AnyPolicy]) -> list[Role]:
+    return [role for role, policy in policies.items() if policy.observes]
+
+
+def _inputs(
+    session: ObservedSession, policies: Mapping[Role, AnyPolicy], seen: Mapping[str, ObservationMapping]
+) -> dict[Role, ObservationMapping]:
+    """Returns the observations of policies, with masks where they are read."""
     inputs: dict[Role, ObservationMapping] = {}
     for role, policy in policies.items():
         observation = seen.get(role, {})
         inputs[role] = {**observation, "action_mask": session.mask(role)} if policy.reads_mask else observation
     return inputs
+
+
+def decide(
+    session: ObservedSession, policies: Mapping[Role, AnyPolicy], states: MutableMapping[Role, Any]
+) -> dict[str, AnyAction]:
+    """Returns the actions of policies at the current decision, by agent, for the engine of the session.
+
+    Args:
+        session: session in progress.
+        policies: policies by role.
+        states: state of each policy, which is replaced by the next one.
+    """
+    typed = {role: policy for role, policy in policies.items() if isinstance(policy, TypedPolicy) and policy.is_direct}
+    others = {role: policy for role, policy in policies.items() if role not in typed}
+    seen = session.observations.views(_observers(typed))
+    inputs = {**_inputs(session, typed, seen), **policy_inputs(session, others)}
+    actions: dict[str, AnyAction] = {}
+    for role, policy in policies.items():
+        choose = typed[role].act if role in typed else policy.step
+        actions[str(role)], states[role] = choose(inputs[role], states[role])
+    return actions

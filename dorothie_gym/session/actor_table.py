@@ -23,7 +23,7 @@ _VEHICLE, _RIDER, _WALKER, _PROP = (
 )
 _WALKER_LENGTH, _WALKER_WIDTH = float(Pedestrian.LENGTH), float(Pedestrian.WIDTH)
 
-_COLUMNS: Final = len(ACTOR_DTYPE)
+_COLUMNS: Final = len(ACTOR_DTYPE.names or ())
 """Number of columns of `ACTOR_DTYPE`, all of eight bytes: key and kind, then six numbers."""
 
 

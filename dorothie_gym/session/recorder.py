@@ -15,7 +15,7 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.actor_table import actors_around
 from dorothie_gym.session.recording.writer import Scene
-from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, action_space, noop
+from dorothie_gym.session.spaces.actions import ActionDict, AnyAction, action_space, encoded, is_idle, noop
 from dorothie_gym.support.audio import encode_flac
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
     return frozenset(name for name, value in _idle(role, limits).items() if isinstance(value, np.ndarray))
 
 
-def compact(actions: Mapping[str, ActionMapping], limits: SpaceLimits) -> dict[Role, ActionDict]:
+def compact(actions: Mapping[str, AnyAction], limits: SpaceLimits) -> dict[Role, ActionDict]:
     """Returns actions in the compact form of `Decision`: fields without effect are left out.
 
     Args:
@@ -84,9 +84,12 @@ def compact(actions: Mapping[str, ActionMapping], limits: SpaceLimits) -> dict[R
     """
     found = {}
     for role in AGENT_ROLES:
+        action = actions[str(role)]
+        if is_idle(action):
+            continue
         idle, arrays = _idle(role, limits), _arrays(role, limits)
         fields: ActionDict = {}
-        for name, value in actions[str(role)].items():
+        for name, value in encoded(action, limits).items():
             if name in arrays:
                 values = np.asarray(value)
                 if values.any():
@@ -170,7 +173,7 @@ class SessionRecorder:
         self._frame = engine.session.world.frame
         self._append()
 
-    def record(self, actions: Mapping[str, ActionMapping], events: Sequence[Event] | None = None) -> None:
+    def record(self, actions: Mapping[str, AnyAction], events: Sequence[Event] | None = None) -> None:
         """Records a decision after the engine has played it.
 
         Args:
@@ -191,12 +194,12 @@ class SessionRecorder:
     def _append(self, events: Sequence[Event] | None = None) -> None:
         frames, world = self._engine.last_frames, self._engine.session.world
         self._frame = world.frame
-        happened = self._engine.last_events if events is None else events
+        happened, check = (self._engine.last_events, False) if events is None else (events, True)
         if len(frames) and frames[-1, 0] == world.frame:
             scene = Scene(actors_around(world), self._lights.at(world.time), world.weather.values)
-            self._writer.append(happened, frames, scene)
+            self._writer.append(happened, frames, scene, check=check)
         else:
-            self._writer.append(happened, frames)
+            self._writer.append(happened, frames, check=check)
         if recordings := self._engine.last_recordings:
             for name, samples in recordings.items():
                 self._writer.add_audio(name, encode_flac(samples))

@@ -37,7 +37,7 @@ from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventLog
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
-from dorothie_gym.support.compilation import direct
+from dorothie_gym.support.compilation import fixed
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, Restorable
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.sim.sensing.visibility import Visibility
 
-_step_share = direct(step_share)
+_step_share = fixed(step_share)
 
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""

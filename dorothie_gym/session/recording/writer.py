@@ -99,7 +99,12 @@ class SessionWriter:
         self._last_decision = -1
 
     def append(
-        self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None, scene: Scene | None = None
+        self,
+        events: Iterable[Event] = (),
+        frames: NDArray[np.float64] | None = None,
+        scene: Scene | None = None,
+        *,
+        check: bool = True,
     ) -> None:
         """Appends a batch of events and frames and flushes it to the operating system.
 
@@ -107,14 +112,16 @@ class SessionWriter:
             events: events, in order.
             frames: (n, 9) float64, see `TRAJECTORY_COLUMNS`; frames must rise.
             scene: surroundings of the car at the last of these frames.
+            check: whether the values are checked. Without it they must be those of an engine; the numbers are then
+                checked when the session is finished.
 
         Raises:
             SessionError: an event, a row or the scene cannot be written; no part of the batch is written then.
         """
         self._check_open("nothing can be appended")
-        lines = [encode_event(event) for event in events]
-        rows = None if frames is None else self._checked(frames)
-        parts = () if scene is None else self._parts_of(scene)
+        lines = [encode_event(event, check=check) for event in events]
+        rows = None if frames is None else self._checked(frames) if check else np.ascontiguousarray(frames)
+        parts = () if scene is None else self._parts_of(scene, check)
         if parts and (rows is None or not len(rows)):
             raise SessionError(f"{self.folder}: surroundings without a frame of the car")
         if lines:
@@ -264,10 +271,11 @@ class SessionWriter:
             raise SessionError(f"{self.folder}: frame {rows[-1, 0]:.0f}; frames are below {MAX_FRAME}")
         return rows
 
-    def _parts_of(self, scene: Scene) -> Sequence[tuple[bytes, Rows]]:
-        """Returns the rows of a scene by kind, checked."""
+    def _parts_of(self, scene: Scene, check: bool) -> Sequence[tuple[bytes, Rows]]:
+        """Returns the rows of a scene by kind."""
+        actors = scene.actors
         return (
-            (ACTORS, actor_rows(scene.actors)),
+            (ACTORS, actor_rows(actors) if check or isinstance(actors, Mapping) else actors),
             (LIGHTS, self._light_rows(scene.lights)),
             (WEATHER, self._weather_rows(scene.weather)),
         )
