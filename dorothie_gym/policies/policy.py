@@ -104,7 +104,7 @@ class Policy(ABC, Generic[State]):
 class TypedPolicy(Policy[State]):
     """Policy that chooses typed actions, which the engine of a session takes as they are.
 
-    Where policies and engine run in one loop (`decide`), nothing is encoded and decoded, and observations are not
+    Where policies and engine run in one loop (`Players`), nothing is encoded and decoded, and observations are not
     copied. A class that defines a `step` of its own is played by that `step`.
     """
 
@@ -211,22 +211,38 @@ def _inputs(
     return inputs
 
 
-def decide(
-    session: ObservedSession, policies: Mapping[Role, AnyPolicy], states: MutableMapping[Role, Any]
-) -> dict[str, AnyAction]:
-    """Returns the actions of policies at the current decision, by agent, for the engine of the session.
+class Players:
+    """Policies that play roles of sessions, prepared for their decisions.
 
     Args:
-        session: session in progress.
         policies: policies by role.
-        states: state of each policy, which is replaced by the next one.
     """
-    typed = {role: policy for role, policy in policies.items() if isinstance(policy, TypedPolicy) and policy.is_direct}
-    others = {role: policy for role, policy in policies.items() if role not in typed}
-    seen = session.observations.views(_observers(typed))
-    inputs = {**_inputs(session, typed, seen), **policy_inputs(session, others)}
-    actions: dict[str, AnyAction] = {}
-    for role, policy in policies.items():
-        choose = typed[role].act if role in typed else policy.step
-        actions[str(role)], states[role] = choose(inputs[role], states[role])
-    return actions
+
+    def __init__(self, policies: Mapping[Role, AnyPolicy]) -> None:
+        self._direct: dict[Role, TypedPolicy[Any]] = {}
+        self._others: dict[Role, AnyPolicy] = {}
+        for role, policy in policies.items():
+            if isinstance(policy, TypedPolicy) and policy.is_direct:
+                self._direct[role] = policy
+            else:
+                self._others[role] = policy
+        self._steps = [
+            (role, str(role), self._direct[role].act if role in self._direct else policy.step)
+            for role, policy in policies.items()
+        ]
+        self._observers = _observers(self._direct)
+
+    def decide(self, session: ObservedSession, states: MutableMapping[Role, Any]) -> dict[str, AnyAction]:
+        """Returns the actions of the policies at the current decision, by agent, for the engine of the session.
+
+        Args:
+            session: session in progress.
+            states: state of each policy, which is replaced by the next one.
+        """
+        inputs = _inputs(session, self._direct, session.observations.views(self._observers))
+        if self._others:
+            inputs |= policy_inputs(session, self._others)
+        actions: dict[str, AnyAction] = {}
+        for role, agent, choose in self._steps:
+            actions[agent], states[role] = choose(inputs[role], states[role])
+        return actions

@@ -306,8 +306,6 @@ class ObservationBuilder(CachedViews):
             co_wizard["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
             participant["other_speaking"][0] = delivered.speaking[Role.CO_WIZARD] > 0.0
             co_wizard["other_speaking"][0] = delivered.speaking[Role.PARTICIPANT] > 0.0
-            for role in (Role.PARTICIPANT, Role.CO_WIZARD):
-                self._views.renew(role, "speaking", "other_speaking")
         heard = bool(delivered.said or delivered.message)
         if heard or self._heard:
             message = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""

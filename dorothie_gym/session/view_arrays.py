@@ -190,7 +190,7 @@ class RowView:
         self._row, self._texts = row, arrays.texts[role]
         self._tables = arrays.observations[role].arrays
         self._numbers = tuple((name, array) for name, array in self._tables.items() if array.ndim == 1)
-        changing = frozenset(vars(_WRITTEN[role])["_fields"])
+        changing = frozenset((*vars(_WRITTEN[role])["_fields"], *SPEAKING))
         tables = {name: array for name, array in self._tables.items() if array.ndim > 1}
         self._content: Observation = {
             name: _read_only(array[row]) for name, array in tables.items() if name in changing
@@ -205,7 +205,7 @@ class RowView:
         return content
 
     def renew(self, fields: Iterable[str]) -> None:
-        """Replaces fields that the compiled code does not write, after a change."""
+        """Replaces fields that are no views, after a change."""
         for name in fields:
             if name in self._texts:
                 self._content[name] = self._texts[name][self._row]
@@ -219,6 +219,9 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     view.flags.writeable = False
     return view
 
+
+SPEAKING: Final = ("speaking", "other_speaking")
+"""Fields that Python writes at every decision while there is talk."""
 
 _WRITTEN: Final[Mapping[Role, type[tuple[Any, ...]]]] = {
     Role.PARTICIPANT: ParticipantArrays,

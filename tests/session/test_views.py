@@ -11,13 +11,13 @@ import pytest
 from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
-from dorothie_gym.policies.policy import AnyPolicy, TypedPolicy, decide, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, Players, TypedPolicy, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.view_arrays import AdWizardArrays, CoWizardArrays, ParticipantArrays
+from dorothie_gym.session.view_arrays import SPEAKING, AdWizardArrays, CoWizardArrays, ParticipantArrays
 
-CHANGING = {*ParticipantArrays._fields, *CoWizardArrays._fields, *AdWizardArrays._fields}
+CHANGING = {*SPEAKING, *ParticipantArrays._fields, *CoWizardArrays._fields, *AdWizardArrays._fields}
 
 
 def scripted(engine: SessionEngine) -> dict[Role, AnyPolicy]:
@@ -29,11 +29,12 @@ def scripted(engine: SessionEngine) -> dict[Role, AnyPolicy]:
 
 def play(engine: SessionEngine, seed: int, decisions: int) -> Any:
     policies = scripted(engine)
+    players = Players(policies)
     engine.reset(seed)
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
     for _ in range(decisions):
         yield
-        engine.step(decide(engine, policies, states))
+        engine.step(players.decide(engine, states))
 
 
 def test_views_equal_copies() -> None:
@@ -69,7 +70,8 @@ def test_views_cannot_be_written_to() -> None:
 def test_views_of_a_past_decision_are_refused() -> None:
     engine = SessionEngine("brookside")
     observations = engine.reset(0)
-    engine.step(decide(engine, {role: make_policy("silent", role) for role in AGENT_ROLES}, dict.fromkeys(AGENT_ROLES)))
+    players = Players({role: make_policy("silent", role) for role in AGENT_ROLES})
+    engine.step(players.decide(engine, dict.fromkeys(AGENT_ROLES)))
     with pytest.raises(RuntimeError, match="another decision"):
         observations.views(AGENT_ROLES)
 

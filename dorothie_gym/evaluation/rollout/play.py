@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from dorothie_gym.evaluation.rollout.folder import noticing_deletion
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy import AnyPolicy, decide, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, Players, policy_seed
 from dorothie_gym.session.recorder import SessionRecorder
 from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.writer import SessionWriter
@@ -83,7 +83,7 @@ def play_session(
         raise ValueError(f"policies has none for {', '.join(missing)}; each of the three roles needs one")
     engine = host.engine
     host.reset(seed=seed)
-    players = {role: policies[role] for role in AGENT_ROLES}
+    players = Players({role: policies[role] for role in AGENT_ROLES})
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
     engine.session.dialogue.give_voices(pitches_of(personas_of(policies, states)))
     with ExitStack() as stack:
@@ -96,7 +96,7 @@ def play_session(
         if on_step is not None:
             on_step(engine)
         while not engine.over:
-            actions = decide(engine, players, states)
+            actions = players.decide(engine, states)
             if host is engine:
                 engine.step(actions)
             else:
