@@ -31,7 +31,11 @@ from dorothie_gym.session.session_engine import SessionEngine
 
 PARTS: Final[Mapping[str, tuple[str, ...]]] = {
     "physics": ("sim.world:World.step",),
-    "observations": ("session.observations:SessionObserver.look", "session.observations:SessionObserver.observations"),
+    "observations": (
+        "session.observations:SessionObserver.look",
+        "session.observations:SessionObserver.observations",
+        "session.observations:SessionObserver.views",
+    ),
     "decoding": ("session.session_engine:SessionEngine.decode",),
     "hearing": ("session.live_session:LiveSession._deliver",),
     "recording": ("session.recorder:SessionRecorder.record",),
@@ -170,7 +174,8 @@ def _play(engine: SessionEngine, co_wizard: str, seed: int, folder: Path | None,
     for role in AGENT_ROLES:
         policies[role] = make_policy(co_wizard if role is Role.CO_WIZARD else "scripted", role, engine.limits)
         if times.by_role:
-            policies[role].step = times.timed(str(role), policies[role].step)
+            step = "act" if getattr(policies[role], "is_direct", False) else "step"
+            setattr(policies[role], step, times.timed(str(role), getattr(policies[role], step)))
     with times.within(OTHER):
         play_session(engine, policies, seed=seed, folder=folder)
     return engine.session.decisions

@@ -199,6 +199,8 @@ class Conversation:
             Utterances sorted by start; the participant comes first among equal starts.
         """
         heard = [utterance for utterance in self._air.values() if utterance.end <= now + _END_TOLERANCE]
+        if not heard:
+            return heard
         for utterance in heard:
             del self._air[utterance.speaker]
         return sorted(map(_ended, heard), key=lambda utterance: (utterance.start, _ORDER[utterance.speaker]))

@@ -17,9 +17,9 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.decision_random import decision_random
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar, weather
-from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.policies.policy import TypedPolicy, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
-from dorothie_gym.session.spaces.actions import ActionDict, AdWizardAction, LanePosition
+from dorothie_gym.session.spaces.actions import AdWizardAction, LanePosition
 from dorothie_gym.session.spaces.observations import ObservationMapping, PropColumn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import Rows
@@ -127,6 +127,8 @@ PROPS: Mapping[PropKind, float] = MappingProxyType(
 SAME_PROP = 3.0
 """Distance within which a prop is recognized as the one placed [m]."""
 
+_NO_ACTION = AdWizardAction()
+
 MOST_TRICKS = 4
 """Largest average number of tricks per session that can be set."""
 
@@ -220,7 +222,7 @@ Outcome: TypeAlias = tuple[AdWizardAction | None, AdWizardState]
 """Action of a trick, or None where it finds no moment, and the new state."""
 
 
-class ScriptedAdWizard(Policy[AdWizardState]):
+class ScriptedAdWizard(TypedPolicy[AdWizardState]):
     """Plays one to four tricks in a session: roadblocks, weather, changed tasks, faulty sensors, crowds.
 
     Of a storyboard that is not shipped, it plays every change of the task that the storyboard marks.
@@ -274,7 +276,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
                 planned.append(PlannedTrick(trick=self._kinds[int(order[k % len(order)])], at=float(at)))
         return AdWizardState(seed=seed, town=town, config=config, planned=tuple(planned))
 
-    def step(self, observation: ObservationMapping, state: AdWizardState) -> tuple[ActionDict, AdWizardState]:
+    def act(self, observation: ObservationMapping, state: AdWizardState) -> tuple[AdWizardAction, AdWizardState]:
         """Plays a trick, undoes one, or does nothing."""
         state = state.advanced()
         rng = decision_random(state.seed, state.count)
@@ -285,7 +287,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
             state = state if action is None else replace(state, last_at=now)
         if action is None:
             action, state = _play(state, observation, now, rng)
-        return (action or AdWizardAction()).encode(self.limits), state
+        return action or _NO_ACTION, state
 
 
 def idle_until(policy: ScriptedAdWizard, state: AdWizardState, story: str) -> float:

@@ -10,7 +10,7 @@ Last of the five files that explain the package. docs/architecture.md continues 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dataclasses import replace as replace
 
     from dorothie_gym.maps.town import Town
-    from dorothie_gym.session.spaces.actions import ActionDict
+    from dorothie_gym.session.spaces.actions import ActionDict, AnyAction, RoleAction
     from dorothie_gym.session.spaces.observations import ObservationMapping
 else:
 
@@ -107,6 +107,33 @@ class Policy(ABC, Generic[State]):
         """
 
 
+class TypedPolicy(Policy[State]):
+    """Policy that chooses typed actions, which the engine of a session takes as they are.
+
+    Where policies and engine run in one loop (`Players`), nothing is encoded and decoded, and observations are not
+    copied. A class that defines a `step` of its own is played by that `step`.
+    """
+
+    def step(self, observation: ObservationMapping, state: State) -> tuple[ActionDict, State]:
+        """Chooses an action, see `Policy.step`."""
+        action, state = self.act(observation, state)
+        return action.encode(self.limits), state
+
+    @abstractmethod
+    def act(self, observation: ObservationMapping, state: State) -> tuple[RoleAction, State]:
+        """Chooses a typed action.
+
+        Args:
+            observation: as for `step`. Its arrays may change with the next decision: the state must hold none of them.
+            state: as for `step`.
+        """
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether `step` is that of this class, so that `act` can be called in its place."""
+        return type(self).step is TypedPolicy.step and "step" not in vars(self)
+
+
 AnyPolicy: TypeAlias = Policy[Any]
 """Policy whose state type is not known statically."""
 
@@ -145,6 +172,10 @@ class RoleObservations(Protocol):
         """Returns the observations of the given roles by agent."""
         ...
 
+    def views(self, roles: Sequence[Role]) -> Mapping[str, ObservationMapping]:
+        """Returns the observations of the given roles by agent, as views that the next step changes."""
+        ...
+
 
 class ObservedSession(Protocol):
     """Session whose roles observe and are given action masks, such as a `SessionEngine`."""
@@ -168,9 +199,56 @@ def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) 
         session: session in progress.
         policies: policies by role.
     """
-    seen = session.observations.of([role for role, policy in policies.items() if policy.observes])
+    return _inputs(session, policies, session.observations.of(_observers(policies)))
+
+
+def _observers(policies: Mapping[Role, AnyPolicy]) -> list[Role]:
+    return [role for role, policy in policies.items() if policy.observes]
+
+
+def _inputs(
+    session: ObservedSession, policies: Mapping[Role, AnyPolicy], seen: Mapping[str, ObservationMapping]
+) -> dict[Role, ObservationMapping]:
+    """Returns the observations of policies, with masks where they are read."""
     inputs: dict[Role, ObservationMapping] = {}
     for role, policy in policies.items():
         observation = seen.get(role, {})
         inputs[role] = {**observation, "action_mask": session.mask(role)} if policy.reads_mask else observation
     return inputs
+
+
+class Players:
+    """Policies that play roles of sessions, prepared for their decisions.
+
+    Args:
+        policies: policies by role.
+    """
+
+    def __init__(self, policies: Mapping[Role, AnyPolicy]) -> None:
+        self._direct: dict[Role, TypedPolicy[Any]] = {}
+        self._others: dict[Role, AnyPolicy] = {}
+        for role, policy in policies.items():
+            if isinstance(policy, TypedPolicy) and policy.is_direct:
+                self._direct[role] = policy
+            else:
+                self._others[role] = policy
+        self._steps = [
+            (role, str(role), self._direct[role].act if role in self._direct else policy.step)
+            for role, policy in policies.items()
+        ]
+        self._observers = _observers(self._direct)
+
+    def decide(self, session: ObservedSession, states: MutableMapping[Role, Any]) -> dict[str, AnyAction]:
+        """Returns the actions of the policies at the current decision, by agent, for the engine of the session.
+
+        Args:
+            session: session in progress.
+            states: state of each policy, which is replaced by the next one.
+        """
+        inputs = _inputs(session, self._direct, session.observations.views(self._observers))
+        if self._others:
+            inputs |= policy_inputs(session, self._others)
+        actions: dict[str, AnyAction] = {}
+        for role, agent, choose in self._steps:
+            actions[agent], states[role] = choose(inputs[role], states[role])
+        return actions

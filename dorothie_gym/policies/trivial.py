@@ -10,8 +10,15 @@ import numpy as np
 
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.policy import Policy, replace
-from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical, action_space, noop
+from dorothie_gym.policies.policy import Policy, TypedPolicy, replace
+from dorothie_gym.session.spaces.actions import (
+    ActionDict,
+    CoWizardAction,
+    Physical,
+    RoleAction,
+    action_space,
+    idle_action,
+)
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
 
@@ -32,7 +39,7 @@ class DrawCount:
         return replace(self, count=self.count + 1)
 
 
-class SilentPolicy(Policy[None]):
+class SilentPolicy(TypedPolicy[None]):
     """Policy that neither speaks nor acts."""
 
     observes = False
@@ -40,9 +47,9 @@ class SilentPolicy(Policy[None]):
     def initial_state(self, seed: int, town: Town) -> None:
         """Returns None: the policy has no state."""
 
-    def step(self, observation: ObservationMapping, state: None) -> tuple[ActionDict, None]:
+    def act(self, observation: ObservationMapping, state: None) -> tuple[RoleAction, None]:
         """Returns the action that does nothing."""
-        return noop(self.role, self.limits), None
+        return idle_action(self.role), None
 
 
 class RandomPolicy(Policy[DrawCount]):
@@ -69,7 +76,7 @@ class RandomPolicy(Policy[DrawCount]):
         return action, state.next()
 
 
-class LaneFollowPolicy(Policy[None]):
+class LaneFollowPolicy(TypedPolicy[None]):
     """Co-Wizard that drives and never talks; a baseline for driving without dialogue.
 
     It follows its lane, takes the straightest exit if it has to choose, and turns round at a dead end. It acts only
@@ -83,9 +90,9 @@ class LaneFollowPolicy(Policy[None]):
     def initial_state(self, seed: int, town: Town) -> None:
         """Returns None: the policy has no state."""
 
-    def step(self, observation: ObservationMapping, state: None) -> tuple[ActionDict, None]:
+    def act(self, observation: ObservationMapping, state: None) -> tuple[CoWizardAction, None]:
         """Returns the action that keeps the car going."""
-        return CoWizardAction(physical=_drive_on(observation)).encode(self.limits), None
+        return CoWizardAction(physical=_drive_on(observation)), None
 
 
 def _drive_on(observation: ObservationMapping) -> Physical | None:

@@ -15,7 +15,7 @@ from dorothie_gym.ontology.dialogue_acts import encode_slots
 from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus
-from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
 from dorothie_gym.session.providers import VisiblePerception, see_by_camera
 from dorothie_gym.session.sensor_readings import SensorReadings
@@ -190,7 +190,7 @@ class ObservationBuilder(CachedViews):
             beliefs: places of hidden landmarks as the Co-Wizard has stated them.
         """
         self._views, self._world, self._task, self._beliefs = views, views.world, task, beliefs
-        self._weather: tuple[float, ...] = ()
+        self._weather: Mapping[WeatherParameter, float] | None = None
         self._faults: tuple[Sensor, ...] = ()
         self._versions = (-1, -1)
         self._props = 0
@@ -215,19 +215,27 @@ class ObservationBuilder(CachedViews):
         arrays, row = self._views.arrays, self._views.row
         return {_NAMES[role]: arrays.observation(role, row) for role in roles}
 
+    def view(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
+        """As `build`, as views that are valid until the next decision, see `RowView`."""
+        self._views.observe(roles)
+        self.write(delivered)
+        return {_NAMES[role]: self._views.view(role) for role in roles}
+
     def write(self, delivered: DeliveredMessages) -> None:
         """Writes all values that the compiled code does not write: utterances, and changes of the rest."""
         self._write_talk(delivered)
         self._write_props()
-        weather = tuple(self._world.weather.values.values())
-        if weather != self._weather:
+        weather = self._world.weather.values  # another object after a change
+        if weather is not self._weather:
             self._weather = weather
-            for table in self._tables.values():
-                table["weather"][:] = weather
+            for role, table in self._tables.items():
+                table["weather"][:] = tuple(weather.values())
+                self._views.renew(role, "weather")
         faults = tuple(self._world.faults)
         if faults != self._faults:
             self._faults = faults
             self._tables[Role.AD_WIZARD]["sensors"][:] = [sensor in faults for sensor in _SENSORS]
+            self._views.renew(Role.AD_WIZARD, "sensors")
         versions = self._task.version, self._beliefs.version
         if versions != self._versions:
             self._versions = versions
@@ -269,12 +277,14 @@ class ObservationBuilder(CachedViews):
             self._write_lines(role, "tasks", map(self._task.description, numbers))
         for role, permissions in ((Role.PARTICIPANT, False), (Role.AD_WIZARD, True)):
             write_subgoals(self._tables[role]["subgoals"], self._task, permissions=permissions)
+            self._views.renew(role, "subgoals")
 
     def _write_guesses(self, table: Table) -> None:
         table[:] = 0.0
         for name, guess in self._beliefs.places.items():
             (xx, xy), (_, yy) = guess.covariance
             table[name.value] = (1.0, *guess.mean, xx, yy, xy)
+        self._views.renew(Role.CO_WIZARD, "guesses")
 
     def _write_props(self) -> None:
         """Writes the props, if there are any or have been."""
@@ -285,6 +295,7 @@ class ObservationBuilder(CachedViews):
             row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
         self._props = min(len(props), len(table))
         table[self._props :] = 0.0
+        self._views.renew(Role.AD_WIZARD, "props")
 
     # --- talk -------------------------------------------------------------------------------------------------------
 
@@ -315,6 +326,7 @@ class ObservationBuilder(CachedViews):
         moves[:], slots[:] = NO_MOVE, 0
         for k, act in enumerate(() if utterance is None else utterance.acts[: len(moves)]):
             moves[k], slots[k] = int(act.move), encode_slots(act.slots)
+        self._views.renew(listener, f"{speaker}_moves", f"{speaker}_slots")
 
 
 _NAMES = {role: str(role) for role in AGENT_ROLES}
@@ -430,6 +442,12 @@ class SessionObserver:
             self.sensors.add_to(observations, decision)
         return observations
 
+    def views(self, roles: Sequence[Role], decision: int) -> dict[str, Observation]:
+        """As `observations`, as views that are valid until the next decision, see `RowView`."""
+        if self.camera_perception is not None or self.sensors is not None:
+            return self.observations(roles, decision)
+        return self._builder.view(self.delivered, roles)
+
     def picture(self, decision: int, name: str = "") -> CameraFrame | None:
         """Returns the picture of a camera on the car, boxes included; None without such a camera."""
         return None if self.sensors is None else self.sensors.picture(decision, name)
@@ -447,6 +465,10 @@ class Observable(Protocol):
 
     def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
         """Builds the observations of the given roles at the current decision, by agent."""
+        ...
+
+    def views(self, roles: Sequence[Role]) -> dict[str, Observation]:
+        """As `observations`, as views that are valid until the next decision, see `RowView`."""
         ...
 
 
@@ -469,6 +491,12 @@ class LazyObservations(Mapping[str, Observation]):
 
     def __len__(self) -> int:
         return len(_AGENTS)
+
+    def views(self, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Returns the observations of the given roles by agent, as views that the next step changes, see `RowView`."""
+        if self._session.decisions != self._decision:
+            raise RuntimeError("the session has taken a step since; its views show another decision")
+        return self._session.views(roles)
 
     def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Returns the observations of the given roles by agent; missing ones are built together."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -14,59 +13,18 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind
-from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, action_space, noop
-from dorothie_gym.sim.bodies import Pedestrian
-from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.session.actor_table import actors_around
+from dorothie_gym.session.recording.writer import Scene
+from dorothie_gym.session.spaces.actions import ActionDict, AnyAction, action_space, encoded, is_idle, noop
 from dorothie_gym.support.audio import encode_flac
-from dorothie_gym.support.compilation.records import plain
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.town import LightColour, LightProgramme, Town
+    from dorothie_gym.maps.town import LightColour, Town
     from dorothie_gym.session.recording.action_log import Decision
     from dorothie_gym.session.recording.events import Event
     from dorothie_gym.session.recording.writer import SessionWriter
     from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.spaces.fields import SpaceLimits
-    from dorothie_gym.sim.world import World
-
-_ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
-_ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
-"""Kind of actor by `Kind` of a vehicle; -1 for empty records and for the ego."""
-
-_PLACE = ("key", "x", "y", "heading")
-
-
-def actors_around(world: World) -> NDArray[np.void]:
-    """Returns vehicles, pedestrians and props without the ego as rows of `ACTOR_DTYPE` (n,)."""
-    state = world.actors.arrays
-    vehicles, pedestrians, props = plain(state.vehicles), plain(state.pedestrians), plain(state.props)
-    kinds = _ACTOR_KINDS[vehicles["kind"]]
-    driving = np.flatnonzero(kinds >= 0)
-    walking = np.flatnonzero(pedestrians["state"] != Walk.EMPTY)
-    standing = np.flatnonzero(props["present"])
-    first, second = len(driving), len(driving) + len(walking)
-    rows = np.empty(second + len(standing), dtype=ACTOR_DTYPE)
-    if first:
-        part = rows[:first]
-        part["kind"] = kinds[driving]
-        for name in (*_PLACE, "speed", "length", "width"):
-            part[name] = vehicles[name][driving]
-    if second > first:
-        part = rows[first:second]
-        part["kind"], part["length"], part["width"] = ActorKind.PEDESTRIAN, Pedestrian.LENGTH, Pedestrian.WIDTH
-        for name in (*_PLACE, "speed"):
-            part[name] = pedestrians[name][walking]
-    if len(standing):
-        part = rows[second:]
-        part["kind"], part["speed"] = ActorKind.PROP, 0.0
-        for name in (*_PLACE, "length", "width"):
-            part[name] = props[name][standing]
-    return rows
-
-
-_CLOSE = 1e-3
-"""Time before a change of phase from which the colours are computed again [s]; sums of durations are not exact."""
 
 
 class LightStates:
@@ -77,25 +35,31 @@ class LightStates:
     """
 
     def __init__(self, town: Town) -> None:
-        self._programmes = town.programmes
-        self._since, self._until = 0.0, -math.inf
+        self._programmes = [(programme, -math.inf, -math.inf) for programme in town.programmes]
+        self._since = self._until = -math.inf
         self._states: dict[int, LightColour] = {}
 
     def at(self, time: float) -> dict[int, LightColour]:
-        """Returns the colours at a simulated time [s] by id of the signal; the caller must not modify them."""
+        """Returns the colours at a simulated time [s] by id of the signal; the caller must not modify them.
+
+        It is the same object as long as no light of the town changes.
+        """
         if not self._since <= time < self._until:
-            remaining = (_remaining(programme, time) for programme in self._programmes)
-            self._since, self._until = time, time + min(remaining, default=math.inf) - _CLOSE
-            phases = [(programme.phase_at(time), programme.signals) for programme in self._programmes]
-            self._states = {signal: phase.colour(signal) for phase, signals in phases for signal in signals}
+            self._update(time)
         return self._states
 
-
-def _remaining(programme: LightProgramme, time: float) -> float:
-    """Returns the remaining time of the current phase [s]."""
-    now = (time - programme.offset) % programme.cycle
-    ends = itertools.accumulate(phase.duration for phase in programme.phases)
-    return next((end - now for end in ends if now < end), 0.0)
+    def _update(self, time: float) -> None:
+        """Looks up the programmes whose phase may be another one at a time."""
+        changed: dict[int, LightColour] = {}
+        for number, (programme, since, until) in enumerate(self._programmes):
+            if not since <= time < until:
+                self._programmes[number] = programme, time, programme.change_after(time)
+                phase = programme.phase_at(time)
+                changed |= {signal: phase.colour(signal) for signal in programme.signals}
+        if any(self._states.get(signal) is not colour for signal, colour in changed.items()):
+            self._states = self._states | changed
+        self._since = max((since for _, since, _ in self._programmes), default=time)
+        self._until = min((until for *_, until in self._programmes), default=math.inf)
 
 
 # --- compact actions --------------------------------------------------------------------------------------------------
@@ -111,7 +75,7 @@ def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
     return frozenset(name for name, value in _idle(role, limits).items() if isinstance(value, np.ndarray))
 
 
-def compact(actions: Mapping[str, ActionMapping], limits: SpaceLimits) -> dict[Role, ActionDict]:
+def compact(actions: Mapping[str, AnyAction], limits: SpaceLimits) -> dict[Role, ActionDict]:
     """Returns actions in the compact form of `Decision`: fields without effect are left out.
 
     Args:
@@ -120,9 +84,12 @@ def compact(actions: Mapping[str, ActionMapping], limits: SpaceLimits) -> dict[R
     """
     found = {}
     for role in AGENT_ROLES:
+        action = actions[str(role)]
+        if is_idle(action):
+            continue
         idle, arrays = _idle(role, limits), _arrays(role, limits)
         fields: ActionDict = {}
-        for name, value in actions[str(role)].items():
+        for name, value in encoded(action, limits).items():
             if name in arrays:
                 values = np.asarray(value)
                 if values.any():
@@ -206,7 +173,7 @@ class SessionRecorder:
         self._frame = engine.session.world.frame
         self._append()
 
-    def record(self, actions: Mapping[str, ActionMapping], events: Sequence[Event] | None = None) -> None:
+    def record(self, actions: Mapping[str, AnyAction], events: Sequence[Event] | None = None) -> None:
         """Records a decision after the engine has played it.
 
         Args:
@@ -226,12 +193,13 @@ class SessionRecorder:
 
     def _append(self, events: Sequence[Event] | None = None) -> None:
         frames, world = self._engine.last_frames, self._engine.session.world
-        self._writer.append(self._engine.last_events if events is None else events, frames)
+        self._frame = world.frame
+        happened, check = (self._engine.last_events, False) if events is None else (events, True)
+        if len(frames) and frames[-1, 0] == world.frame:
+            scene = Scene(actors_around(world), self._lights.at(world.time), world.weather.values)
+            self._writer.append(happened, frames, scene, check=check)
+        else:
+            self._writer.append(happened, frames, check=check)
         if recordings := self._engine.last_recordings:
             for name, samples in recordings.items():
                 self._writer.add_audio(name, encode_flac(samples))
-        self._frame = world.frame
-        if len(frames) and frames[-1, 0] == world.frame:
-            self._writer.add_actors(world.frame, actors_around(world))
-            self._writer.add_lights(world.frame, self._lights.at(world.time))
-            self._writer.add_weather(world.frame, world.weather.values)

@@ -27,7 +27,7 @@ from dorothie_gym.session.providers import OBSERVERS, sensor_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
 from dorothie_gym.session.rewards import RewardTerms, term_names
 from dorothie_gym.session.scenario import Scenario, draw_scenario, header_of, template_option
-from dorothie_gym.session.spaces.actions import ActionDecoder, ActionMapping, RoleAction, StepInfo
+from dorothie_gym.session.spaces.actions import ActionDecoder, AnyAction, RoleAction, StepInfo
 from dorothie_gym.session.spaces.fields import SpaceLimits, dict_space
 from dorothie_gym.session.spaces.observations import camera_perception_fields, observation_space
 from dorothie_gym.sim.network.network import network_of
@@ -140,11 +140,12 @@ class SessionEngine(Restorable):
         """Returns the town of the session of a seed: the engine's, unless each seed has another one."""
         return self._town if self._series is None else maps.town_at(self._series, seed)
 
-    def step(self, actions: Mapping[str, ActionMapping]) -> StepOutcome:
+    def step(self, actions: Mapping[str, AnyAction]) -> StepOutcome:
         """Runs one decision: the actions of all roles, then the physics until the next decision.
 
         Args:
-            actions: an action for each agent, see `dorothie_gym.session.spaces.action_space`.
+            actions: an action for each agent, see `dorothie_gym.session.spaces.action_space`; or a typed one, such as
+                `CoWizardAction`, with the same effect.
 
         Raises:
             ValueError: an action is missing or malformed; the message names the agent and the field.
@@ -152,7 +153,7 @@ class SessionEngine(Restorable):
         """
         return self.end_step(self.begin_step(self.decode(actions)), self.session.world.step(self.config.frames))
 
-    def decode(self, actions: Mapping[str, ActionMapping]) -> dict[Role, RoleAction]:
+    def decode(self, actions: Mapping[str, AnyAction]) -> dict[Role, RoleAction]:
         """Returns the actions of a decision, decoded; errors as in `step`."""
         if self.session.over:
             raise RuntimeError("the session is over: call reset() first")

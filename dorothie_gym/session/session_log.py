@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NotRequired, TypeAlias, TypedDict
 
@@ -82,6 +82,12 @@ REFUSABLE: Final[Mapping[Role, tuple[str, ...]]] = MappingProxyType(
 """Kinds of actions of each role that can be refused, the keys of `info["refused"]`; a decision has one of each."""
 
 
+_NO_REFUSALS: Final[Mapping[Role, Mapping[str, str]]] = {
+    role: dict.fromkeys(kinds, "") for role, kinds in REFUSABLE.items()
+}
+_NONE_REFUSED: Final[Mapping[Role, Sequence[str]]] = {role: () for role in REFUSABLE}
+
+
 class EventLog:
     """Events and refusals of the last decision, and counts of the session.
 
@@ -99,11 +105,13 @@ class EventLog:
     def clear(self) -> None:
         """Begins another decision."""
         self.events: list[Event] = []
-        self.refusals = {role: dict.fromkeys(kinds, "") for role, kinds in REFUSABLE.items()}
+        self.refusals = _NO_REFUSALS
 
     @property
-    def refused(self) -> dict[Role, list[str]]:
+    def refused(self) -> Mapping[Role, Sequence[str]]:
         """Reasons for the refusals of the last decision, by role."""
+        if self.refusals is _NO_REFUSALS:
+            return _NONE_REFUSED
         return {role: [reason for reason in kinds.values() if reason] for role, kinds in self.refusals.items()}
 
     def add(
@@ -126,7 +134,7 @@ class EventLog:
     def refuse(self, role: Role, kind: str, action: str, reason: str) -> None:
         """Logs the refusal of an action of one of the role's kinds."""
         assert self.refusals[role][kind] == ""  # one action of each kind in a decision
-        self.refusals[role][kind] = f"{action}: {reason}"
+        self.refusals = {**self.refusals, role: {**self.refusals[role], kind: f"{action}: {reason}"}}
         self.counts["refusals"] += 1
         self.add(EventType.REFUSAL, role, {"action": action, "reason": reason})
 

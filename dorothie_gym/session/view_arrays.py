@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -170,6 +170,64 @@ class RoleArrays(CachedViews):
             buffer.clear(row)
             for texts in self.texts[role].values():
                 texts[row] = ""
+
+
+class RowView:
+    """Observation of a role in one session as views of its arrays, for policies that keep no part of it.
+
+    Values that change at every decision are read-only views, and hold the next decision's values after it. All other
+    arrays and texts are the same objects until Python has written them again.
+    """
+
+    def __init__(self, arrays: RoleArrays, role: Role, row: int) -> None:
+        """Looks up a row.
+
+        Args:
+            arrays: observations of all sessions.
+            role: the role.
+            row: number of the session.
+        """
+        self._row, self._texts = row, arrays.texts[role]
+        self._tables = arrays.observations[role].arrays
+        self._numbers = tuple((name, array) for name, array in self._tables.items() if array.ndim == 1)
+        changing = frozenset((*vars(_WRITTEN[role])["_fields"], *SPEAKING))
+        tables = {name: array for name, array in self._tables.items() if array.ndim > 1}
+        self._content: Observation = {
+            name: _read_only(array[row]) for name, array in tables.items() if name in changing
+        }
+        self.renew([name for name in (*tables, *self._texts) if name not in changing])
+
+    def refreshed(self) -> Observation:
+        """Returns the observation with the numbers of the current decision; the same mapping each time."""
+        row, content = self._row, self._content
+        for name, array in self._numbers:
+            content[name] = array.item(row)
+        return content
+
+    def renew(self, fields: Iterable[str]) -> None:
+        """Replaces fields that are no views, after a change."""
+        for name in fields:
+            if name in self._texts:
+                self._content[name] = self._texts[name][self._row]
+            else:
+                self._content[name] = _read_only(self._tables[name][self._row].copy())
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Returns a view of an array that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+SPEAKING: Final = ("speaking", "other_speaking")
+"""Fields that Python writes at every decision while there is talk."""
+
+_WRITTEN: Final[Mapping[Role, type[tuple[Any, ...]]]] = {
+    Role.PARTICIPANT: ParticipantArrays,
+    Role.CO_WIZARD: CoWizardArrays,
+    Role.AD_WIZARD: AdWizardArrays,
+}
 
 
 @lru_cache(maxsize=64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from dorothie_gym.session.view_arrays import (
     MaskArrays,
     ParticipantArrays,
     RoleArrays,
+    RowView,
     TurnOptions,
     turn_options,
 )
@@ -33,7 +35,7 @@ from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
 from dorothie_gym.sim.state.world_arrays import WorldArrays, world_of
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.compilation import compiled, concurrent, direct
+from dorothie_gym.support.compilation import compiled, concurrent, fixed
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.copying import CachedViews
 
@@ -308,7 +310,7 @@ def write_masks(
 # --- Row of a session -------------------------------------------------------------------------------------------------
 # Row of a session in the arrays of observations and masks.
 
-_observe_share = direct(observe_share)
+_observe_share = fixed(observe_share)
 _FLAGS = dict(zip(AGENT_ROLES, map(int, (Wanted.PARTICIPANT, Wanted.CO_WIZARD, Wanted.AD_WIZARD)), strict=True))
 _SESSION_MASKS = int(Wanted.MASKS)
 
@@ -322,7 +324,7 @@ class SessionViews(CachedViews):
         row: number of the row.
     """
 
-    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_call", "_called_with")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_call", "_called_with", "_views")
 
     _called_with: WorldArrays | None = None
 
@@ -352,6 +354,19 @@ class SessionViews(CachedViews):
         self._call[0][0, 0] = 0
         _observe_share(*self._call, wanted)
 
+    @cached_property
+    def _views(self) -> dict[Role, RowView]:
+        return {role: RowView(self.arrays, role, self.row) for role in AGENT_ROLES}
+
+    def view(self, role: Role) -> Observation:
+        """Returns the observation of a role as views of the row, see `RowView`."""
+        return self._views[role].refreshed()
+
+    def renew(self, role: Role, *fields: str) -> None:
+        """Renews fields of the view after Python has written them."""
+        if "_views" in self.__dict__:
+            self._views[role].renew(fields)
+
     def tables(self) -> dict[Role, Observation]:
         """Returns the arrays of the row, by role and field."""
         return {
@@ -362,3 +377,4 @@ class SessionViews(CachedViews):
     def set_text(self, role: Role, field: str, text: str) -> None:
         """Writes a text of an observation."""
         self.arrays.texts[role][field][self.row] = text
+        self.renew(role, field)

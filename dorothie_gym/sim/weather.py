@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -52,8 +51,8 @@ class Weather:
 
     @property
     def values(self) -> Mapping[WeatherParameter, float]:
-        """The ten values, for reading."""
-        return MappingProxyType(self._values)
+        """The ten values, for reading: the same object until one of them changes."""
+        return self._values
 
     def set(self, parameter: WeatherParameter, value: float) -> None:
         """Sets a parameter.
@@ -62,7 +61,7 @@ class Weather:
             OntologyError: the value is out of the parameter's range.
         """
         parameter.check(value)
-        self._values[parameter] = value
+        self._values = {**self._values, parameter: value}
         self._views.clear()
 
     def set_share(self, parameter: WeatherParameter, share: float) -> float:

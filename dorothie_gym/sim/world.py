@@ -37,7 +37,7 @@ from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from dorothie_gym.sim.traffic_rules import WorldEvent, WorldEventLog
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
-from dorothie_gym.support.compilation import direct
+from dorothie_gym.support.compilation import fixed
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import CachedViews, Restorable
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.sim.sensing.visibility import Visibility
 
-_step_share = direct(step_share)
+_step_share = fixed(step_share)
 
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""
@@ -152,7 +152,7 @@ class World(CachedViews, Restorable):
     def step(self, frames: int) -> list[WorldEvent]:
         """Runs the world for a number of physics frames; returns the events of the ego."""
         traces = []
-        for part in parts_of(frames):
+        for part in parts_of(frames) if frames > MAX_SUBSTEPS else (frames,):
             self.begin_part()
             self._run(part)
             traces.append(self.end_part(part))
@@ -229,8 +229,7 @@ class World(CachedViews, Restorable):
     @property
     def collisions(self) -> int:
         """Number of collisions by the ego's own fault."""
-        *_, collisions = self._record.outcome.item()
-        return int(collisions)
+        return int(self._record.outcome.item()[2])
 
     # --- Perception ---------------------------------------------------------------------------------------------------
 
@@ -240,7 +239,7 @@ class World(CachedViews, Restorable):
         clarity = 1.0
         if self.faults:
             clarity = min((CLARITY[sensor] for sensor in CLARITY if self._is_faulty(sensor, self.frame)), default=1.0)
-        return self.weather.visibility(lights=self.ego.lights, clarity=clarity)
+        return self.weather.visibility(lights=bool(self._record.lights.item()[0]), clarity=clarity)
 
     @property
     def sight(self) -> float:

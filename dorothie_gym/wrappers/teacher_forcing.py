@@ -17,7 +17,8 @@ from dorothie_gym.errors import SessionError, StateError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.session.recorder import LightStates, actors_around
+from dorothie_gym.session.actor_table import actors_around
+from dorothie_gym.session.recorder import LightStates
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
 from dorothie_gym.session.recording.trajectory import trajectory_of

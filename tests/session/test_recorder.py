@@ -6,7 +6,8 @@ import pytest
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PropKind, Role
-from dorothie_gym.session.recorder import LightStates, actors_around, compact, expand, idle_actions
+from dorothie_gym.session.actor_table import actors_around
+from dorothie_gym.session.recorder import LightStates, compact, expand, idle_actions
 from dorothie_gym.session.recording import ActorKind, Decision
 
 

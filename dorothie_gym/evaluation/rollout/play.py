@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from dorothie_gym.evaluation.rollout.folder import noticing_deletion
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, Players, policy_seed
 from dorothie_gym.session.recorder import SessionRecorder
 from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.writer import SessionWriter
+from dorothie_gym.session.spaces.actions import encoded
 from dorothie_gym.support.files import write_atomically
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ def play_session(
         raise ValueError(f"policies has none for {', '.join(missing)}; each of the three roles needs one")
     engine = host.engine
     host.reset(seed=seed)
+    players = Players({role: policies[role] for role in AGENT_ROLES})
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
     engine.session.dialogue.give_voices(pitches_of(personas_of(policies, states)))
     with ExitStack() as stack:
@@ -94,10 +96,11 @@ def play_session(
         if on_step is not None:
             on_step(engine)
         while not engine.over:
-            inputs, actions = policy_inputs(engine, policies), {}
-            for role in AGENT_ROLES:
-                actions[str(role)], states[role] = policies[role].step(inputs[role], states[role])
-            host.step(actions)
+            actions = players.decide(engine, states)
+            if host is engine:
+                engine.step(actions)
+            else:
+                host.step({agent: encoded(action, engine.limits) for agent, action in actions.items()})
             if recorder is not None:
                 recorder.record(actions)
             if on_step is not None:

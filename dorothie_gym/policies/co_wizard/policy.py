@@ -23,9 +23,9 @@ from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.persona import Persona, Trait
-from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.policies.policy import TypedPolicy, replace
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Mental, Physical
+from dorothie_gym.session.spaces.actions import CoWizardAction, Mental, Physical
 from dorothie_gym.sim.state.codes import Motion
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
-class ScriptedCoWizard(Policy[CoWizardState]):
+class ScriptedCoWizard(TypedPolicy[CoWizardState]):
     """Rule-based Co-Wizard: understands instructions, plans with its beliefs, drives, asks, confirms and explains.
 
     It knows the map without hidden places. It drives to places on the map by its own route; to others it is guided by
@@ -84,13 +84,13 @@ class ScriptedCoWizard(Policy[CoWizardState]):
         """Returns the traits of the session's persona."""
         return None if state.persona is None else state.persona.to_json()
 
-    def step(self, observation: ObservationMapping, state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
+    def act(self, observation: ObservationMapping, state: CoWizardState) -> tuple[CoWizardAction, CoWizardState]:
         """Processes utterances and observation, drives, and possibly speaks."""
         decision = attend(observation, state)
         updated, view = decision.state, decision.view
         rest(updated, view, decision.rng)
         end_red_light_rest(updated, view)
-        return respond(decision, drive(updated, view)).encode(self.limits), updated
+        return respond(decision, drive(updated, view)), updated
 
 
 class PendingDecision(NamedTuple):

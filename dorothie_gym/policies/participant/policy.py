@@ -21,9 +21,9 @@ from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_li
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.persona import Persona, Trait
-from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.policies.policy import TypedPolicy, replace
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
+from dorothie_gym.session.spaces.actions import ParticipantAction
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
-class ScriptedParticipant(Policy[ParticipantState]):
+class ScriptedParticipant(TypedPolicy[ParticipantState]):
     """Rule-based participant that knows all places and directs the car to the subgoals of the storyboard.
 
     It names places or guides turn by turn (by its style, drawn for each session), answers questions, corrects wrong
@@ -83,7 +83,9 @@ class ScriptedParticipant(Policy[ParticipantState]):
         """Returns the traits of the session's persona."""
         return None if state.persona is None else state.persona.to_json()
 
-    def step(self, observation: ObservationMapping, state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
+    def act(
+        self, observation: ObservationMapping, state: ParticipantState
+    ) -> tuple[ParticipantAction, ParticipantState]:
         """Processes utterances, observes the car, and chooses a remark or silence."""
         updated, rng = state.next_decision()
         view = ParticipantView.read(observation, updated.town)
@@ -113,4 +115,4 @@ class ScriptedParticipant(Policy[ParticipantState]):
             note_said(updated, view, updated.speech.last)
             drop_repetition(updated, updated.speech.last)
         updated.motion = updated.motion.with_speed(view.speed)
-        return ParticipantAction(speech=speech).encode(self.limits), updated
+        return ParticipantAction(speech=speech), updated

@@ -157,8 +157,8 @@ def actor_rows(actors: Rows | ActorColumns) -> Rows:
     if not finite.all():
         name = _ACTOR_COLUMNS[2 + int(np.argmin(finite.all(axis=0)))]
         raise SessionError(f"actors: field {name!r} has a value that is not finite")
-    kinds = actors["kind"]
-    if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(ActorKind):
+    kinds = actors["kind"].view(np.uint64)  # negative numbers become large ones
+    if len(kinds) and kinds.max() >= len(ActorKind):
         raise SessionError(f"actors: field 'kind' must be one of {', '.join(kind.name.lower() for kind in ActorKind)}")
     return actors
 

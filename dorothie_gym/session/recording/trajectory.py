@@ -39,7 +39,9 @@ TRAJECTORY_DTYPE: Final = np.dtype(
 )
 
 
-_WHOLE: Final = [TRAJECTORY_COLUMNS.index(name) for name in WHOLE_COLUMNS]
+_FIRST, _SECOND = map(TRAJECTORY_COLUMNS.index, WHOLE_COLUMNS)
+_WHOLE: Final = slice(_FIRST, None, _SECOND - _FIRST)
+"""The columns of whole numbers, as a slice: the second is the last column of all."""
 
 
 def trajectory_of(rows: NDArray[np.float64]) -> Trajectory:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Self
+from typing import IO, TYPE_CHECKING, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,27 @@ if TYPE_CHECKING:
     from dorothie_gym.session.recording.header import SessionHeader
 
 
+LightColours: TypeAlias = Mapping[int, "LightColour | str"]
+"""State of each light, by id of its signal."""
+
+WeatherValues: TypeAlias = "Mapping[WeatherParameter, float] | Mapping[str, float]"
+"""The ten weather parameters, in the ontology's units."""
+
+
+class Scene(NamedTuple):
+    """Surroundings of the car at a frame.
+
+    Attributes:
+        actors: rows of `ACTOR_DTYPE`, or a mapping of its columns.
+        lights: state of each light.
+        weather: the ten weather parameters. Neither mapping may be changed afterwards.
+    """
+
+    actors: Rows | ActorColumns
+    lights: LightColours
+    weather: WeatherValues
+
+
 class SessionWriter:
     """Appends events and frames to the folder of a session; appended data survives the death of the process.
 
@@ -72,32 +93,47 @@ class SessionWriter:
         self._event_count = 0
         self._last_frame = -1
         self._frames: set[float] = set()
-        self._lights: tuple[Mapping[int, LightColour | str], Rows] | None = None
-        self._weather: tuple[Mapping[WeatherParameter, float] | Mapping[str, float], Rows] | None = None
+        self._lights: tuple[LightColours, Rows] | None = None
+        self._weather: tuple[WeatherValues, Rows] | None = None
         self._recorded = {ACTORS: -1, LIGHTS: -1, WEATHER: -1}
         self._last_decision = -1
 
-    def append(self, events: Iterable[Event] = (), frames: NDArray[np.float64] | None = None) -> None:
+    def append(
+        self,
+        events: Iterable[Event] = (),
+        frames: NDArray[np.float64] | None = None,
+        scene: Scene | None = None,
+        *,
+        check: bool = True,
+    ) -> None:
         """Appends a batch of events and frames and flushes it to the operating system.
 
         Args:
             events: events, in order.
             frames: (n, 9) float64, see `TRAJECTORY_COLUMNS`; frames must rise.
+            scene: surroundings of the car at the last of these frames.
+            check: whether the values are checked. Without it they must be those of an engine; the numbers are then
+                checked when the session is finished.
 
         Raises:
-            SessionError: an event or a row cannot be written; no part of the batch is written then.
+            SessionError: an event, a row or the scene cannot be written; no part of the batch is written then.
         """
         self._check_open("nothing can be appended")
-        lines = [encode_event(event) for event in events]
-        rows = None if frames is None else self._checked(frames)
+        lines = [encode_event(event, check=check) for event in events]
+        rows = None if frames is None else self._checked(frames) if check else np.ascontiguousarray(frames)
+        parts = () if scene is None else self._parts_of(scene, check)
+        if parts and (rows is None or not len(rows)):
+            raise SessionError(f"{self.folder}: surroundings without a frame of the car")
         if lines:
             self._events.write(("\n".join(lines) + "\n").encode("utf-8"))
             self._events.flush()
             self._event_count += len(lines)
         if rows is not None and len(rows):
-            self._write(CAR, int(rows[0, 0]), rows)
+            first, last = int(rows[0, 0]), int(rows[-1, 0])
+            self._write((CAR, first, rows), *((kind, last, part) for kind, part in parts))
             self._frames.update(rows[:, 0].tolist())
-            self._last_frame = int(rows[-1, 0])
+            self._last_frame = last
+            self._recorded.update((kind, last) for kind, _ in parts)
 
     def add_frames(self, frames: NDArray[np.float64]) -> None:
         """Appends frames of the car, (n, 9) float64 as in `TRAJECTORY_COLUMNS`; raises `SessionError` as `append`."""
@@ -130,17 +166,13 @@ class SessionWriter:
         """
         self._add(ACTORS, frame, actor_rows(actors))
 
-    def add_lights(self, frame: int, lights: Mapping[int, LightColour | str]) -> None:
+    def add_lights(self, frame: int, lights: LightColours) -> None:
         """Appends the state of each light at a frame, by id of its signal; raises `SessionError` as `add_actors`."""
-        if self._lights is None or self._lights[0] != lights:  # they rarely change
-            self._lights = dict(lights), light_rows(lights)
-        self._add(LIGHTS, frame, self._lights[1])
+        self._add(LIGHTS, frame, self._light_rows(dict(lights)))
 
-    def add_weather(self, frame: int, weather: Mapping[WeatherParameter, float] | Mapping[str, float]) -> None:
+    def add_weather(self, frame: int, weather: WeatherValues) -> None:
         """Appends the ten weather parameters at a frame; raises `SessionError` as `add_actors`."""
-        if self._weather is None or self._weather[0] != weather:
-            self._weather = dict(weather), weather_rows(weather)
-        self._add(WEATHER, frame, self._weather[1])
+        self._add(WEATHER, frame, self._weather_rows(dict(weather)))
 
     def add_picture(self, frame: int, png: bytes) -> None:
         """Writes a picture (PNG) of a frame.
@@ -239,17 +271,36 @@ class SessionWriter:
             raise SessionError(f"{self.folder}: frame {rows[-1, 0]:.0f}; frames are below {MAX_FRAME}")
         return rows
 
+    def _parts_of(self, scene: Scene, check: bool) -> Sequence[tuple[bytes, Rows]]:
+        """Returns the rows of a scene by kind."""
+        actors = scene.actors
+        return (
+            (ACTORS, actor_rows(actors) if check or isinstance(actors, Mapping) else actors),
+            (LIGHTS, self._light_rows(scene.lights)),
+            (WEATHER, self._weather_rows(scene.weather)),
+        )
+
+    def _light_rows(self, lights: LightColours) -> Rows:
+        if self._lights is None or (self._lights[0] is not lights and self._lights[0] != lights):  # they rarely change
+            self._lights = lights, light_rows(lights)
+        return self._lights[1]
+
+    def _weather_rows(self, weather: WeatherValues) -> Rows:
+        if self._weather is None or (self._weather[0] is not weather and self._weather[0] != weather):
+            self._weather = weather, weather_rows(weather)
+        return self._weather[1]
+
     def _add(self, kind: bytes, frame: int, rows: Rows) -> None:
         self._check_open("nothing can be appended")
         if frame not in self._frames:
             raise SessionError(f"{self.folder}: frame {frame} was not appended; append the frames of the car first")
         if frame <= self._recorded[kind]:
             raise SessionError(f"{self.folder}: frame {frame} after {self._recorded[kind]}; frames must rise")
-        self._write(kind, int(frame), rows)
+        self._write((kind, int(frame), rows))
         self._recorded[kind] = int(frame)
 
-    def _write(self, kind: bytes, frame: int, rows: NDArray[np.generic]) -> None:
-        self._journal.write(encode_block(kind, frame, rows))
+    def _write(self, *blocks: tuple[bytes, int, NDArray[np.generic]]) -> None:
+        self._journal.write(b"".join([encode_block(*block) for block in blocks]))
         self._journal.flush()
 
 

@@ -299,6 +299,12 @@ _SILENCE, _INACTION, _INTACT = ParticipantAction(), CoWizardAction(), AdWizardAc
 
 RoleAction: TypeAlias = ParticipantAction | CoWizardAction | AdWizardAction
 
+AnyAction: TypeAlias = ActionMapping | RoleAction
+"""Action of a role as the engine takes it: an action dict, or a typed action, which need not be encoded."""
+
+_IDLE: dict[Role, RoleAction] = {action.role: action for action in (_SILENCE, _INACTION, _INTACT)}
+_IDLE_OF: dict[type, RoleAction] = {type(action): action for action in _IDLE.values()}
+
 _CLASSES: dict[Role, type[ParticipantAction] | type[CoWizardAction] | type[AdWizardAction]] = {
     cls.role: cls for cls in (ParticipantAction, CoWizardAction, AdWizardAction)
 }
@@ -310,17 +316,41 @@ class ActionDecoder:
 
     def __init__(self, role: Role, limits: SpaceLimits) -> None:
         """Looks up the field bounds of a role."""
-        self.role = role
+        self.role, self._limits = role, limits
+        self._class, self._idle = _CLASSES[role], _IDLE[role]
         self._fields, self._read = _fields(role, limits), _CLASSES[role].read
 
-    def __call__(self, action: ActionMapping) -> RoleAction:
-        """Decodes an action dict; raises `ValueError` with the role and the name of an invalid field."""
+    def __call__(self, action: AnyAction) -> RoleAction:
+        """Decodes an action dict; raises `ValueError` with the role and the name of an invalid field.
+
+        A typed action gives what its action dict would give: values in the steps and bounds of the action space.
+        """
+        if type(action) is self._class:
+            if action is self._idle or action == self._idle:
+                return self._idle
+            action = action.encode(self._limits)
         if type(action) is not dict and not isinstance(action, Mapping):
             raise ValueError(f"action of {self.role}: expected a dict, got {type(action).__name__}")
         try:
             return self._read(ActionReader(action, self._fields))
         except ValueError as error:
             raise ValueError(f"action of {self.role}: {error}") from None
+
+
+def encoded(action: AnyAction, limits: SpaceLimits) -> ActionMapping:
+    """Returns the action dict of an action, which may be one already."""
+    return action if isinstance(action, Mapping) else action.encode(limits)
+
+
+def idle_action(role: Role) -> RoleAction:
+    """Returns the typed action that does nothing."""
+    return _IDLE[role]
+
+
+def is_idle(action: AnyAction) -> bool:
+    """Returns whether an action is typed and does nothing."""
+    idle = _IDLE_OF.get(type(action))
+    return idle is not None and (action is idle or action == idle)
 
 
 def decode_action(role: Role, action: ActionMapping, limits: SpaceLimits) -> RoleAction:

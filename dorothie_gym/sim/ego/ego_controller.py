@@ -131,6 +131,7 @@ class CarRecord:
         hazard: hazard and hazard_gap: the cause of a hazard stop.
         outcome: numbers of events, infractions and collisions.
         props: number of props that it sees.
+        lights: whether its headlights are on.
         air: friction, wind, wind_heading and wind_phase: effects of the weather.
     """
 
@@ -139,6 +140,7 @@ class CarRecord:
         self.hazard = fields(arrays.car, "hazard", "hazard_gap")
         self.outcome = fields(arrays.car, "events", "breaches", "collisions")
         self.props = fields(arrays.plan, "props")
+        self.lights = fields(arrays.plan, "lights")
         self.air = fields(arrays.car, "friction", "wind", "wind_heading", "wind_phase")
 
 

@@ -32,7 +32,7 @@ from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction
+from dorothie_gym.session.spaces.actions import CoWizardAction
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
@@ -122,10 +122,10 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
             voice=SpeechState(role=Role.CO_WIZARD, style=style),
         )
 
-    def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
+    def act(self, observation: ObservationMapping, state: LearnedState) -> tuple[CoWizardAction, LearnedState]:
         """Updates the memory, and chooses a command and remarks."""
         turn = self.play(observation, state)
-        return turn.action.encode(self.limits), turn.state
+        return turn.action, turn.state
 
     def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> Turn:
         """Takes a decision; returns all that it consists of.

@@ -35,7 +35,7 @@ from dorothie_gym.baselines.roles.participant.remarks import (
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.reactions import scene_of
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction, Speech
+from dorothie_gym.session.spaces.actions import ParticipantAction, Speech
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
@@ -79,14 +79,14 @@ class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
         """Returns the state before the first observation."""
         return LearnedState(attention=Attention(memory=SessionMemory.begin(town, seed)))
 
-    def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
+    def act(self, observation: ObservationMapping, state: LearnedState) -> tuple[ParticipantAction, LearnedState]:
         """Looks, listens, chooses the errand, and speaks or is silent."""
         percept = perceive(observation, state.attention)
         choice = self.choose(choosing_inputs(percept), percept)
         memory = percept.memory.chosen(choice, percept.view, percept.rng)
         remarks = self.speak(speaking_inputs(percept, memory), percept, memory)
         speech, attention = finished(percept, memory, remarks)
-        return ParticipantAction(speech=speech).encode(self.limits), replace(state, attention=attention)
+        return ParticipantAction(speech=speech), replace(state, attention=attention)
 
     def choose(self, inputs: Inputs, percept: ParticipantPercept) -> TargetChoice:
         """Returns the most likely target, and whether to guide."""
