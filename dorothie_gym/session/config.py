@@ -205,7 +205,7 @@ class EnvConfig:
         They lack the camera, which has no effect on a session, and the usual perception and channel, so that records
         are equal to those of versions without a choice.
         """
-        settings = asdict(self)
+        settings = {**asdict(self), "world": self.world.record()}
         del settings["camera"]
         for name in ("perception", "channel"):
             value = settings.pop(name)
