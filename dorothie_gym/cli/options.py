@@ -79,8 +79,28 @@ CoWizard = Annotated[
 AdWizard = Annotated[
     str,
     typer.Option(
-        metavar="scripted|silent|random|llm:MODEL|FILE",
-        help="Policy of the Ad-Wizard; a file holds a learned policy.",
+        metavar="scripted[:OPTIONS]|silent|random|llm:MODEL|FILE",
+        help="Policy of the Ad-Wizard; a file holds a learned policy. Options fix what it does: "
+        "scripted:rate=4,spacing=12.",
+        autocompletion=complete_policy("ad_wizard"),
+    ),
+]
+
+TierParticipant = Annotated[
+    str | None,
+    typer.Option(
+        metavar="scripted[:TRAITS]|silent|random|llm:MODEL|FILE[+...]",
+        help="Policy of the participant, by default scripted or those of the tier; several, joined by +, take turns.",
+        autocompletion=complete_policy("participant"),
+    ),
+]
+
+TierAdWizard = Annotated[
+    str | None,
+    typer.Option(
+        metavar="scripted[:OPTIONS]|silent|random|llm:MODEL|FILE",
+        help="Policy of the Ad-Wizard, by default scripted or that of the tier. Options fix what it does: "
+        "scripted:rate=4,spacing=12.",
         autocompletion=complete_policy("ad_wizard"),
     ),
 ]

@@ -6,7 +6,7 @@ import shlex
 import shutil
 import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,17 +26,16 @@ from dorothie_gym.cli.language_model import (
     warn_of_usage,
 )
 from dorothie_gym.cli.options import (
-    AdWizard,
     AsJson,
     CoWizard,
     MaxSeconds,
-    Participant,
     Perception,
     Players,
     Ray,
     Speech,
+    TierAdWizard,
+    TierParticipant,
     WordErrors,
-    env_config,
     find_cast,
 )
 from dorothie_gym.cli.output import (
@@ -48,6 +47,7 @@ from dorothie_gym.cli.output import (
     session_progress,
     wide_stdout,
 )
+from dorothie_gym.cli.tier_options import TierName, chosen_config, find_pool, participants_of, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import closed_loop
@@ -55,20 +55,31 @@ from dorothie_gym.maps.folds import TownFold
 from dorothie_gym.session.config import PerceptionModel
 from dorothie_gym.support.processors import available_processors
 
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.tiers import Tier
+
 
 def rollout(
     co_wizard: CoWizard = "scripted",
-    participant: Participant = "scripted",
-    ad_wizard: AdWizard = "scripted",
+    participant: TierParticipant = None,
+    ad_wizard: TierAdWizard = None,
+    tier: TierName = None,
+    oracle: Annotated[
+        bool,
+        typer.Option("--oracle", help="With --tier: exact words and acts, and brakes for all that is in the world."),
+    ] = False,
+    trials: Annotated[
+        int, typer.Option(min=1, help="Sessions of each scenario, with other seeds of the players; 3 for Pass^3.")
+    ] = 1,
     sessions: Annotated[int, typer.Option(min=1, help="Number of sessions in all towns together.")] = 20,
     towns: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="FOLD|all|NAME,...",
-            help="Towns, which take turns: seen, development, validation, unseen, all, or names.",
+            help="Towns, which take turns: seen, development, validation (default), unseen, all, or names.",
             autocompletion=complete_towns,
         ),
-    ] = TownFold.VALIDATION,
+    ] = None,
     workers: Players = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, for any policies.")] = 0,
     out: Annotated[
@@ -107,13 +118,36 @@ def rollout(
             replay=llm_replay,
             prices=llm_prices,
         )
-        cast = find_cast(participant, co_wizard, ad_wizard, asked)
+        found = tier_of(tier)
+        if oracle and found is None:
+            fail("--oracle plays the oracle of a tier; give it with --tier")
+        config = chosen_config(
+            found,
+            oracle=oracle,
+            max_seconds=max_seconds,
+            word_errors=word_errors,
+            perception=perception,
+            speech=speech,
+            pictures=llm_pictures,
+        )
+        pool = participants_of(participant, found)
+        ad_wizard = ad_wizard or (found.ad_wizard if found else "scripted")
+        cast = find_cast(pool[0], co_wizard, ad_wizard, asked)
         try:
-            chosen = closed_loop.parse_towns(towns)
+            settings = closed_loop.RolloutSettings(
+                cast=cast,
+                towns=_towns(towns, found),
+                sessions=sessions,
+                seed=seed,
+                config=config,
+                pool=find_pool(pool, asked),
+                trials=trials,
+                tier=tier,
+                oracle=oracle,
+                references=found is not None or trials > 1,
+            )
         except ValueError as error:
             fail(str(error))
-        config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures)
-        settings = closed_loop.RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
         result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
     warn_of_usage(closed_loop.usage_warnings(result.usage()))
     if as_json:
@@ -123,6 +157,13 @@ def rollout(
     closed_loop.print_result(result, console)
     if out is not None:
         console.print(f"Folder for `dorothie-gym replay` and `leaderboard`: {out}", style="dim", soft_wrap=True)
+
+
+def _towns(given: str | None, tier: Tier | None) -> tuple[str, ...]:
+    """Returns the towns of a rollout; raises `ValueError` if one is unknown."""
+    if given is None and tier is not None:
+        return tier.towns
+    return closed_loop.parse_towns(given or TownFold.VALIDATION)
 
 
 def _play(

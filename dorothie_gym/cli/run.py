@@ -28,16 +28,15 @@ from dorothie_gym.cli.language_model import (
     warn_of_usage,
 )
 from dorothie_gym.cli.options import (
-    AdWizard,
     AsJson,
     CoWizard,
-    Participant,
     Perception,
     Speech,
     Storyboard,
+    TierAdWizard,
+    TierParticipant,
     View,
     WordErrors,
-    env_config,
     find_cast,
     needs,
 )
@@ -51,6 +50,7 @@ from dorothie_gym.cli.output import (
     reporting_errors,
     stdout,
 )
+from dorothie_gym.cli.tier_options import TierName, chosen_config, participant_of, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.evaluation import rollout as rollouts
@@ -73,6 +73,7 @@ class _Plan:
     """Options of the command line."""
 
     town: str
+    tier: str | None
     storyboard: str | None
     seed: int
     out: Path | None
@@ -90,11 +91,13 @@ class _Plan:
 
 def run(
     town: Annotated[
-        str,
+        str | None,
         typer.Option(
-            metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).", autocompletion=complete_town
+            metavar="NAME|FILE",
+            help=f"A town's name, or a file (.xodr, .yaml); default {DEFAULT_TOWN}, or that of the tier.",
+            autocompletion=complete_town,
         ),
-    ] = DEFAULT_TOWN,
+    ] = None,
     storyboard: Storyboard = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; equal seeds give equal sessions.")] = 0,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Record the session into this new folder.")] = None,
@@ -107,9 +110,10 @@ def run(
         Path | None, typer.Option(metavar="V.mp4", help=f"Write a video of the session ({needs('video')}).")
     ] = None,
     view: View = RenderView.BOTH,
-    participant: Participant = "scripted",
+    participant: TierParticipant = None,
     co_wizard: CoWizard = "scripted",
-    ad_wizard: AdWizard = "scripted",
+    ad_wizard: TierAdWizard = None,
+    tier: TierName = None,
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="Truncate the session after this simulated time [s].")
     ] = None,
@@ -142,15 +146,18 @@ def run(
     """
     if no_picture and picture is not None:
         fail("--picture and --no-picture exclude each other; give one of them")
+    found = tier_of(tier)
+    ad_wizard = ad_wizard or (found.ad_wizard if found else "scripted")
     plan = _Plan(
-        town=town,
+        town=town or (found.town if found else DEFAULT_TOWN),
+        tier=tier,
         storyboard=storyboard,
         seed=seed,
         out=out,
         picture=picture if picture or no_picture or as_json else PICTURE,
         video=video,
         view=view,
-        players=(participant, co_wizard, ad_wizard),
+        players=(participant_of(participant, found, seed), co_wizard, ad_wizard),
         max_seconds=max_seconds,
         word_errors=word_errors,
         perception=perception,
@@ -196,8 +203,13 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
     filmed = plan.video is not None and plan.view is not RenderView.MAP
     drawn = plan.perception is PerceptionModel.CAMERA or plan.language_model.pictures
     compile_first(pictures=filmed or drawn)
-    config = env_config(
-        plan.max_seconds, plan.word_errors, plan.perception, plan.speech, pictures=plan.language_model.pictures
+    config = chosen_config(
+        tier_of(plan.tier),
+        max_seconds=plan.max_seconds,
+        word_errors=plan.word_errors,
+        perception=plan.perception,
+        speech=plan.speech,
+        pictures=plan.language_model.pictures,
     )
     engine = SessionEngine(plan.town, plan.storyboard, config=config)
     engine.reset(seed=plan.seed)

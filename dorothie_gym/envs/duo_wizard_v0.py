@@ -22,8 +22,8 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
+from dorothie_gym.envs.tier_settings import tier_settings
 from dorothie_gym.envs.turn_based_duo_wizard import TurnBasedDuoWizard
-from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.session.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
@@ -86,6 +86,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `render_view`: picture of `render()`: `"map"`, `"camera"` (the windscreen) or `"both"`, with subtitles.
     - `max_cycles`: decisions until truncation, instead of `config.max_seconds`.
+    - `tier`: name of a `Tier`, which gives town and settings that are not given themselves.
 
     `reset(options={"scenario": Scenario})` plays a given scenario, whose seed is then the session's; other options
     are ignored, as PettingZoo's API test expects.
@@ -99,14 +100,16 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
 
     def __init__(
         self,
-        town: str | Path | Town = DEFAULT_TOWN,
+        town: str | Path | Town | None = None,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         config: EnvConfig | Mapping[str, object] | None = None,
         render_mode: str | None = None,
         max_cycles: int | None = None,
         render_view: str = "map",
+        tier: str | None = None,
     ) -> None:
+        town, config, _ = tier_settings(tier, town, config)
         self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
         rate = self.engine.config.decision_frequency
         self.metadata = {**_METADATA, **metadata_at(rate)}

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
+from dorothie_gym.envs.tier_settings import tier_settings
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import ChannelKind, EnvConfig, PerceptionModel, RenderView, checked_view
 from dorothie_gym.session.providers import sensor_spaces
@@ -81,7 +81,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     def __init__(
         self,
         num_envs: int = 1,
-        town: Towns = DEFAULT_TOWN,
+        town: Towns | None = None,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
         config: EnvConfig | None = None,
@@ -90,6 +90,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         threads: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_view: str = RenderView.MAP,
+        tier: str | None = None,
     ) -> None:
         """Makes the environments.
 
@@ -104,10 +105,12 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
             threads: number of threads; None for one per processor.
             autoreset_mode: see above.
             render_view: as in `DuoWizardEnv`.
+            tier: as in `DuoWizardEnv`.
 
         Raises:
             ValueError: an argument is out of its range.
         """
+        town, config, _ = tier_settings(tier, town, config)
         if config is not None and config.perception is PerceptionModel.CAMERA:
             raise ValueError('config.perception is "camera"; batches do not perceive by it: make single environments')
         if config is not None and config.channel is ChannelKind.SPEECH:

@@ -12,7 +12,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.maps.folds import DEFAULT_TOWN
+from dorothie_gym.envs.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
@@ -63,6 +63,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`, `render_view`: as in `DuoWizardEnv`.
     - `view`: picture of `render()`: `"role"` (what the role observes) or `"session"` (the whole session).
     - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
+    - `tier`: name of a `Tier`, which gives town, settings and partners that are not given themselves.
 
     `reset(seed=...)` plays the session that `DuoWizardEnv` has for this seed; the seeds of the partners follow from it.
     `reset(options={"scenario": Scenario})` plays a given scenario.
@@ -77,7 +78,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     def __init__(
         self,
         role: Role | str,
-        town: str | Path | Town = DEFAULT_TOWN,
+        town: str | Path | Town | None = None,
         storyboard: str | Path | StoryboardTemplate | None = None,
         config: EnvConfig | Mapping[str, object] | None = None,
         partners: Mapping[str, str | AnyPolicy] | None = None,
@@ -85,10 +86,12 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         max_cycles: int | None = None,
         view: str = "role",
         render_view: str = "map",
+        tier: str | None = None,
     ) -> None:
         if role not in AGENT_ROLES:
             raise ValueError(f"role is {str(role)!r}; it must be one of {', '.join(AGENT_ROLES)}")
         self.role = Role(role)
+        town, config, usual = tier_settings(tier, town, config, self.role)
         self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
         rate = self.engine.config.decision_frequency
         self.metadata = metadata_at(rate)
@@ -97,7 +100,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         limits = self.engine.limits
         self.observation_space = deepcopy(self.engine.observation_space(self.role))
         self.action_space = deepcopy(action_space(self.role, limits))
-        self.partners = self._cast(partners or {})
+        self.partners = self._cast({**usual, **(partners or {})})
         self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))
         self._states: dict[Role, object] = {}
 

@@ -156,9 +156,16 @@ class DecisionClock:
         return DecisionClock(time=now, interval=elapsed if elapsed > 0.0 else self.interval)
 
 
-def policy_seed(seed: int, role: Role) -> int:
-    """Returns the seed of a role's policy in the session of a seed: 32 bits, different for each role."""
-    branch = np.random.SeedSequence([seed, _SEED_BRANCH, AGENT_ROLES.index(role)])
+def policy_seed(seed: int, role: Role, trial: int = 0) -> int:
+    """Returns the seed of a role's policy in the session of a seed: 32 bits, different for each role.
+
+    Args:
+        seed: seed of the session.
+        role: the role.
+        trial: number of the trial, of several of one scenario.
+    """
+    repeated = [trial] if trial else []
+    branch = np.random.SeedSequence([seed, _SEED_BRANCH, AGENT_ROLES.index(role), *repeated])
     return int(branch.generate_state(1)[0])
 
 

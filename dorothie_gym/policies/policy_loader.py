@@ -19,6 +19,7 @@ from dorothie_gym import policies
 from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean, short_repr
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies import language_model as model_policies
+from dorothie_gym.policies.ad_wizard_options import parse_ad_wizard
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import DESCRIPTION, AnyPolicy
@@ -30,7 +31,7 @@ POLICY_NAMES = ("scripted", "silent", "random")
 """Names that `make_policy` accepts for every role."""
 
 WITH_TRAITS: Final = "scripted:"
-"""Beginning of the name of a scripted policy whose personas have given traits."""
+"""Beginning of the name of a scripted policy whose personas have given traits, or of an Ad-Wizard with options."""
 
 LANGUAGE_MODEL: Final = "llm:"
 """Prefix of the name of a policy that calls a language model; the name of the model follows."""
@@ -51,7 +52,8 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     Args:
         name: "scripted", "silent" (does nothing) or "random" (samples the action space); for participant and Co-Wizard
             also "scripted:" with traits of the persona ("scripted:talkativeness=0.8..1", see
-            `dorothie_gym.policies.persona`); for the Co-Wizard also "lane-follow" (follows its lane, never talks), or a
+            `dorothie_gym.policies.persona`), for the Ad-Wizard with its options ("scripted:rate=4,spacing=12", see
+            `dorothie_gym.policies.ad_wizard_options`); for the Co-Wizard also "lane-follow" (follows its lane, never talks), or a
             shipped model such as "pretrained:maskable-ppo"; "llm:" with the name of a language model at the endpoint
             `OPENAI_BASE_URL`.
         role: role of the policy.
@@ -64,7 +66,11 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if role not in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
         raise ValueError(f"role is {role}; policies act for participant, co_wizard and ad_wizard")
     if _gives_traits(name, role):
-        traits = parse_traits(name.removeprefix(WITH_TRAITS))
+        given = name.removeprefix(WITH_TRAITS)
+        if role is Role.AD_WIZARD:
+            options = parse_ad_wizard(given)
+            return policies.ScriptedAdWizard(limits, rate=options.rate, kinds=options.kinds, config=options.config)
+        traits = parse_traits(given)
         if role is Role.PARTICIPANT:
             return policies.ScriptedParticipant(limits, traits=traits)
         return policies.ScriptedCoWizard(limits, traits=traits)
@@ -90,7 +96,7 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
 
 
 def _gives_traits(name: str, role: Role) -> bool:
-    return name.startswith(WITH_TRAITS) and role in (Role.PARTICIPANT, Role.CO_WIZARD)
+    return name.startswith(WITH_TRAITS) and role in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
 
 
 Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], AnyPolicy]
@@ -203,7 +209,8 @@ def find_player(given: str, role: Role, language_model: LanguageModelConfig | No
     """
     if _gives_traits(given, role):
         try:
-            parse_traits(given.removeprefix(WITH_TRAITS))
+            parse = parse_ad_wizard if role is Role.AD_WIZARD else parse_traits
+            parse(given.removeprefix(WITH_TRAITS))
         except ValueError as error:
             raise PolicyLoadError(f"{role}: {error}") from None
         return Player(name=given)

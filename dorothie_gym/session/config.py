@@ -145,6 +145,9 @@ class EnvConfig:
         channel: channel of the words between participant and Co-Wizard. With `ChannelKind.SPEECH` they are
             synthesised, mixed with the noise of the car and recognised; `word_error_rate` is then not used, and
             utterances take as long as their audio. Needs the extra `speech`.
+        time_factor: time after which the session is truncated as a multiple of the reference time of its scenario
+            (`Scenario.reference`); `max_seconds` is then an upper bound. None for `max_seconds` alone.
+        stops: range of the number of stops, the subgoals at the start, of drawn storyboards; None draws from all.
     """
 
     decision_frequency: float = 2.0
@@ -159,6 +162,8 @@ class EnvConfig:
     sensors: SensorConfig = SensorConfig()
     perception: PerceptionModel = PerceptionModel.SYMBOLIC
     channel: ChannelKind = ChannelKind.TEXT
+    time_factor: float | None = None
+    stops: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         frames = FRAME_RATE / self.decision_frequency if self.decision_frequency > 0 else 0.5
@@ -182,6 +187,16 @@ class EnvConfig:
         if self.channel not in (kinds := list(map(str, ChannelKind))):
             raise ValueError(f"EnvConfig.channel is {self.channel!r}; it must be {' or '.join(kinds)}")
         object.__setattr__(self, "channel", ChannelKind(self.channel))
+        if self.time_factor is not None and not 0.1 <= self.time_factor <= 100.0:
+            raise ValueError(f"EnvConfig.time_factor is {self.time_factor}; it must be in 0.1..100, or None")
+        self._check_stops()
+
+    def _check_stops(self) -> None:
+        if self.stops is None:
+            return
+        if len(self.stops) != 2 or not 1 <= self.stops[0] <= self.stops[1]:
+            raise ValueError(f"EnvConfig.stops is {self.stops}; it must be a range (least, most) from 1, or None")
+        object.__setattr__(self, "stops", tuple(self.stops))
 
     def _check_sensors(self) -> None:
         if not isinstance(self.cameras, Mapping):
@@ -215,16 +230,20 @@ class EnvConfig:
     def record(self) -> dict[str, object]:
         """Returns the settings in JSON types, for records.
 
-        They lack cameras and sensors, which have no effect on a session, and the usual perception and channel, so that
-        records are equal to those of versions without a choice.
+        They lack cameras and sensors, which have no effect on a session, and the usual perception, channel, time and
+        stops, so that records are equal to those of versions without a choice.
         """
-        settings = asdict(self)
+        settings = {**asdict(self), "world": self.world.record()}
         for name in ("camera", "cameras", "sensors"):
             del settings[name]
         for name in ("perception", "channel"):
             value = settings.pop(name)
             if value is not getattr(EnvConfig, name):
                 settings[name] = str(value)
+        if self.time_factor is None:
+            del settings["time_factor"]
+        if settings.pop("stops") is not None:
+            settings["stops"] = list(self.stops or ())
         return settings
 
 

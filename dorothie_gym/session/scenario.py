@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import gymnasium
 import numpy as np
@@ -30,6 +30,26 @@ STREET_NAMES = tuple(
 
 @shared
 @dataclass(frozen=True, kw_only=True)
+class ReferenceDrive:
+    """Effort of the reference pair in a scenario, see `dorothie_gym.evaluation.rollout.reference_drives`.
+
+    Attributes:
+        seconds: simulated time until the destination [s].
+        exchanges: number of exchanges of their dialogue.
+        subgoals: number of live subgoals, all reached.
+    """
+
+    seconds: float
+    exchanges: int
+    subgoals: int
+
+
+REFERENCE: Final = "reference"
+"""Field of `SessionHeader.extra` with the reference of the scenario: the fields of `ReferenceDrive`."""
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
 class Scenario:
     """Initial conditions of a session.
 
@@ -38,12 +58,15 @@ class Scenario:
         storyboard: the task, bound to places of the town.
         street_names: name of each street of the town.
         departure: lane of the parked ego and the distance along it [m].
+        reference: effort of the reference pair; None if it was not measured. It has no effect but on
+            `EnvConfig.time_factor`.
     """
 
     seed: int
     storyboard: Storyboard
     street_names: tuple[StreetName, ...]
     departure: tuple[int, float]
+    reference: ReferenceDrive | None = None
 
 
 ResetOptions: TypeAlias = Mapping[str, object]
@@ -88,19 +111,25 @@ def template_option(storyboard: str | Path | StoryboardTemplate | None) -> Story
     return tasks.load_template(storyboard)
 
 
-def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) -> Scenario:
+def draw_scenario(
+    town: Town, template: StoryboardTemplate | None, seed: int, stops: tuple[int, int] | None = None
+) -> Scenario:
     """Draws a scenario; equal arguments give equal scenarios.
 
     Args:
         town: the map, with at least one site for each landmark of the storyboard.
         template: template of the storyboard; None draws one of the shipped templates that fit the town.
         seed: any integer >= 0.
+        stops: range of the number of stops of a drawn template, see `EnvConfig.stops`; None draws from all.
 
     Raises:
         StoryboardError: the template cannot be bound to the town, or none fits it.
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     sites = connected_sites(town)
+    if template is None and stops is not None:
+        fitting = _with_stops(fitting_templates(town), stops, town)
+        template = fitting[int(task.integers(len(fitting)))]
     if template is None:
         names = tasks.template_names()
         template = tasks.load_template(names[int(task.integers(len(names)))])
@@ -135,6 +164,23 @@ def fitting_templates(town: Town) -> list[StoryboardTemplate]:
         )
         raise StoryboardError(least.name, "landmarks", reason)
     return fitting
+
+
+def _with_stops(
+    templates: Sequence[StoryboardTemplate], stops: tuple[int, int], town: Town
+) -> list[StoryboardTemplate]:
+    """Returns the templates with a number of stops in a range; raises `StoryboardError` if there is none."""
+    found = [
+        template
+        for template in templates
+        if stops[0] <= sum(not subgoal.trigger for subgoal in template.subgoals) <= stops[1]
+    ]
+    if not found:
+        reason = (
+            f"no shipped storyboard that fits town {town.name} has {stops[0]} to {stops[1]} stops; use a larger town"
+        )
+        raise StoryboardError(templates[0].name, "subgoals", reason)
+    return found
 
 
 def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...]:
@@ -191,6 +237,7 @@ def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader
         story=storyboard.story,
         departure=scenario.departure,
         config=config.record(),
+        extra={} if scenario.reference is None else {REFERENCE: asdict(scenario.reference)},
     )
 
 

@@ -25,13 +25,18 @@ def time_allowed(town: Town, scenario: Scenario, config: EnvConfig) -> float:
     """Returns the time after which a session is truncated [s].
 
     It is `EnvConfig.max_seconds`. The default is a minimum in towns where cars drive as fast as the lanes allow: there
-    the time is three times that of the reference route, if that is longer.
+    the time is three times that of the reference route, if that is longer. With `EnvConfig.time_factor` it is a
+    multiple of the reference time of the scenario, in all towns: that of `Scenario.reference`, else the expected one.
 
     Args:
         town: the map.
         scenario: the scenario.
         config: settings of the session.
     """
+    if config.time_factor is not None:
+        measured = scenario.reference
+        reference = reference_seconds(town, scenario) if measured is None else measured.seconds
+        return min(config.max_seconds, float(round(config.time_factor * reference)))
     if town.cruise is not None or config.max_seconds != EnvConfig.max_seconds:
         return config.max_seconds
     return max(config.max_seconds, float(round(_SLACK * reference_seconds(town, scenario))))

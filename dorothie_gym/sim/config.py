@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import enum
+from dataclasses import asdict, dataclass
 
 from dorothie_gym.support.copying import shared
 
@@ -11,6 +12,17 @@ FRAME_RATE = 30
 
 FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
 """Columns of the ego's trajectory: metres, radians, m/s, normalised controls; `lane` is the lane's id."""
+
+
+class AutomaticBraking(enum.StrEnum):
+    """Extent of the car's automatic braking."""
+
+    COMPLETE = "complete"
+    """For all bodies in sight, for red lights and stop signs; the car slows down in poor sight."""
+    PERCEIVED = "perceived"
+    """For bodies that its sensors have had in view for `WorldConfig.braking_delay`. Bodies behind vehicles are hidden
+    from the sensors. The car keeps its speed in poor sight, and the action Start close to a red light or a stop sign
+    passes it."""
 
 
 @shared
@@ -25,12 +37,16 @@ class WorldConfig:
             speed of its own (`Town.cruise`), the ego follows the speed limits instead of the default until another
             speed is set.
         collisions_stop: duration of the ego's standstill after a collision [s].
+        braking: extent of the car's automatic braking; also as text.
+        braking_delay: time for which a body must be in view before `AutomaticBraking.PERCEIVED` acts on it [s].
     """
 
     vehicles: int = 10
     pedestrians: int = 4
     cruise_speed: float = 40.0
     collisions_stop: float = 3.0
+    braking: AutomaticBraking = AutomaticBraking.COMPLETE
+    braking_delay: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.vehicles <= 200:
@@ -43,3 +59,17 @@ class WorldConfig:
             )
         if not 0.0 <= self.collisions_stop <= 60.0:
             raise ValueError(f"WorldConfig.collisions_stop is {self.collisions_stop}; it must be in 0..60 s")
+        if self.braking not in (kinds := list(map(str, AutomaticBraking))):
+            raise ValueError(f"WorldConfig.braking is {self.braking!r}; it must be {' or '.join(kinds)}")
+        object.__setattr__(self, "braking", AutomaticBraking(self.braking))
+        if not 0.0 <= self.braking_delay <= 5.0:
+            raise ValueError(f"WorldConfig.braking_delay is {self.braking_delay}; it must be in 0..5 s")
+
+    def record(self) -> dict[str, object]:
+        """Returns the settings in JSON types, for records; without those of the braking if it is complete."""
+        settings = asdict(self)
+        braking = settings.pop("braking")
+        if braking is AutomaticBraking.COMPLETE:
+            del settings["braking_delay"]
+            return settings
+        return {**settings, "braking": str(braking)}

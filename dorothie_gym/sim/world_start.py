@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
+from dorothie_gym.sim.config import FRAME_RATE, AutomaticBraking, WorldConfig
 from dorothie_gym.sim.ego.ego_controller import request_path
 from dorothie_gym.sim.ego.limits import cruise_by_limit
 from dorothie_gym.sim.ego.manoeuvres import BEGIN
@@ -68,7 +68,10 @@ def start_world(
     town, (lane, station) = town_arrays(network), departure
     sow(holder.arrays, seeds.bodies)
     add_car(town, holder.arrays, lane, station)
-    plain(holder.arrays.car)["collision_stop"] = round(config.collisions_stop * FRAME_RATE)
+    car = plain(holder.arrays.car)
+    car["collision_stop"] = round(config.collisions_stop * FRAME_RATE)
+    car["attentive"] = config.braking is AutomaticBraking.PERCEIVED
+    car["attention"] = round(config.braking_delay * FRAME_RATE)
     request_path(town, holder, BEGIN, lane=lane, station=station)
     plan = plain(holder.arrays.plan)
     follows = network.town.cruise is None and config.cruise_speed == WorldConfig.cruise_speed

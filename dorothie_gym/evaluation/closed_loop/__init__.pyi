@@ -13,12 +13,13 @@ from .leaderboard_chart import draw_leaderboard as draw_leaderboard
 from .leaderboard_plan import LeaderboardPlan as LeaderboardPlan
 from .leaderboard_plan import usual_rows as usual_rows
 from .many_rollouts import roll_out_all as roll_out_all
+from .metric import ClosedLoopMetric as ClosedLoopMetric
 from .metrics import METRICS as METRICS
 from .metrics import PENALTIES as PENALTIES
 from .metrics import SPL as SPL
 from .metrics import AbandonedExchanges as AbandonedExchanges
+from .metrics import AllTrials as AllTrials
 from .metrics import ClarificationRate as ClarificationRate
-from .metrics import ClosedLoopMetric as ClosedLoopMetric
 from .metrics import DrivingScore as DrivingScore
 from .metrics import ExceptionsMet as ExceptionsMet
 from .metrics import ExceptionsRecovered as ExceptionsRecovered
@@ -31,6 +32,7 @@ from .metrics import RecoverySeconds as RecoverySeconds
 from .metrics import RouteCompletion as RouteCompletion
 from .metrics import Seconds as Seconds
 from .metrics import Success as Success
+from .metrics import TimelyCompletion as TimelyCompletion
 from .metrics import UtterancesPerSubgoal as UtterancesPerSubgoal
 from .metrics import figures_of as figures_of
 from .metrics import interval_of as interval_of

@@ -33,7 +33,7 @@ from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, raising, read_json
 
 if TYPE_CHECKING:
-    from dorothie_gym.evaluation.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
+    from dorothie_gym.evaluation.closed_loop.metrics import ShownMetric
 
 IMPORTED: Final = "imported"
 """Part of the leaderboard for rollouts in towns from OpenDRIVE files."""
@@ -302,9 +302,7 @@ def leaderboard_page(
 
 
 def _figures(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
-    columns: list[ClosedLoopMetric | RecoverySeconds] = [
-        next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS
-    ]
+    columns: list[ShownMetric] = [next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS]
     rows = [["Co-Wizard", "sessions", "errored", CLAIMED, *(metric.title for metric in columns)]]
     for entry in entries:
         cells = [figure_text(metric, entry.table.figures[metric.key]) for metric in columns]

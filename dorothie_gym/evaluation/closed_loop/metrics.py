@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import statistics
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -19,42 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.analysis.intervals import bootstrap_weights, percentile_interval, wilson_interval
+from dorothie_gym.evaluation.closed_loop.metric import ClosedLoopMetric
 from dorothie_gym.evaluation.closed_loop.session_record import TIMEOUT, SessionRecord
+from dorothie_gym.evaluation.closed_loop.sub_scores import (
+    Discomfort,
+    ExchangesAgainstReference,
+    HardBraking,
+    Truth,
+    UnansweredQuestions,
+)
 from dorothie_gym.support import portable_arrays as pn
 
 PENALTIES: Final[Mapping[str, float]] = MappingProxyType(
     {"pedestrian": 0.50, "vehicle": 0.60, "static": 0.65, "red_light": 0.70, "stop_sign": 0.80, TIMEOUT: 0.70}
 )
 """Factor of the driving score for each infraction, as in the CARLA leaderboard (leaderboard.carla.org, version 2)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ClosedLoopMetric(ABC):
-    """Metric over one or more sessions.
-
-    Attributes:
-        key: name of the metric in JSON.
-        title: name of the metric in tables.
-        worst: value of a session that ended in an error; None leaves such sessions out.
-        is_share: whether tables show the metric in per cent.
-        counts_sessions: whether the metric is 0 or 1 for a session.
-    """
-
-    key: ClassVar[str]
-    title: ClassVar[str]
-    worst: ClassVar[float | None] = None
-    is_share: ClassVar[bool] = True
-    counts_sessions: ClassVar[bool] = False
-
-    @abstractmethod
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the contributions of a session to numerator and denominator; (0, 0) leaves the session out."""
-
-    def of(self, records: Iterable[SessionRecord]) -> float | None:
-        """Returns the metric over sessions; None if all are left out."""
-        sums = [self.parts(record) for record in records]
-        lower = sum(part for _, part in sums)
-        return sum(part for part, _ in sums) / lower if lower else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,6 +142,30 @@ class DrivingScore(ClosedLoopMetric):
 
 
 @dataclass(frozen=True, kw_only=True)
+class TimelyCompletion(ClosedLoopMetric):
+    """Route completion x infraction score x min(1, 2 T_ref / T), with the time T and the reference time T_ref.
+
+    The reference is that of the scenario (`ReferenceDrive`); sessions without one are left out.
+    """
+
+    key: ClassVar[str] = "timely_completion"
+    title: ClassVar[str] = "timely completion"
+    worst: ClassVar[float | None] = 0.0
+    needs_reference: ClassVar[bool] = True
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the numerator (the product) and the denominator (1) of the metric."""
+        if record.reference is None:
+            return 0.0, 0.0
+        share, counts = DrivingScore().parts(record)
+        return share * min(1.0, TIMELY * record.reference.seconds / max(record.seconds, 1e-9)), counts
+
+
+TIMELY: Final = 2.0
+"""Time up to which a completion is timely, as a multiple of the reference time."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Seconds(ClosedLoopMetric):
     """Simulated time of a session [s]."""
 
@@ -254,6 +256,7 @@ class ExceptionsRecovered(ClosedLoopMetric):
 
 
 METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
+    TimelyCompletion(),
     Success(),
     GoalConditionSuccess(),
     SPL(),
@@ -266,6 +269,11 @@ METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
     UtterancesPerSubgoal(),
     AbandonedExchanges(),
     ClarificationRate(),
+    ExchangesAgainstReference(),
+    UnansweredQuestions(),
+    Truth(),
+    Discomfort(),
+    HardBraking(),
     ExceptionsMet(),
     ExceptionsRecovered(),
 )
@@ -279,6 +287,7 @@ class RecoverySeconds:
     key: ClassVar[str] = "recovery_seconds"
     title: ClassVar[str] = "seconds to recovery"
     is_share: ClassVar[bool] = False
+    needs_reference: ClassVar[bool] = False
 
     def values(self, record: SessionRecord) -> tuple[float, ...]:
         """Returns the times of one session."""
@@ -288,6 +297,36 @@ class RecoverySeconds:
         """Returns the median over the exceptions of the given sessions; None without a recovery."""
         found = [seconds for record in records for seconds in self.values(record)]
         return statistics.median(found) if found else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllTrials:
+    """Share of the scenarios in which all of several trials are a success: Pass^k (Yao et al., 2024, tau-bench).
+
+    Scenarios with another number of trials are left out. With `trials` 3 it is Pass^3.
+    """
+
+    key: ClassVar[str] = "all_trials"
+    title: ClassVar[str] = "Pass^3"
+    is_share: ClassVar[bool] = True
+    needs_reference: ClassVar[bool] = True
+    trials: int = 3
+
+    def interval(self, scenarios: Iterable[Sequence[bool]]) -> MetricInterval:
+        """Returns the share with Wilson's interval.
+
+        Args:
+            scenarios: successes of the trials of each scenario.
+        """
+        passed = [all(each) for each in scenarios if len(each) == self.trials]
+        if not passed:
+            return MetricInterval(mean=None)
+        low, high = wilson_interval(sum(passed), len(passed))
+        return MetricInterval(mean=sum(passed) / len(passed), low=low, high=high)
+
+
+ShownMetric: TypeAlias = ClosedLoopMetric | RecoverySeconds | AllTrials
+"""Metric of the tables: its key, its title, and whether it is a share."""
 
 
 # --- figures over sessions --------------------------------------------------------------------------------------------
@@ -337,7 +376,7 @@ def figures_of(records: Sequence[SessionRecord], errored: int = 0) -> dict[str, 
 def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], errored: int = 0) -> MetricInterval:
     """Returns a metric over sessions with its interval; see `figures_of`."""
     parts = [metric.parts(record) for record in records]
-    if metric.worst is not None:
+    if metric.worst is not None and not (metric.needs_reference and not any(lower for _, lower in parts)):
         parts += [(metric.worst, 1.0)] * errored
     if not any(lower for _, lower in parts):
         return MetricInterval(mean=None)

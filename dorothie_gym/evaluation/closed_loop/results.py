@@ -16,10 +16,11 @@ from dorothie_gym.evaluation.analysis.intervals import CONFIDENCE, RESAMPLES
 from dorothie_gym.evaluation.closed_loop.metrics import (
     BOOTSTRAP_SEED,
     METRICS,
-    ClosedLoopMetric,
+    AllTrials,
     FigurePage,
     MetricInterval,
     RecoverySeconds,
+    ShownMetric,
     figures_of,
 )
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, SessionRecordPage
@@ -58,6 +59,8 @@ class RolloutRow:
         record: measures of the session; None if it ended in an error.
         error: the error, if any.
         usage: usage of language models, by role; empty if there is none.
+        trial: number of the trial, of several of one scenario.
+        participant: name of the participant's player, if several take turns.
     """
 
     number: int
@@ -66,12 +69,22 @@ class RolloutRow:
     record: SessionRecord | None = None
     error: str | None = None
     usage: SessionUsage = field(default_factory=dict)
+    trial: int = 0
+    participant: str | None = None
 
     def to_json(self) -> dict[str, object]:
-        """Returns the fields in JSON types; `usage` is left out if there is none."""
+        """Returns the fields in JSON types; `usage`, `trial` and `participant` are left out if there are none."""
         record = None if self.record is None else self.record.to_json()
-        page = {"number": self.number, "town": self.town, "seed": self.seed, "error": self.error, "record": record}
-        return {**page, "usage": usage_to_json(self.usage)} if self.usage else page
+        return {
+            "number": self.number,
+            "town": self.town,
+            "seed": self.seed,
+            "error": self.error,
+            "record": record,
+            **({"usage": usage_to_json(self.usage)} if self.usage else {}),
+            **({"trial": self.trial} if self.trial else {}),
+            **({"participant": self.participant} if self.participant is not None else {}),
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +147,7 @@ class RolloutResult:
 
     def to_json(self) -> dict[str, object]:
         """Returns the table and the rows in JSON types; they do not depend on the number of workers."""
-        usage = self.usage()
+        usage, partners = self.usage(), self.per_partner()
         return {
             "version": RESULT_VERSION,
             "settings": dict(self.settings),
@@ -142,6 +155,7 @@ class RolloutResult:
             **self.table().to_json(),
             "per_town": {town: table.to_json() for town, table in self.per_town().items()},
             "per_exception": {kind: table.to_json() for kind, table in self.per_exception().items()},
+            **({"per_partner": {name: table.to_json() for name, table in partners.items()}} if partners else {}),
             **({"usage": usage_to_json(usage)} if usage else {}),
             "seeds": [row.seed for row in self.rows],
             "interval": {"share": CONFIDENCE, "resamples": RESAMPLES, "seed": BOOTSTRAP_SEED},
@@ -160,6 +174,11 @@ class RolloutResult:
         """Returns the table of each town, in the order of their first sessions."""
         towns = dict.fromkeys(row.town for row in self.rows)
         return {town: RolloutTable.of([row for row in self.rows if row.town == town]) for town in towns}
+
+    def per_partner(self) -> dict[str, RolloutTable]:
+        """Returns the table of each participant, in the order of their first sessions; empty if there is only one."""
+        names = dict.fromkeys(row.participant for row in self.rows if row.participant is not None)
+        return {name: RolloutTable.of([row for row in self.rows if row.participant == name]) for name in names}
 
     def per_exception(self) -> dict[str, RolloutTable]:
         """Returns a table for the sessions with each kind of exception, and one for sessions without exceptions.
@@ -188,6 +207,8 @@ class _RowPage(TypedDict):
     error: str | None
     record: SessionRecordPage | None
     usage: NotRequired[dict[str, UsagePage]]
+    trial: NotRequired[Annotated[int, Meta(ge=0, lt=1000)]]
+    participant: NotRequired[str]
 
 
 class _ConfigPage(TypedDict):
@@ -243,6 +264,8 @@ def result_from_json(page: JsonValue, where: str) -> RolloutResult:
                 record=None if row["record"] is None else SessionRecord.from_json(row["record"]),
                 error=row["error"],
                 usage=usage_from_json(row.get("usage", {})),
+                trial=row.get("trial", 0),
+                participant=row.get("participant"),
             )
             for row in found["rows"]
         ]
@@ -271,7 +294,17 @@ def read_result(path: Path | str) -> RolloutResult:
 
 def _figures(rows: Sequence[RolloutRow]) -> dict[str, MetricInterval]:
     records = [row.record for row in rows if row.record is not None]
-    return figures_of(records, len(rows) - len(records))
+    found = figures_of(records, len(rows) - len(records))
+    found[AllTrials.key] = AllTrials().interval(_trials(rows))
+    return found
+
+
+def _trials(rows: Sequence[RolloutRow]) -> list[list[bool]]:
+    """Returns the successes of the trials of each scenario; an error counts as a failure."""
+    found: dict[tuple[str, int], list[bool]] = {}
+    for row in rows:
+        found.setdefault((row.town, row.seed), []).append(row.record is not None and row.record.success)
+    return list(found.values())
 
 
 def _only(record: SessionRecord, kind: ExceptionKind) -> SessionRecord:
@@ -281,9 +314,10 @@ def _only(record: SessionRecord, kind: ExceptionKind) -> SessionRecord:
 
 # --- terminal ---------------------------------------------------------------------------------------------------------
 
-ALL_METRICS: Final[tuple[ClosedLoopMetric | RecoverySeconds, ...]] = (*METRICS, RecoverySeconds())
+ALL_METRICS: Final[tuple[ShownMetric, ...]] = (*METRICS, RecoverySeconds(), AllTrials())
 
 TOWN_METRICS: Final = (
+    "timely_completion",
     "success",
     "goal_condition_success",
     "spl",
@@ -293,6 +327,9 @@ TOWN_METRICS: Final = (
     "seconds",
 )
 """Metrics of the table of towns."""
+
+PARTNER_METRICS: Final = ("timely_completion", "success", "goal_condition_success", "driving_score", "all_trials")
+"""Metrics of the table of partners."""
 
 EXCEPTION_METRICS: Final = ("success", "driving_score", "exceptions_met", "exceptions_recovered", "recovery_seconds")
 """Metrics of the table of exceptions."""
@@ -319,6 +356,11 @@ def print_result(result: RolloutResult, console: Console) -> None:
             console.print(part)
     for part in _parts("exception", result.per_exception(), EXCEPTION_METRICS, console.width):
         console.print(part)
+    partners = result.per_partner()
+    for part in _parts("partner", partners, PARTNER_METRICS, console.width) if partners else ():
+        console.print(part)
+    if worst := worst_partner(partners):
+        console.print(f"Worst partner: {worst}", markup=False)
     if usage := result.usage():
         console.print(usage_table(usage, table.sessions))
     seeds = [str(row.seed) for row in result.rows]
@@ -329,7 +371,16 @@ def print_result(result: RolloutResult, console: Console) -> None:
             console.print(f"Session {row.number} ({row.town}, seed {row.seed}): {row.error}", markup=False)
 
 
-def figure_text(metric: ClosedLoopMetric | RecoverySeconds, figure: FigurePage) -> str:
+def worst_partner(partners: Mapping[str, RolloutTable]) -> str | None:
+    """Returns the partner with the lowest timely completion, or success where that is undefined; None without any."""
+    ranks = {name: table.figures["timely_completion"]["mean"] for name, table in partners.items()}
+    if any(rank is None for rank in ranks.values()):
+        ranks = {name: table.figures["success"]["mean"] for name, table in partners.items()}
+    known = {name: rank for name, rank in ranks.items() if rank is not None}
+    return min(known, key=lambda name: (known[name], name)) if known else None
+
+
+def figure_text(metric: ShownMetric, figure: FigurePage) -> str:
     """Returns a figure with its interval: "95.0 [92.1, 97.4] %" for a share, "-" if it is undefined."""
     mean, low, high = figure["mean"], figure["low"], figure["high"]
     if mean is None:
@@ -344,6 +395,8 @@ def figure_text(metric: ClosedLoopMetric | RecoverySeconds, figure: FigurePage) 
 def _overall(page: RolloutTable) -> Table:
     table = Table("metric", "mean [95 % interval]", title="Closed loop")
     for metric in ALL_METRICS:
+        if metric.needs_reference and page.figures[metric.key]["mean"] is None:
+            continue
         table.add_row(metric.title, figure_text(metric, page.figures[metric.key]))
     return table
 
@@ -362,7 +415,7 @@ def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...], 
     figures = {
         metric.title: [figure_text(metric, page.figures[metric.key]).replace(" [", "\n[") for page in parts.values()]
         for metric in ALL_METRICS
-        if metric.key in keys
+        if metric.key in keys and not (metric.needs_reference and _is_undefined(metric, parts))
     }
     taken, chosen = _width(first) + 1, dict[str, list[str]]()
     for title, cells in figures.items():
@@ -371,6 +424,10 @@ def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...], 
             chosen = {}
         chosen[title] = cells
     yield _table(name, {**first, **chosen}, width)
+
+
+def _is_undefined(metric: ShownMetric, parts: Mapping[str, RolloutTable]) -> bool:
+    return all(page.figures[metric.key]["mean"] is None for page in parts.values())
 
 
 def _narrowest(title: str, cells: Sequence[str]) -> int:

@@ -15,6 +15,7 @@ from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResu
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
 from dorothie_gym.evaluation.closed_loop.usage import SessionUsage, read_usage
 from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
+from dorothie_gym.evaluation.tiers import POOL_SEPARATOR, TIERS
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.folds import FOLD_TOWNS, VALIDATION_TOWNS, TownFold
 from dorothie_gym.maps.generated.specification import parse_series, split_names
@@ -44,12 +45,21 @@ class RolloutPlan:
     Attributes:
         number: number of the session in the rollout, from 0.
         town: name or file of the town.
-        seed: seed of the session, which determines it together with the players.
+        seed: seed of the session, which determines it together with the players and the trial.
+        trial: number of the trial, of several of one scenario, in which the players have other seeds.
+        participant: player of the participant, if several take turns.
     """
 
     number: int
     town: str
     seed: int
+    trial: int = 0
+    participant: Player | None = None
+
+    @property
+    def partners(self) -> Mapping[Role, Player]:
+        """Players of this session that replace those of the rollout."""
+        return {} if self.participant is None else {Role.PARTICIPANT: self.participant}
 
     @property
     def path(self) -> str:
@@ -70,6 +80,11 @@ class RolloutSettings:
         sessions: number of sessions in all towns.
         seed: seed of the rollout; with the number of a session it gives the seed of the session, for any players.
         config: settings of the engine.
+        pool: players of the participant who take turns in place of that of the cast; empty for that of the cast.
+        trials: number of sessions of each scenario, in which the players have different seeds.
+        tier: name of the tier that gave the settings, for tables; None for other settings.
+        oracle: whether they are those of the oracle of the tier, for tables.
+        references: whether sessions get the reference of their scenario, see `ReferenceDrive`.
     """
 
     cast: Mapping[Role, Player] = field(default_factory=lambda: ALL_SCRIPTED)
@@ -77,11 +92,20 @@ class RolloutSettings:
     sessions: int = 20
     seed: int = 0
     config: EnvConfig = field(default_factory=EnvConfig)
+    pool: tuple[Player, ...] = ()
+    trials: int = 1
+    tier: str | None = None
+    oracle: bool = False
+    references: bool = False
 
     def __post_init__(self) -> None:
         """Checks the fields."""
         if self.sessions < 1:
             raise ValueError(f"sessions is {self.sessions}; it must be at least 1")
+        if self.trials < 1 or self.sessions % self.trials:
+            raise ValueError(
+                f"trials is {self.trials}; it must be at least 1 and divide the number of sessions, {self.sessions}"
+            )
         if self.seed < 0:
             raise ValueError(f"seed is {self.seed}; it must be at least 0")
         if not self.towns:
@@ -91,24 +115,49 @@ class RolloutSettings:
             raise ValueError(f"cast has no player for {', '.join(missing)}; each of the three roles needs a player")
 
     def plans(self) -> tuple[RolloutPlan, ...]:
-        """Returns the plans of the sessions, in order."""
+        """Returns the plans of the sessions, in order: all trials of a scenario, then those of the next one."""
         return tuple(
-            RolloutPlan(number=number, town=self.towns[number % len(self.towns)], seed=_seed(self.seed, number))
+            RolloutPlan(
+                number=number,
+                town=self.towns[scenario % len(self.towns)],
+                seed=_seed(self.seed, scenario),
+                trial=trial,
+                participant=self._participant_of(scenario),
+            )
             for number in range(self.sessions)
+            for scenario, trial in [divmod(number, self.trials)]
         )
 
+    def _participant_of(self, scenario: int) -> Player | None:
+        """Returns the participant of a scenario; in each town, all of the pool take turns."""
+        return self.pool[(scenario + scenario // len(self.towns)) % len(self.pool)] if self.pool else None
+
     def to_json(self) -> dict[str, object]:
-        """Returns the settings in JSON types, with SHA-256 and training cost of learned players."""
+        """Returns the settings in JSON types, with SHA-256 and training cost of learned players.
+
+        Fields of tiers are left out where they have their defaults.
+        """
         models = {
             str(role): player.language_model.record()
             for role, player in self.cast.items()
             if player.language_model is not None
         }
+        names = {str(role): self.cast[role].name for role in AGENT_ROLES}
+        if self.pool:
+            names[str(Role.PARTICIPANT)] = POOL_SEPARATOR.join(player.name for player in self.pool)
+        tier: dict[str, object] = {
+            "tier": self.tier,
+            "oracle": self.oracle,
+            "references": self.references,
+            "trials": self.trials if self.trials > 1 else None,
+            "pool_sha256": [player.sha256 for player in self.pool],
+        }
         return {
-            **{str(role): self.cast[role].name for role in AGENT_ROLES},
+            **names,
             "sha256": {str(role): self.cast[role].sha256 for role in AGENT_ROLES if self.cast[role].sha256},
             "training": {str(role): dict(self.cast[role].training) for role in AGENT_ROLES if self.cast[role].training},
             **({"language_models": models} if models else {}),
+            **{name: value for name, value in tier.items() if value},
             "towns": list(self.towns),
             "sessions_planned": self.sessions,
             "seed": self.seed,
@@ -121,8 +170,13 @@ def command_of(settings: Mapping[str, Any]) -> str:
 
     Settings of the engine without a command-line option are left out.
     """
-    usual, config = EnvConfig(), settings["config"]
+    config = settings["config"]
+    usual = _usual_config(settings)
     words = ["dorothie-gym", "rollout"]
+    if tier := settings.get("tier"):
+        words += ["--tier", str(tier), *(["--oracle"] if settings.get("oracle") else [])]
+    if trials := settings.get("trials"):
+        words += ["--trials", str(trials)]
     for role in (Role.CO_WIZARD, Role.PARTICIPANT, Role.AD_WIZARD):
         words += [f"--{str(role).replace('_', '-')}", str(settings[str(role)])]
     words += ["--towns", towns_text(settings["towns"])]
@@ -132,10 +186,18 @@ def command_of(settings: Mapping[str, Any]) -> str:
             words += [option, f"{config[name]:g}"]
     if perception := config.get("perception"):
         words += ["--perception", perception]
-    if config.get("channel") == ChannelKind.SPEECH:
+    if config.get("channel") == ChannelKind.SPEECH and usual.channel is not ChannelKind.SPEECH:
         words += ["--speech"]
     words += _language_model_options(settings.get("language_models", {}))
     return shlex.join(words)
+
+
+def _usual_config(settings: Mapping[str, Any]) -> EnvConfig:
+    """Returns the settings of the engine that a rollout has without options for them."""
+    if settings.get("tier") not in TIERS:
+        return EnvConfig()
+    tier = TIERS[settings["tier"]]
+    return tier.oracle if settings.get("oracle") else tier.config
 
 
 def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -233,6 +295,7 @@ def roll_out(
         evaluate=_measure,
         keep_errors=True,
         writes_cost=True,
+        references=settings.references,
     )
     with run_sessions(job, settings.plans(), root, workers=workers, ray=ray, on_session=on_session) as outcomes:
         try:
@@ -247,6 +310,8 @@ def roll_out(
                         record=record,
                         error=outcome.error,
                         usage=usage,
+                        trial=plan.trial,
+                        participant=None if plan.participant is None else plan.participant.name,
                     )
                 )
         finally:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Final, TypeAlias, TypedDict
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Annotated, Final, NotRequired, TypeAlias, TypedDict
 
 import numpy as np
 from msgspec import Meta
@@ -15,6 +15,7 @@ from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTANCE, kind_of, time_met
 from dorothie_gym.evaluation.analysis.units import Units
+from dorothie_gym.evaluation.closed_loop.sub_scores import ConductPage, ConductRecord, conduct_of
 from dorothie_gym.evaluation.closed_loop.task_progress import (
     TaskRecord,
     TaskRoutes,
@@ -29,7 +30,9 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
+from dorothie_gym.session.scenario import REFERENCE, ReferenceDrive
 from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.support.input_files import checked, raising
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Place
@@ -269,6 +272,16 @@ class SessionRecordPage(TypedDict):
     infractions: dict[str, Count]
     talk: TalkPage
     exceptions: list[MetExceptionPage]
+    conduct: NotRequired[ConductPage]
+    reference: NotRequired[ReferencePage]
+
+
+class ReferencePage(TypedDict):
+    """Reference of a scenario in JSON types; fields as in `ReferenceDrive`."""
+
+    seconds: Amount
+    exchanges: Count
+    subgoals: Count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,6 +301,8 @@ class SessionRecord:
             "timeout", "off_road", "wrong_way", "hit_by_others").
         talk: counts of the dialogue.
         exceptions: exceptions of the session.
+        conduct: answers, truth and comfort; None in results of versions that did not measure them.
+        reference: reference of the scenario; None if it was not measured.
     """
 
     live: int
@@ -301,10 +316,12 @@ class SessionRecord:
     infractions: Mapping[str, int] = field(default_factory=dict)
     talk: TalkRecord = field(default_factory=TalkRecord)
     exceptions: tuple[MetException, ...] = ()
+    conduct: ConductRecord | None = None
+    reference: ReferenceDrive | None = None
 
     def to_json(self) -> SessionRecordPage:
-        """Returns the fields in JSON types."""
-        return {
+        """Returns the fields in JSON types; `conduct` and `reference` are left out if there are none."""
+        page: SessionRecordPage = {
             "live": self.live,
             "reached": self.reached,
             "success": self.success,
@@ -317,6 +334,11 @@ class SessionRecord:
             "talk": self.talk.to_json(),
             "exceptions": [each.to_json() for each in self.exceptions],
         }
+        if self.conduct is not None:
+            page["conduct"] = self.conduct.to_json()
+        if self.reference is not None:
+            page["reference"] = ReferencePage(**asdict(self.reference))
+        return page
 
     @classmethod
     def from_json(cls, row: SessionRecordPage) -> SessionRecord:
@@ -335,6 +357,8 @@ class SessionRecord:
             infractions=dict(row["infractions"]),
             talk=TalkRecord.from_json(row["talk"]),
             exceptions=tuple(MetException.from_json(each) for each in row["exceptions"]),
+            conduct=ConductRecord.from_json(row["conduct"]) if "conduct" in row else None,
+            reference=ReferenceDrive(**row["reference"]) if "reference" in row else None,
         )
 
 
@@ -362,7 +386,16 @@ def measure(session: Session, town: Town) -> SessionRecord:
         infractions=infractions,
         talk=talk_of(session),
         exceptions=met_exceptions(session, town),
+        conduct=conduct_of(session, town),
+        reference=_reference_of(session),
     )
+
+
+def _reference_of(session: Session) -> ReferenceDrive | None:
+    """Returns the reference of a session's scenario from its header; None if it has none."""
+    page = session.header.extra.get(REFERENCE)
+    with raising(RolloutError):
+        return None if page is None else checked(page, ReferenceDrive, f"{session.name}: header, {REFERENCE}")
 
 
 def count_infractions(session: Session) -> dict[str, int]:

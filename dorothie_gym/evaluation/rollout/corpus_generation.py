@@ -6,14 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
 from dorothie_gym.archive.corpus import FOLDS, PAPER_FOLDS, Fold, ManifestRow, manifest_row, write_manifest
 from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
 from dorothie_gym.maps.folds import SEEN_TOWNS, UNSEEN_TOWNS, VALIDATION_TOWNS, check_training_towns
-from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, safe_name
 from dorothie_gym.session.recording.session import session_state
@@ -42,6 +43,9 @@ class SessionPlan:
     fold: Fold
     town: str
     seed: int
+
+    trial: ClassVar[int] = 0
+    partners: ClassVar[Mapping[Role, Player]] = MappingProxyType({})
 
     @property
     def path(self) -> str:

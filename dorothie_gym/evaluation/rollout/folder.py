@@ -9,13 +9,17 @@ import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import OutputFolderError, SessionError, short_repr
 from dorothie_gym.session.recording.header import FORMAT_VERSION
 from dorothie_gym.support.files import PART, write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, raising, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.policies.policy_loader import Player
 
 if sys.platform != "win32":
     import fcntl
@@ -25,7 +29,7 @@ PARTS_FOLDER: Final = ".parts"
 
 
 class PlannedSession(Protocol):
-    """Session to be played; it follows from town and seed."""
+    """Session to be played; it follows from town, seed, players and trial."""
 
     @property
     def town(self) -> str:
@@ -40,6 +44,16 @@ class PlannedSession(Protocol):
     @property
     def path(self) -> str:
         """Folder of the session within the folder of all sessions."""
+        ...
+
+    @property
+    def partners(self) -> Mapping[Role, Player]:
+        """Players of this session that replace those of the series."""
+        ...
+
+    @property
+    def trial(self) -> int:
+        """Number of the trial, of several of one scenario."""
         ...
 
 

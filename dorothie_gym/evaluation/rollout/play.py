@@ -19,6 +19,7 @@ from dorothie_gym.support.files import write_atomically
 
 if TYPE_CHECKING:
     from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.scenario import Scenario
     from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.session_log import SessionSummary
     from dorothie_gym.session.spaces.actions import ActionMapping
@@ -57,6 +58,8 @@ def play_session(
     folder: Path | str | None = None,
     create: bool = True,
     on_step: Callable[[SessionEngine], None] | None = None,
+    scenario: Scenario | None = None,
+    trial: int = 0,
 ) -> SessionSummary:
     """Plays a session from reset to end.
 
@@ -68,6 +71,8 @@ def play_session(
             session stays in its folder and can be loaded.
         create: whether the folder is created if it is missing.
         on_step: called with the engine after the reset and after each decision.
+        scenario: scenario that the engine plays in place of the drawn one.
+        trial: number of the trial, of several of one scenario, in which the policies have other seeds.
 
     Returns:
         The summary of the session; with `usage`, by role, if a policy has any (`Policy.usage_of`).
@@ -82,9 +87,12 @@ def play_session(
     if missing:
         raise ValueError(f"policies has none for {', '.join(missing)}; each of the three roles needs one")
     engine = host.engine
-    host.reset(seed=seed)
+    if scenario is None:
+        host.reset(seed=seed)
+    else:
+        engine.reset(scenario=scenario)
     players = Players({role: policies[role] for role in AGENT_ROLES})
-    states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
+    states = {role: policies[role].initial_state(policy_seed(seed, role, trial), engine.town) for role in AGENT_ROLES}
     engine.session.dialogue.give_voices(pitches_of(personas_of(policies, states)))
     with ExitStack() as stack:
         writer = None

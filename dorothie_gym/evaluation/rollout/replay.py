@@ -184,7 +184,8 @@ def _scenario(session: Session, seed: int, town: Town, storyboard: StoryboardTem
     templates: list[StoryboardTemplate | None] = [storyboard]
     if storyboard is None and header.storyboard in template_names():
         templates.append(load_template(header.storyboard))
-    drawn = [draw_scenario(town, template, seed) for template in templates]
+    stops = config_of(header).stops
+    drawn = [draw_scenario(town, template, seed, stops) for template in templates]
     for scenario in drawn:
         if _fits(scenario, header):
             return scenario

@@ -20,11 +20,13 @@ from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession,
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
 from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.evaluation.rollout.processes import run_tasks
+from dorothie_gym.evaluation.rollout.reference_drives import reference_of
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, to_page
 from dorothie_gym.session.recording.session import Session, session_state
+from dorothie_gym.session.scenario import Scenario, draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, read_json
@@ -49,12 +51,15 @@ class SessionMaker:
         root: folder of all sessions, locked by `locked_folder`.
         config: settings of the sessions.
         cast: player of each role.
+        references: whether scenarios get their reference drives (`reference_drives`).
     """
 
     root: Path
     config: EnvConfig
     cast: Mapping[Role, Player]
+    references: bool = False
     _engines: dict[str, SessionEngine] = field(default_factory=dict)
+    _scenarios: dict[tuple[str, int], Scenario] = field(default_factory=dict)
 
     def __call__(self, plan: PlannedSession) -> tuple[Session, Path, bool]:
         """Plays a session unless its folder is finished; returns the session, its folder, and whether it is new.
@@ -76,14 +81,25 @@ class SessionMaker:
             raise SessionError(f"{folder}: is in the way, and no finished session; remove it")
         part = self.root / PARTS_FOLDER / folder.name
         engine = self.engine(plan.town)
-        policies = {role: self.cast[role].make(role, engine.limits) for role in AGENT_ROLES}
+        cast = {**self.cast, **plan.partners}
+        policies = {role: cast[role].make(role, engine.limits) for role in AGENT_ROLES}
         part.mkdir(exist_ok=True)  # without its parents: a series that was deleted during the run is not recreated
-        play_session(engine, policies, seed=plan.seed, folder=part, create=False)
+        scenario = self._scenario(plan, engine) if self.references else None
+        play_session(engine, policies, seed=plan.seed, folder=part, create=False, scenario=scenario, trial=plan.trial)
         session = Session.load(part)
         for parent in reversed(Path(plan.path).parents[:-1]):
             (self.root / parent).mkdir(exist_ok=True)
         part.rename(folder)
         return session, folder, True
+
+    def _scenario(self, plan: PlannedSession, engine: SessionEngine) -> Scenario:
+        """Returns the scenario of a session with its reference, which is measured once for all trials."""
+        key = plan.town, plan.seed
+        if key not in self._scenarios:
+            town = engine.town_of(plan.seed)
+            drawn = draw_scenario(town, engine.template, plan.seed, self.config.stops)
+            self._scenarios[key] = replace(drawn, reference=reference_of(town, drawn))
+        return self._scenarios[key]
 
     def engine(self, town: str) -> SessionEngine:
         """Returns the engine of a town, which is created once."""
@@ -154,6 +170,7 @@ class SessionJob(Generic[Result]):
         evaluate: takes the result from a finished session; must be picklable.
         keep_errors: whether an error of a session becomes its outcome; otherwise it ends the run.
         writes_cost: whether time and workers are added up in `COST_FILE`.
+        references: whether scenarios get their reference drives.
     """
 
     settings_file: str
@@ -163,6 +180,7 @@ class SessionJob(Generic[Result]):
     evaluate: Callable[[PlayedSession], Result]
     keep_errors: bool = False
     writes_cost: bool = False
+    references: bool = False
 
 
 @contextmanager
@@ -229,7 +247,7 @@ class _SessionTask(Generic[Result]):
 
     def __init__(self, root: Path, *, job: SessionJob[Result]) -> None:
         self._root, self._job = root, job
-        self._maker = SessionMaker(root, job.config, job.cast)
+        self._maker = SessionMaker(root, job.config, job.cast, job.references)
 
     def __call__(self, plan: Plan) -> SessionOutcome[Plan, Result]:
         begun = time.process_time()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.sim.ego.attention import is_noticed, passes_line
 from dorothie_gym.sim.ego.limits import (
     BEGUN,
     EGO_STANDING,
@@ -119,7 +120,7 @@ def _walker_on(world: WorldArrays, passage: PassageRecord) -> int:
         if walker.state == Walk.CROSSING and walker.crossing == passage.crossing:
             left = (passage.across - walker.station) * walker.direction
             dx, dy = walker.x - vehicle.x, walker.y - vehicle.y
-            if -STEP_PAST < left < STEP_AHEAD and dx * dx + dy * dy < sight * sight:
+            if -STEP_PAST < left < STEP_AHEAD and dx * dx + dy * dy < sight * sight and is_noticed(world, walker):
                 return int(walker.key)
     return -1
 
@@ -147,7 +148,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
         if line > asking:
             break
         wait = request(town, world, 0, r - int(car.run))
-        if wait == Wait.NOT:
+        if wait == Wait.NOT or (line <= car.sent and passes_line(world, wait)):
             break
         return offer(car, best, _holder(town, wait, lane), line, 0.0, -2, False, True)
     return best

@@ -68,6 +68,10 @@ LEFT = 90
 BEGIN = 0
 """Number of the request for a new path; the others are numbers of `PhysicalAction`."""
 
+SENT_ON = 8.0
+"""Way for which a car with `AutomaticBraking.PERCEIVED` passes lights and stop signs after the action Start [m]; set by
+hand: the first car before a line stands nearer, the second one does not."""
+
 LAST_PIECE = 0.5
 """End of a lane that is laid where nothing else is left [m]."""
 
@@ -310,6 +314,8 @@ def command(town: TownArrays, world: WorldArrays, action: int, angle: int, speed
         if plan.held == (action == STOP):
             return Refusal.STOPPED if plan.held else Refusal.NOT_STOPPED
         plan.held = action == STOP
+        if action == START and world.car[0].attentive:
+            world.car[0].sent = SENT_ON
         return Refusal.NONE
     answer = _change_path(town, world, action, angle, speed)
     if answer == Refusal.NONE:

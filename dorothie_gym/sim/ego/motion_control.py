@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym.sim.ego.attention import keep_noticed
 from dorothie_gym.sim.ego.ego_hazards import look
 from dorothie_gym.sim.ego.limits import (
     APPROACH_DISTANCE,
@@ -95,6 +96,9 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
     seen = see(
         world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], vehicle.x, vehicle.y, clock.frame, 0
     )
+    if car.attentive:
+        seen = keep_noticed(world, seen)
+        car.sent = max(car.sent - vehicle.speed * dt, 0.0)
     look(town, world, seen)
     advance(town, world, vehicle)
     if car.s >= car.action_end:
@@ -140,9 +144,9 @@ def _free_speed(world: WorldArrays) -> float:
     if car.stop_at < math.inf:  # exact near the end, where the points are too coarse
         left = car.stop_at - s
         speed = min(speed, math.sqrt(2.0 * PROFILE_BRAKING * left) if left > 0.0 else 0.0)
-    # a roadblock may come into view at any time
-    left = room(STATIC, world.eye[0].sight - 0.5 * vehicle.length - PROP_DEPTH, 0.0, False, False)
-    speed = min(speed, max(safe_speed(0.0, left, car.friction), BLIND_SPEED))
+    if not car.attentive:  # a roadblock may come into view at any time
+        left = room(STATIC, world.eye[0].sight - 0.5 * vehicle.length - PROP_DEPTH, 0.0, False, False)
+        speed = min(speed, max(safe_speed(0.0, left, car.friction), BLIND_SPEED))
     for g in range(car.goals):
         left = car.goal[g] - car.s
         if left >= -1.0:

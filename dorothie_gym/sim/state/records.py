@@ -73,6 +73,11 @@ class EgoRecord:
     stopped_until: Int64  # frame up to which it stands after a collision, and length of such stands [frames]
     collision_stop: Int64
     collisions: Int64  # number of collisions by its own fault
+    attentive: (
+        Flag  # whether its brakes act only on bodies in view for a while (`WorldConfig.braking`), and that [frames]
+    )
+    attention: Int64
+    sent: Float  # way for which it passes red lights and stop signs, because it has just been started [m]
     events: Int32  # rows of `events`, `breaches` and `trace` in use
     breaches: Int32
     frames: Int32
@@ -195,6 +200,7 @@ class SeenRecord:
     key: Int32
     body: Int32  # row in the array of its `Group`
     group: Int32
+    hidden: Flag  # whether a vehicle hides it from the sensors of the brakes (`ego.attention`)
 
 
 class EyeRecord:
@@ -348,6 +354,8 @@ class VehicleRecord:
     crashed: Flag
     blocked: Flag  # whether a prop is next ahead
     touched: Flag  # whether the ego has touched it
+    view_since: Int64  # first and last frame in which the sensors of the ego's brakes had it in view, see `attention`
+    view_last: Int64
 
 
 class PedestrianRecord:
@@ -379,6 +387,8 @@ class PedestrianRecord:
     state: Int32  # `Walk`
     key: Int32
     crashed: Flag
+    view_since: Int64  # as in `VehicleRecord`
+    view_last: Int64
 
 
 class PropRecord:
@@ -397,6 +407,8 @@ class PropRecord:
     lane: Annotated[NDArray[np.int32], "i4", (4,)]
     key: Int32
     present: Flag
+    view_since: Int64  # as in `VehicleRecord`
+    view_last: Int64
 
 
 class NodeRecord:

@@ -1,0 +1,42 @@
+"""Interface of the closed-loop metrics."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoopMetric(ABC):
+    """Metric over one or more sessions.
+
+    Attributes:
+        key: name of the metric in JSON.
+        title: name of the metric in tables.
+        worst: value of a session that ended in an error; None leaves such sessions out.
+        is_share: whether tables show the metric in per cent.
+        counts_sessions: whether the metric is 0 or 1 for a session.
+        needs_reference: whether it needs the reference of the scenario, see `ReferenceDrive`.
+    """
+
+    key: ClassVar[str]
+    title: ClassVar[str]
+    worst: ClassVar[float | None] = None
+    is_share: ClassVar[bool] = True
+    counts_sessions: ClassVar[bool] = False
+    needs_reference: ClassVar[bool] = False
+
+    @abstractmethod
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the contributions of a session to numerator and denominator; (0, 0) leaves the session out."""
+
+    def of(self, records: Iterable[SessionRecord]) -> float | None:
+        """Returns the metric over sessions; None if all are left out."""
+        sums = [self.parts(record) for record in records]
+        lower = sum(part for _, part in sums)
+        return sum(part for part, _ in sums) / lower if lower else None

@@ -1,0 +1,119 @@
+"""Reference drives: how long the reference pair takes for a scenario, and how many exchanges it needs.
+
+The reference pair is the scripted participant and the scripted Co-Wizard, whose words and acts arrive exactly, without
+an Ad-Wizard, in the usual traffic. The reference belongs to the scenario (town, storyboard, seed) and is the same for
+all tiers. References of the published scenarios are stored with the package, so that a new version of the scripts does
+not move the scale; those of other scenarios are measured when they are played.
+"""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TypedDict
+
+from dorothie_gym._version import __version__
+from dorothie_gym.evaluation.analysis.units import Units
+from dorothie_gym.evaluation.rollout.play import play_session
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.policy_loader import make_policy
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.files import to_page
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.scenario import ReferenceDrive, Scenario
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.time_allowed import reference_seconds
+from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, read_json
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps.town import Town
+
+REFERENCE_CONFIG: Final = EnvConfig(observe_acts=True, word_error_rate=0.0, max_seconds=3600.0)
+"""Settings of reference drives."""
+
+REFERENCE_CAST: Final[Mapping[Role, str]] = {
+    Role.PARTICIPANT: "scripted",
+    Role.CO_WIZARD: "scripted",
+    Role.AD_WIZARD: "silent",
+}
+"""Policies of reference drives."""
+
+STORED_FILE: Final = Path(str(files("dorothie_gym.evaluation.rollout"))) / "data" / "reference_drives.json"
+"""References that are stored with the package."""
+
+
+class _DrivePage(TypedDict):
+    seconds: float
+    exchanges: int
+    subgoals: int
+
+
+class _FilePage(TypedDict):
+    version: str
+    drives: dict[str, _DrivePage]
+
+
+def drive_key(scenario: Scenario, town: str) -> str:
+    """Returns the key of a scenario among stored references: town, storyboard and seed."""
+    return f"{town}/{scenario.storyboard.name}/{scenario.seed}"
+
+
+def reference_of(town: Town, scenario: Scenario) -> ReferenceDrive:
+    """Returns the reference of a scenario: the stored one, else that of a drive that is played now.
+
+    Where the reference pair does not reach the destination, its time is the expected one of the routes
+    (`time_allowed.reference_seconds`), and it has no exchanges.
+
+    Args:
+        town: town of the scenario.
+        scenario: the scenario.
+    """
+    stored = stored_drives().get(drive_key(scenario, town.name))
+    return measure_drive(town, scenario) if stored is None else stored
+
+
+def measure_drive(town: Town, scenario: Scenario) -> ReferenceDrive:
+    """Plays the reference drive of a scenario; see `reference_of`."""
+    engine = SessionEngine(town, config=REFERENCE_CONFIG)
+    policies = {role: make_policy(REFERENCE_CAST[role], role, engine.limits) for role in AGENT_ROLES}
+    with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as root:
+        folder = Path(root) / "drive"
+        summary = play_session(
+            engine, policies, seed=scenario.seed, folder=folder, scenario=replace(scenario, reference=None)
+        )
+        session = Session.load(folder)
+    live = engine.session.task.live
+    if not summary["success"]:
+        expected = float(round(reference_seconds(town, scenario)))
+        return ReferenceDrive(seconds=expected, exchanges=0, subgoals=len(live))
+    return ReferenceDrive(
+        seconds=round(session.duration, 3), exchanges=len(Units(session).exchanges), subgoals=len(live)
+    )
+
+
+@functools.cache
+def stored_drives() -> Mapping[str, ReferenceDrive]:
+    """Returns the stored references by `drive_key`."""
+    return read_drives(STORED_FILE) if STORED_FILE.is_file() else {}
+
+
+def read_drives(file: Path) -> dict[str, ReferenceDrive]:
+    """Reads a file of references.
+
+    Raises:
+        InputFileError: the file is damaged.
+        OSError: it cannot be read.
+    """
+    page = checked(read_json(file, MAX_MODEL_JSON), _FilePage, file)
+    return {key: ReferenceDrive(**drive) for key, drive in page["drives"].items()}
+
+
+def write_drives(file: Path, drives: Mapping[str, ReferenceDrive]) -> None:
+    """Writes references, sorted by key, so that equal ones give equal bytes."""
+    rows = {key: asdict(drives[key]) for key in sorted(drives)}
+    write_atomically(file, to_page({"version": __version__, "drives": rows}))
