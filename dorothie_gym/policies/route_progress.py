@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -262,7 +262,7 @@ class RouteProgress:
 
     def left(self, station: float) -> float:
         """Returns the distance to the goal along the route [m]; negative just past the goal."""
-        return self._at(station).left
+        return self._at(station).left()
 
     def _at(self, station: float) -> _WayAhead:
         """Returns what the route has ahead of a station, which is looked for once, whoever asks for it."""
@@ -313,7 +313,7 @@ class RouteProgress:
 
     def next_manoeuvre(self, station: float) -> tuple[LaneEntry, float] | None:
         """Returns the next lane change or U-turn on the route and its distance [m]; None without one."""
-        return self._at(station).manoeuvre
+        return self._at(station).manoeuvre()
 
     def turns_round_on(self, lane: int) -> bool:
         """Returns whether the next U-turn of the route begins on a lane."""
@@ -382,26 +382,30 @@ class _WayAhead:
     def __init__(self, route: Route | None, leg: int, station: float) -> None:
         self._route, self._leg, self._station = route, leg, station
         self._has_way = route is not None and leg < len(route.legs)
+        self._left: float | None = None
+        self._manoeuvre: tuple[tuple[LaneEntry, float] | None] | None = None
         self._crossing: tuple[Town, RouteJunction | None] | None = None
 
     def is_of(self, progress: RouteProgress, station: float) -> bool:
         """Returns whether this is what a progress has ahead of a station."""
         return self._station == station and self._leg == progress.leg and self._route is progress.route
 
-    @cached_property
     def left(self) -> float:
-        """Distance to the goal [m]."""
+        """Returns the distance to the goal [m]."""
         if not self._has_way or self._route is None:
             return math.inf
-        return distance_left(self._route.records, len(self._route.legs), self._leg, self._station)
+        if self._left is None:
+            self._left = distance_left(self._route.records, len(self._route.legs), self._leg, self._station)
+        return self._left
 
-    @cached_property
     def manoeuvre(self) -> tuple[LaneEntry, float] | None:
-        """The next lane change or U-turn and its distance [m]."""
+        """Returns the next lane change or U-turn and its distance [m]."""
         if not self._has_way or self._route is None:
             return None
-        entry, distance = find_manoeuvre(self._route.records, len(self._route.legs), self._leg, self._station)
-        return None if entry < 0 else (LANE_ENTRIES[entry], distance)
+        if self._manoeuvre is None:
+            entry, distance = find_manoeuvre(self._route.records, len(self._route.legs), self._leg, self._station)
+            self._manoeuvre = (None if entry < 0 else (LANE_ENTRIES[entry], distance),)
+        return self._manoeuvre[0]
 
     def crossing(self, town: Town) -> RouteJunction | None:
         """Returns the next junction with a choice."""
@@ -431,4 +435,9 @@ def first_new_street(
 
 def streets_named(street_names: Sequence[int] | IntArray, name: StreetName) -> frozenset[int]:
     """Returns the indices of the streets with a name."""
-    return frozenset(k for k, value in enumerate(np.asarray(street_names).tolist()) if value == name.value)
+    return _streets_named(tuple(np.asarray(street_names).tolist()), name.value)
+
+
+@lru_cache(maxsize=1024)
+def _streets_named(street_names: tuple[int, ...], name: int) -> frozenset[int]:
+    return frozenset(k for k, value in enumerate(street_names) if value == name)

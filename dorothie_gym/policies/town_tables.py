@@ -27,11 +27,16 @@ def kept_with_town(function: Callable[Concatenate[Town, P], Found]) -> Callable[
     def table(town: Town) -> dict[Any, Found]:
         return {}
 
+    last: tuple[Town, dict[Any, Found]] | None = None  # most calls are about the town of the call before
+
     @functools.wraps(function)
     def found(town: Town, *arguments: P.args, **named: P.kwargs) -> Found:
+        nonlocal last
         if named:
             return function(town, *arguments, **named)
-        known = table(town)
+        if last is None or last[0] is not town:
+            last = town, table(town)
+        known = last[1]
         if arguments not in known:
             known[arguments] = function(town, *arguments, **named)
         return known[arguments]
