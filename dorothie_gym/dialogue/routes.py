@@ -114,14 +114,20 @@ class PlanPart:
     """
 
     def __post_init__(self) -> None:
-        for name, required in _fields_of(type(self)):
+        for name, required in self._names():
             value = getattr(self, name)
             if value is not None or required:
                 _check(f"{type(self).__name__}.{name}", name, value)
 
+    @classmethod
+    @functools.cache
+    def _names(cls) -> tuple[tuple[str, bool], ...]:
+        """Returns the names of the fields, each with whether it must be given."""
+        return tuple((field.name, field.default is dataclasses.MISSING) for field in dataclasses.fields(cls))
+
     def to_json(self) -> dict[str, JsonValue]:
         """Returns the fields that are given, in JSON types; `from_json` is the inverse."""
-        values = {name: getattr(self, name) for name, _ in _fields_of(type(self))}
+        values = {name: getattr(self, name) for name, _ in self._names()}
         return {name: _plain(value) for name, value in values.items() if value is not None}
 
     @classmethod
@@ -155,12 +161,6 @@ class PlanPart:
             return cls(**values)
         except OntologyError as error:
             raise OntologyError(f"{where}: {error}") from None
-
-
-@functools.cache
-def _fields_of(part: type[PlanPart]) -> tuple[tuple[str, bool], ...]:
-    """Returns the names of the fields of a class, each with whether it must be given."""
-    return tuple((field.name, field.default is dataclasses.MISSING) for field in dataclasses.fields(part))
 
 
 @shared

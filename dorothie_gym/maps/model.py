@@ -95,7 +95,7 @@ class Lane:
         last = segment[-1] if length[-1] > STRAIGHT_RATIO * length[-2] else 2 * segment[-1] - inner[-1]
         return np.concatenate(([first], inner, [last]))
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Length of the centre line in the plane [m]."""
         return float(self.stations[-1])

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
+from dorothie_gym.policies.lane_bounds import may_be_near
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.session.spaces.observations import (
     LandmarkColumn,
@@ -245,6 +246,8 @@ def place_on_lanes(
     """
     point = np.array([x, y])
     for lane in lanes:
+        if not may_be_near(town, lane, x, y, width + 1.0):
+            continue
         station, lateral = town.lanes[lane].project(point)
         end = town.lanes[lane].position(station)
         if abs(lateral) <= width and pm.hypot(end[0] - x, end[1] - y) <= width + 1.0:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -13,8 +12,10 @@ import numpy as np
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit
 from dorothie_gym.maps.town import Town
+from dorothie_gym.policies.lane_bounds import may_be_near
 from dorothie_gym.policies.route_progress import Choice, direction_of, find_exit, lanes_beside
 from dorothie_gym.policies.route_tables import entry_station
+from dorothie_gym.policies.town_tables import kept_with_town
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.portable_math import wrap_degrees
 
@@ -125,11 +126,13 @@ class RoadAhead:
         best, found = math.inf, None
         for stretch in self.stretches:
             lane = self.town.lanes[stretch.lane]
+            if lane.in_junction or not may_be_near(self.town, stretch.lane, x, y, BESIDE_ROAD):
+                continue
             station, _ = lane.project(np.array([x, y]))
             foot, heading = lane.position(station), lane.heading_at(station)
             off = pm.hypot(foot[0] - x, foot[1] - y)
             beyond = abs((x - foot[0]) * pm.cos(heading) + (y - foot[1]) * pm.sin(heading))
-            if beyond <= CORNER and off <= BESIDE_ROAD and not lane.in_junction and off < best - 1.0:
+            if beyond <= CORNER and off <= BESIDE_ROAD and off < best - 1.0:
                 best, found = off, stretch.begin + station
         return found
 
@@ -180,7 +183,7 @@ def _straight_lanes(town: Town, lane: int, reach: float) -> Iterator[int]:
         lane = way.connector
 
 
-@lru_cache(maxsize=8192)
+@kept_with_town
 def _onward(town: Town, lane: int) -> Exit | None:
     """Returns how a road goes on behind a lane: straight across a junction, or as the only way leads."""
     exits = town.exits(lane)
@@ -192,7 +195,7 @@ def _onward(town: Town, lane: int) -> Exit | None:
     return exits[0] if len(exits) == 1 and not _parts(town, lane) else None
 
 
-@lru_cache(maxsize=8192)
+@kept_with_town
 def _turned_from(town: Town, lane: int) -> int | None:
     """Returns the lane beside a lane from which the road goes on; None where it does so from the lane itself."""
     way = _onward(town, lane)
@@ -201,7 +204,7 @@ def _turned_from(town: Town, lane: int) -> int | None:
     return next((other for other in lanes_beside(town, lane) if way in town.exits(other)), None)
 
 
-@lru_cache(maxsize=8192)
+@kept_with_town
 def _parts(town: Town, lane: int) -> bool:
     """Returns whether the lanes beside a lane lead to another road behind the junction than the lane itself."""
     roads = {town.lanes[way.lane].road_id for one in (lane, *lanes_beside(town, lane)) for way in town.exits(one)}
@@ -212,7 +215,7 @@ def _crossing_at(town: Town, lane: int, distance: float) -> tuple[Crossing, ...]
     return tuple(crossing._replace(distance=max(distance, 0.0)) for crossing in _crossing_behind(town, lane))
 
 
-@lru_cache(maxsize=8192)
+@kept_with_town
 def _crossing_behind(town: Town, lane: int) -> tuple[Crossing, ...]:
     """Returns the junction at the end of a lane, at the distance 0; none if it has one way only."""
     exits = tuple(way for one in (lane, *lanes_beside(town, lane)) for way in town.exits(one))

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from dorothie_gym.policies.route_legs import (
     needs_switch,
 )
 from dorothie_gym.policies.route_tables import default_successor, entry_station, is_choice, route_tables
+from dorothie_gym.policies.town_tables import kept_with_town
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.support.compilation.records import RecordArray
 from dorothie_gym.support.portable_math import wrap_degrees
@@ -175,24 +176,16 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
     return Choice(lane=lane, distance=max(ahead, 0.0), exits=town.exits(lane))
 
 
+@kept_with_town
 def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
     """Returns the adjacent lanes of the same direction, the nearest first."""
-    return _lanes_beside(town)[lane]
-
-
-@lru_cache(maxsize=16)
-def _lanes_beside(town: Town) -> tuple[tuple[int, ...], ...]:
-    """Returns the adjacent lanes of each lane of a town."""
-    rows = []
-    for lane in range(len(town.lanes)):
-        found: list[int] = []
-        for side in (town.traffic.to_middle, town.traffic.to_kerb):
-            beside = town.neighbour(lane, side)
-            while beside is not None and beside not in found and beside != lane:
-                found.append(beside)
-                beside = town.neighbour(beside, side)
-        rows.append(tuple(found))
-    return tuple(rows)
+    found: list[int] = []
+    for side in (town.traffic.to_middle, town.traffic.to_kerb):
+        beside = town.neighbour(lane, side)
+        while beside is not None and beside not in found and beside != lane:
+            found.append(beside)
+            beside = town.neighbour(beside, side)
+    return tuple(found)
 
 
 def find_exit(
@@ -260,7 +253,7 @@ class RouteProgress:
 
     def followed(self, town: Town, lane: int, station: float) -> RouteProgress:
         """Advances the current leg to the place of the car; `astray` counts up if the car is off the route."""
-        leg = find_leg(route_tables(town), *self._legs, lane, station) if self.legs else -1
+        leg = find_leg(route_tables(town), *self._legs, lane, station) if self.has_way else -1
         return replace(self, astray=self.astray + 1) if leg < 0 else replace(self, leg=leg, astray=0)
 
     def lost(self, station: float) -> bool:
@@ -269,7 +262,19 @@ class RouteProgress:
 
     def left(self, station: float) -> float:
         """Returns the distance to the goal along the route [m]; negative just past the goal."""
-        return distance_left(*self._legs, station) if self.legs else math.inf
+        return self._at(station).left()
+
+    def _at(self, station: float) -> _WayAhead:
+        """Returns what the route has ahead of a station, which is looked for once, whoever asks for it."""
+        found: _WayAhead | None = self.__dict__.get(_AHEAD)
+        if found is None or not found.is_of(self, station):
+            found = self.__dict__[_AHEAD] = _WayAhead(self.route, self.leg, station)
+        return found
+
+    @property
+    def has_way(self) -> bool:
+        """Returns whether there is a route, with legs ahead."""
+        return self.route is not None and self.leg < len(self.route.legs)
 
     @property
     def _legs(self) -> tuple[RecordArray[LegRecord], int, int]:
@@ -291,27 +296,24 @@ class RouteProgress:
 
     def next_crossing(self, town: Town, station: float) -> RouteJunction | None:
         """Returns the next junction with a choice on the route; None if there is none."""
-        return next(self.crossings(town, station), None)
+        return self._at(station).crossing(town)
 
     def crossings(self, town: Town, station: float) -> Iterator[RouteJunction]:
         """Yields the junctions with a choice on the route, the next first."""
-        if not self.legs:
+        if not self.has_way:
             return
-        tables, first = route_tables(town), self.leg
+        first = self.leg
         while True:
-            before, row, distance = find_crossing(tables, *self._legs, station, first)
-            if before < 0:
+            found = _next_junction(town, self._planned, self.leg, station, first)
+            if found is None:
                 return
-            lane, first = self._planned.legs[before].lane, before + 1
-            way = town.exits(lane)[row - int(tables.rows[lane])]
-            yield RouteJunction(lane=lane, exit=way, distance=distance)
+            before, junction = found
+            first = before + 1
+            yield junction
 
     def next_manoeuvre(self, station: float) -> tuple[LaneEntry, float] | None:
         """Returns the next lane change or U-turn on the route and its distance [m]; None without one."""
-        if not self.legs:
-            return None
-        entry, distance = find_manoeuvre(*self._legs, station)
-        return None if entry < 0 else (LANE_ENTRIES[entry], distance)
+        return self._at(station).manoeuvre()
 
     def turns_round_on(self, lane: int) -> bool:
         """Returns whether the next U-turn of the route begins on a lane."""
@@ -354,6 +356,67 @@ class RouteProgress:
         return False
 
 
+def _next_junction(town: Town, route: Route, leg: int, station: float, first: int) -> tuple[int, RouteJunction] | None:
+    """Returns the next junction with a choice behind the leg `first` at the earliest, and the leg before it."""
+    tables = route_tables(town)
+    before, row, distance = find_crossing(tables, route.records, len(route.legs), leg, station, first)
+    if before < 0:
+        return None
+    lane = route.legs[before].lane
+    return before, RouteJunction(lane=lane, exit=town.exits(lane)[row - int(tables.rows[lane])], distance=distance)
+
+
+_AHEAD: Final = "_ahead"
+"""Attribute of `RouteProgress` for its `_WayAhead`; none of its fields, since it follows from them."""
+
+
+class _WayAhead:
+    """What a route has ahead of a station, found when it is first asked for.
+
+    Args:
+        route: the route; None if there is none.
+        leg: the current leg.
+        station: place of the car on it [m].
+    """
+
+    def __init__(self, route: Route | None, leg: int, station: float) -> None:
+        self._route, self._leg, self._station = route, leg, station
+        self._has_way = route is not None and leg < len(route.legs)
+        self._left: float | None = None
+        self._manoeuvre: tuple[tuple[LaneEntry, float] | None] | None = None
+        self._crossing: tuple[Town, RouteJunction | None] | None = None
+
+    def is_of(self, progress: RouteProgress, station: float) -> bool:
+        """Returns whether this is what a progress has ahead of a station."""
+        return self._station == station and self._leg == progress.leg and self._route is progress.route
+
+    def left(self) -> float:
+        """Returns the distance to the goal [m]."""
+        if not self._has_way or self._route is None:
+            return math.inf
+        if self._left is None:
+            self._left = distance_left(self._route.records, len(self._route.legs), self._leg, self._station)
+        return self._left
+
+    def manoeuvre(self) -> tuple[LaneEntry, float] | None:
+        """Returns the next lane change or U-turn and its distance [m]."""
+        if not self._has_way or self._route is None:
+            return None
+        if self._manoeuvre is None:
+            entry, distance = find_manoeuvre(self._route.records, len(self._route.legs), self._leg, self._station)
+            self._manoeuvre = (None if entry < 0 else (LANE_ENTRIES[entry], distance),)
+        return self._manoeuvre[0]
+
+    def crossing(self, town: Town) -> RouteJunction | None:
+        """Returns the next junction with a choice."""
+        if not self._has_way or self._route is None:
+            return None
+        if self._crossing is None or self._crossing[0] is not town:
+            found = _next_junction(town, self._route, self._leg, self._station, self._leg)
+            self._crossing = town, None if found is None else found[1]
+        return self._crossing[1]
+
+
 def first_new_street(
     observation: ObservationMapping, town: Town, lane: int, progress: RouteProgress | None
 ) -> StreetName | None:
@@ -372,4 +435,9 @@ def first_new_street(
 
 def streets_named(street_names: Sequence[int] | IntArray, name: StreetName) -> frozenset[int]:
     """Returns the indices of the streets with a name."""
-    return frozenset(k for k, value in enumerate(np.asarray(street_names).tolist()) if value == name.value)
+    return _streets_named(tuple(np.asarray(street_names).tolist()), name.value)
+
+
+@lru_cache(maxsize=1024)
+def _streets_named(street_names: tuple[int, ...], name: int) -> frozenset[int]:
+    return frozenset(k for k, value in enumerate(street_names) if value == name)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import IntArray
 from dorothie_gym.maps.routing_graph import NONE, RoutingLane, routing_graph
+from dorothie_gym.policies.town_tables import kept_with_town
 from dorothie_gym.support.compilation.records import Int32, RecordArray, argument, by_reference, filled_records
 from dorothie_gym.support.copying import shared
 
@@ -63,12 +64,14 @@ def route_tables(town: Town) -> RouteTables:
     )
 
 
+@kept_with_town
 def is_choice(town: Town, lane: int) -> bool:
     """Returns whether a lane ends at a junction with more than one exit."""
     exits = town.exits(lane)
     return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 
 
+@kept_with_town
 def default_successor(town: Town, lane: int) -> int | None:
     """Returns the lane that follows by default; None at a junction with a choice and where the map ends.
 
@@ -83,6 +86,7 @@ def default_successor(town: Town, lane: int) -> int | None:
     return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
 
 
+@kept_with_town
 def entry_station(town: Town, lane: int, following: int) -> float:
     """Returns the station of the lane that follows by default which is at the end of a lane [m]; 0 for a successor."""
     return 0.0 if town.merge(lane) is None else town.lanes[following].project(town.lanes[lane].points[-1])[0]

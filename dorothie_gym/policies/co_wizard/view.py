@@ -93,7 +93,7 @@ class CoWizardView:
     @cached_property
     def waypoints(self) -> np.ndarray:
         """Points of the planned path (n, 2) [m]."""
-        points = self.raw["waypoints"]
+        points: np.ndarray = self.raw["waypoints"]
         return points[np.any(points != 0.0, axis=1)]
 
     @property

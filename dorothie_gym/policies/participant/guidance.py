@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import TYPE_CHECKING
 
@@ -439,7 +440,7 @@ def next_step(
         return None
     if step.junction is not None:
         return step.key, step.distance, _turn_remark(state, view, move, step.junction, rng)
-    return step.key, step.distance, order(move, step.action, Wording(direction=step.direction))
+    return step.key, step.distance, _order_of_step(move, step.action, step.direction)
 
 
 def _turn_remark(
@@ -460,7 +461,18 @@ def _turn_remark(
         onto = street
     first = crossing.distance < 60.0 or rng.random() < 0.5
     ordinal = 1 if first and onto is None and action is ActionValue.J_TURN and rng.random() < 0.5 else None
-    return order(move, action, Wording(direction=direction, ordinal=ordinal), street=onto)
+    return _order_of_step(move, action, direction, ordinal, onto)
+
+
+@functools.lru_cache(maxsize=512)
+def _order_of_step(
+    move: DialogueMove,
+    action: ActionValue,
+    direction: Direction | None,
+    ordinal: int | None = None,
+    street: StreetName | None = None,
+) -> Remark:
+    return order(move, action, Wording(direction=direction, ordinal=ordinal), street=street)
 
 
 def _is_ambiguous(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:

@@ -155,9 +155,9 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
 
 def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[Place | None, PropKind | None]:
     """Returns the place of the first obstacle in sight on the next lanes of the route, and its kind."""
-    lanes = [leg.lane for leg in state.route.to_goal.legs[:6]]
     for thing in view.objects:
         if thing.kind is ObjectClass.STATIC and thing.distance < state.config.roadblock_sight:
+            lanes = [leg.lane for leg in state.route.to_goal.legs[:6]]
             found = place_on_lanes(state.town, lanes, thing.x, thing.y)
             behind = found is not None and found[0] == view.lane and found[1] < view.station
             if found is not None and not behind:
