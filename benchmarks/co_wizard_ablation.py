@@ -7,6 +7,7 @@ network without a part, not the result of training without that part.
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,8 +23,9 @@ from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept
 from dorothie_gym.baselines.roles.co_wizard.features import ordered_exit
 from dorothie_gym.baselines.roles.co_wizard.files import FILES
 from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, SPEEDS, Update, WorkingMemory
+from dorothie_gym.baselines.roles.co_wizard.network import HeardNumbers
 from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
-from dorothie_gym.baselines.roles.learned_role.decision import Inputs
+from dorothie_gym.baselines.roles.learned_role.inference import MISSING
 from dorothie_gym.baselines.roles.learned_role.policy import drawn
 from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources, filled
 from dorothie_gym.cli.output import reporting_errors, session_progress
@@ -50,21 +52,19 @@ SHOWN: Final = ("success", "driving_score", "goal_condition_success", "exchanges
 class RandomCommands(LearnedCoWizard):
     """Commands that are drawn evenly among those that the action mask allows, "none" among them."""
 
-    def _act(
-        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[int, tuple[Remark, ...]]:
-        _, remarks = super()._act(percept, memory, inputs, rng, silent=silent)
-        return int(rng.integers(len(inputs.rows))), remarks
+    def _command(
+        self, percept: CoWizardPercept, memory: WorkingMemory, rng: np.random.Generator, scores: NDArray[np.float32]
+    ) -> int:
+        return int(rng.integers(int((scores > MISSING).sum())))
 
 
 class RuledCommands(LearnedCoWizard):
     """Commands by a rule over the memory that the network has written."""
 
-    def _act(
-        self, percept: CoWizardPercept, memory: WorkingMemory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[int, tuple[Remark, ...]]:
-        _, remarks = super()._act(percept, memory, inputs, rng, silent=silent)
-        return ruled_command(memory, percept.view), remarks
+    def _command(
+        self, percept: CoWizardPercept, memory: WorkingMemory, rng: np.random.Generator, scores: NDArray[np.float32]
+    ) -> int:
+        return ruled_command(memory, percept.view)
 
 
 def ruled_command(memory: WorkingMemory, view: CoWizardView) -> int:
@@ -102,7 +102,7 @@ def ruled_command(memory: WorkingMemory, view: CoWizardView) -> int:
 class FrozenListening(LearnedCoWizard):
     """Nothing that is heard changes the memory: it keeps its initial values, and no goal is set."""
 
-    def _listen(self, percept: CoWizardPercept, inputs: Inputs) -> Update:
+    def _update(self, percept: CoWizardPercept, rows: Sequence[int], heard: HeardNumbers) -> Update:
         return Update(values=percept.memory.values, fresh=(False,) * len(FRESH))
 
 
@@ -175,9 +175,11 @@ class RandomRemarks(LearnedCoWizard):
 class Silent(LearnedCoWizard):
     """Nothing is said."""
 
-    def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> Turn:
-        """Takes a decision; nothing is to be said."""
-        return super().play(observation, state, silent=True)
+    def play_all(
+        self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState], *, silent: bool = False
+    ) -> list[Turn]:
+        """Takes decisions; nothing is to be said."""
+        return super().play_all(observations, states, silent=True)
 
 
 ROWS: Final[dict[str, type[LearnedCoWizard]]] = {

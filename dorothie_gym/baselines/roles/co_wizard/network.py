@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.roles.co_wizard.features import COMMAND_SIZE, PLACE_SIZE, STATE_SIZE
 from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, STATUSES, VARIABLES, GoalEvent
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.roles.learned_role.inference import (
+    Dense,
+    Floats,
+    FollowingRemark,
+    HiddenLayers,
+    Scorer,
+    numbers_of,
+)
 from dorothie_gym.baselines.roles.learned_role.network import (
     REMARK_WIDTH,
     WIDTH,
@@ -20,6 +29,11 @@ from dorothie_gym.baselines.roles.learned_role.network import (
     hidden_layers,
     without_missing,
 )
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dorothie_gym.baselines.roles.learned_role.decision import InputBatch
 
 SIZES: Final = tuple(VARIABLES.values())
 OPTION_WIDTH: Final = 96
@@ -127,3 +141,44 @@ class _Scorer(nn.Module):
         """Returns the score of each option (b, k), almost minus infinity for those that are only filled in."""
         both = torch.relu(self.hidden(hidden)[:, None, :] + self.option(options))
         return without_missing(self.last(both).squeeze(2), count)
+
+
+# --- In play ----------------------------------------------------------------------------------------------------------
+
+
+class HeardNumbers(NamedTuple):
+    """Outputs of listening in play, see `Heard`: logits (b, ...)."""
+
+    values: Floats
+    fresh: Floats
+    goal: Floats
+    status: Floats
+
+
+class CoWizardInference:
+    """Forward passes of a trained network in play, with equal results in batches of any size."""
+
+    def __init__(self, network: CoWizardNetwork) -> None:
+        """Copies the parameters of a network."""
+        self._listening, self._acting = (HiddenLayers(network, each) for each in (network.listening, network.acting))
+        self._values, self._fresh = Dense(network.values), Dense(network.fresh)
+        self._goal, self._status = Dense(network.goal), Dense(network.status)
+        self._kept, self._starts = numbers_of(network.kept), network.starts.numpy()
+        self._place, self._command = (
+            Scorer(Dense(each.hidden), Dense(each.option), each.last) for each in (network.place, network.command)
+        )
+        self._first, self.then = Dense(network.first), FollowingRemark(network.remarks, network.second)
+
+    def listen(self, batch: InputBatch, before: NDArray[np.int64]) -> HeardNumbers:
+        """Returns the logits of the next memory; `before` are the values of the memory (b, v)."""
+        hidden = self._listening(batch)
+        values = self._values(hidden)
+        kept = before + self._starts
+        values[np.arange(len(values))[:, None], kept] += self._kept[kept]
+        goal = np.concatenate([self._goal(hidden), self._place(hidden, batch.options, batch.counts)], axis=1)
+        return HeardNumbers(values, self._fresh(hidden), goal, self._status(hidden))
+
+    def act(self, batch: InputBatch) -> tuple[Floats, Floats, Floats]:
+        """Returns the logits of the commands (b, k) and of the first remark (b, r), and the hidden layer for `then`."""
+        hidden = self._acting(batch)
+        return self._command(hidden, batch.options, batch.counts), self._first(hidden), hidden

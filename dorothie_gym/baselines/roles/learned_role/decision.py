@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -125,12 +125,33 @@ class Inputs:
             options[: len(vectors)] = vectors
         return cls(state=np.asarray(state, dtype=np.float32), words=words, options=options, rows=rows)
 
-    def tensors(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Returns state, words, options and their number as a batch of one, rounded as in training."""
-        state, options = (array.astype(np.float16).astype(np.float32) for array in (self.state, self.options))
-        return (
-            torch.from_numpy(state)[None],
-            torch.from_numpy(self.words)[None],
-            torch.from_numpy(options)[None],
-            torch.tensor([len(self.rows)]),
+
+class InputBatch(NamedTuple):
+    """Inputs of several sessions, rounded as in training.
+
+    Attributes:
+        state: (b, n).
+        words: (b, w).
+        options: (b, k, m).
+        counts: number of options (b,).
+    """
+
+    state: NDArray[np.float32]
+    words: NDArray[np.int64]
+    options: NDArray[np.float32]
+    counts: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, inputs: Sequence[Inputs]) -> InputBatch:
+        """Returns the inputs of sessions, at least one."""
+        return cls(
+            np.stack([each.state for each in inputs]).astype(np.float16).astype(np.float32),
+            np.stack([each.words for each in inputs]),
+            np.stack([each.options for each in inputs]).astype(np.float16).astype(np.float32),
+            np.array([len(each.rows) for each in inputs], dtype=np.int64),
         )
+
+    def tensors(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Returns state, words, options and their numbers for a network of torch."""
+        state, words, options, counts = map(torch.from_numpy, self)
+        return state, words, options, counts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 
 from dorothie_gym.dialogue.propositions import Predicate
@@ -19,9 +20,10 @@ _TIMES: Final = (1.0, 4.0, 15.0)
 """Scales of times [s]."""
 
 
-def one_hot(index: int, size: int) -> list[float]:
+@lru_cache(maxsize=4096)
+def one_hot(index: int, size: int) -> tuple[float, ...]:
     """Returns zeros (size,) with a one at an index, or without one for an index outside."""
-    return [float(k == index) for k in range(size)]
+    return tuple(float(k == index) for k in range(size))
 
 
 def seconds_since(now: float, then: float) -> float:
@@ -29,13 +31,14 @@ def seconds_since(now: float, then: float) -> float:
     return min(max(now - then, 0.0), AWAY) if math.isfinite(then) else AWAY
 
 
-def time_scales(seconds: float) -> list[float]:
+@lru_cache(maxsize=4096)
+def time_scales(seconds: float) -> tuple[float, ...]:
     """Returns a time [s] on several scales (4,)."""
     seconds = min(max(seconds, 0.0), AWAY)
-    return [float(seconds <= 0.01), *(math.exp(-seconds / scale) for scale in _TIMES)]
+    return float(seconds <= 0.01), *(math.exp(-seconds / scale) for scale in _TIMES)
 
 
-def age_scales(now: float, then: float) -> list[float]:
+def age_scales(now: float, then: float) -> tuple[float, ...]:
     """Returns the time since a moment on several scales (4,)."""
     return time_scales(seconds_since(now, then))
 

@@ -51,12 +51,6 @@ class LearnedPolicy(TypedPolicy[State], Generic[State, Network]):
         return np.array([needs <= available.keys() for needs in self._needs])
 
 
-def shares_of(scores: torch.Tensor, temperature: float) -> NDArray[np.float64]:
-    """Returns the probabilities of remarks at a temperature (r,) from logits (1, r)."""
-    shares: NDArray[np.float64] = torch.softmax(scores[0].double() / temperature, dim=0).numpy()
-    return shares
-
-
 def drawn(shares: NDArray[np.float64], rng: np.random.Generator) -> int:
     """Returns a number drawn in proportion to shares; 0 if all are 0."""
     total = float(shares.sum())

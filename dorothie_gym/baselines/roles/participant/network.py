@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.roles.learned_role.inference import Dense, Floats, FollowingRemark, HiddenLayers, Scorer
 from dorothie_gym.baselines.roles.learned_role.network import (
     REMARK_WIDTH,
     WIDTH,
@@ -20,6 +22,11 @@ from dorothie_gym.baselines.roles.learned_role.network import (
     option_scores,
 )
 from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, STATE_SIZE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dorothie_gym.baselines.roles.learned_role.decision import InputBatch
 
 ERRAND_WIDTH: Final = 64
 """Width of the layer that scores errands."""
@@ -87,3 +94,27 @@ class ParticipantNetwork(RoleNetwork):
         """Returns the logits of the remark (b, r) that follows another one (b,)."""
         scores: Tensor = self.next(torch.cat([hidden, self.remarks(before)], dim=1))
         return scores
+
+
+class ParticipantInference:
+    """Forward passes of a trained network in play, with equal results in batches of any size."""
+
+    def __init__(self, network: ParticipantNetwork) -> None:
+        """Copies the parameters of a network."""
+        self._choosing, self._speaking = (HiddenLayers(network, each) for each in (network.choosing, network.speaking))
+        self._keep, self._guiding, self._kept = Dense(network.keep), Dense(network.guiding), network.kept.item()
+        first, size = network.errand[0], WIDTH + network.layout.errand
+        self._errand = Scorer(Dense.of_part(first, 0, WIDTH), Dense.of_part(first, WIDTH, size), network.errand[2])
+        self._first, self.then = Dense(network.first), FollowingRemark(network.remarks, network.next)
+
+    def choose(self, batch: InputBatch, guides: Sequence[bool]) -> tuple[Floats, Floats]:
+        """Returns the logits of keeping the target and of each errand (b, 1 + k), and that of guiding (b,)."""
+        hidden = self._choosing(batch)
+        scores = self._errand(hidden, batch.options, batch.counts)
+        kept = np.array([self._kept if guided else -self._kept for guided in guides], dtype=np.float32)
+        return np.concatenate([self._keep(hidden), scores], axis=1), self._guiding(hidden)[:, 0] + kept
+
+    def speak(self, batch: InputBatch) -> tuple[Floats, Floats]:
+        """Returns the logits of the first remark (b, r), and the hidden layer for `then`."""
+        hidden = self._speaking(batch)
+        return self._first(hidden), hidden

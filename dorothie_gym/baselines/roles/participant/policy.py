@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.roles.learned_role.decision import Attention, Inputs
-from dorothie_gym.baselines.roles.learned_role.policy import LearnedPolicy, drawn, shares_of
+from dorothie_gym.baselines.roles.learned_role.decision import Attention, InputBatch, Inputs
+from dorothie_gym.baselines.roles.learned_role.inference import shares_of
+from dorothie_gym.baselines.roles.learned_role.policy import LearnedPolicy, drawn
 from dorothie_gym.baselines.roles.participant.decision import (
     ParticipantPercept,
     choosing_inputs,
@@ -21,7 +21,7 @@ from dorothie_gym.baselines.roles.participant.decision import (
 from dorothie_gym.baselines.roles.participant.examples import MOST_REMARKS
 from dorothie_gym.baselines.roles.participant.features import answer_to
 from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, SessionMemory, TargetChoice
-from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
+from dorothie_gym.baselines.roles.participant.network import ParticipantInference, ParticipantNetwork
 from dorothie_gym.baselines.roles.participant.observed_truth import is_denied
 from dorothie_gym.baselines.roles.participant.remarks import (
     STOP_FORM,
@@ -72,6 +72,7 @@ class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
             limits: sizes of the spaces.
         """
         super().__init__(Role.PARTICIPANT, network, vocabulary, limits, sources_of)
+        self._inference = ParticipantInference(network)
         self._yes = np.array([is_yes(form) for form in self._vocabulary])
         self._no = np.array([is_no(form) for form in self._vocabulary])
 
@@ -81,44 +82,70 @@ class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
 
     def act(self, observation: ObservationMapping, state: LearnedState) -> tuple[ParticipantAction, LearnedState]:
         """Looks, listens, chooses the errand, and speaks or is silent."""
-        percept = perceive(observation, state.attention)
-        choice = self.choose(choosing_inputs(percept), percept)
-        memory = percept.memory.chosen(choice, percept.view, percept.rng)
-        remarks = self.speak(speaking_inputs(percept, memory), percept, memory)
-        speech, attention = finished(percept, memory, remarks)
-        return ParticipantAction(speech=speech), replace(state, attention=attention)
+        return self.act_all([observation], [state])[0]
+
+    def act_all(
+        self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState]
+    ) -> list[tuple[ParticipantAction, LearnedState]]:
+        """As `act` for several sessions, with one forward pass for all; the results are equal."""
+        percepts = [perceive(seen, state.attention) for seen, state in zip(observations, states, strict=True)]
+        choices = self._choose_all([choosing_inputs(percept) for percept in percepts], percepts)
+        memories = [
+            percept.memory.chosen(choice, percept.view, percept.rng)
+            for percept, choice in zip(percepts, choices, strict=True)
+        ]
+        inputs = [speaking_inputs(percept, memory) for percept, memory in zip(percepts, memories, strict=True)]
+        scores, hidden = self._inference.speak(InputBatch.of(inputs))
+        found = []
+        for number, (percept, memory, state) in enumerate(zip(percepts, memories, states, strict=True)):
+            remarks = self._talk(scores[number], hidden[number : number + 1], percept, memory)
+            speech, attention = finished(percept, memory, remarks)
+            found.append((ParticipantAction(speech=speech), replace(state, attention=attention)))
+        return found
 
     def choose(self, inputs: Inputs, percept: ParticipantPercept) -> TargetChoice:
         """Returns the most likely target, and whether to guide."""
-        guides = torch.tensor([float(percept.memory.records.guidance.guiding)])
-        with torch.inference_mode():
-            target, guiding = self._network.choose(*inputs.tensors(), guides)
-        chosen = int(target[0].argmax())
-        return TargetChoice(target=inputs.rows[chosen - 1] if chosen else KEEP_TARGET, guiding=bool(guiding[0] > 0.0))
+        return self._choose_all([inputs], [percept])[0]
+
+    def _choose_all(self, inputs: Sequence[Inputs], percepts: Sequence[ParticipantPercept]) -> list[TargetChoice]:
+        guides = [percept.memory.records.guidance.guiding for percept in percepts]
+        targets, guiding = self._inference.choose(InputBatch.of(inputs), guides)
+        return [
+            TargetChoice(target=own.rows[chosen - 1] if chosen else KEEP_TARGET, guiding=bool(guide > 0.0))
+            for own, chosen, guide in zip(inputs, targets.argmax(axis=1).tolist(), guiding.tolist(), strict=True)
+        ]
 
     def speak(self, inputs: Inputs, percept: ParticipantPercept, memory: SessionMemory) -> tuple[Remark, ...]:
         """Returns sampled remarks; none for silence."""
-        with torch.inference_mode():
-            state, words, _, _ = inputs.tensors()
-            scores, hidden = self._network.speak(state, words)
-            shares = shares_of(scores, TEMPERATURE)
-            if percept.rng.random() < shares[0]:
-                return ()
-            available = sources(memory, percept.view, percept.utterances)
-            allowed = self._fillable(available)
-            if STOP_FORM in self._vocabulary:
-                allowed[self._vocabulary.index(STOP_FORM)] = stop_remark(memory) is not None
-            if percept.heard and (true := answer_to(memory, percept.view, percept.utterances[0])) is not None:
-                allowed &= ~(self._no if true else self._yes)
-            allowed[0] = False
-            remarks: list[Remark] = []
-            while len(remarks) < MOST_REMARKS:
-                chosen, said = self._draw(shares * allowed, percept, memory, available, joined=bool(remarks))
-                if said is None:
-                    break
-                remarks.append(said)
-                allowed[0], allowed[chosen] = True, False
-                shares = shares_of(self._network.then(hidden, torch.tensor([chosen])), TEMPERATURE)
+        scores, hidden = self._inference.speak(InputBatch.of([inputs]))
+        return self._talk(scores[0], hidden, percept, memory)
+
+    def _talk(
+        self,
+        scores: NDArray[np.float32],
+        hidden: NDArray[np.float32],
+        percept: ParticipantPercept,
+        memory: SessionMemory,
+    ) -> tuple[Remark, ...]:
+        """Returns sampled remarks, from the logits of the first one (r,) and the hidden layer (1, h)."""
+        shares = shares_of(scores, TEMPERATURE)
+        if percept.rng.random() < shares[0]:
+            return ()
+        available = sources(memory, percept.view, percept.utterances)
+        allowed = self._fillable(available)
+        if STOP_FORM in self._vocabulary:
+            allowed[self._vocabulary.index(STOP_FORM)] = stop_remark(memory) is not None
+        if percept.heard and (true := answer_to(memory, percept.view, percept.utterances[0])) is not None:
+            allowed &= ~(self._no if true else self._yes)
+        allowed[0] = False
+        remarks: list[Remark] = []
+        while len(remarks) < MOST_REMARKS:
+            chosen, said = self._draw(shares * allowed, percept, memory, available, joined=bool(remarks))
+            if said is None:
+                break
+            remarks.append(said)
+            allowed[0], allowed[chosen] = True, False
+            shares = shares_of(self._inference.then(hidden, [chosen])[0], TEMPERATURE)
         return tuple(remarks)
 
     def _draw(

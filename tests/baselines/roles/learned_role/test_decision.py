@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.roles.learned_role.decision import Inputs, kept_utterances
+from dorothie_gym.baselines.roles.learned_role.decision import InputBatch, Inputs, kept_utterances
 from dorothie_gym.baselines.roles.learned_role.encoding import AWAY, age_scales, distance_scales, one_hot, time_scales
 from dorothie_gym.baselines.roles.learned_role.examples import reals
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, word_rows
@@ -11,7 +11,7 @@ from tests.baselines.roles.learned_role.test_hearing import heard
 
 def test_inputs_in_play_are_those_of_an_example():
     inputs = Inputs.of([0.1, 1.0 / 3.0], word_rows("turn left"), [[0.7, 0.2]], (5,), (3, 2))
-    state, words, options, count = inputs.tensors()
+    state, words, options, count = InputBatch.of([inputs]).tensors()
     assert state.equal(reals([inputs.state]).float()) and options.equal(reals([inputs.options]).float())
     assert options.shape == (1, 3, 2) and not options[0, 1:].any() and count.tolist() == [1]
     assert words.dtype is torch.int64
