@@ -25,6 +25,7 @@ from dorothie_gym.evaluation.closed_loop.running import command_of, fold_of_town
 from dorothie_gym.evaluation.closed_loop.session_record import Amount
 from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, SubmissionCheck, check_submission
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
+from dorothie_gym.maps.default_lights import split_lights
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.config import EnvConfig
@@ -133,7 +134,7 @@ class LeaderboardEntry:
     def part(self) -> str:
         """Part of the page, a key of `PART_TITLES`."""
         towns = self.result.settings["towns"]
-        imported = all(str(town).lower().endswith(".xodr") for town in towns)
+        imported = all(split_lights(str(town))[0].lower().endswith(".xodr") for town in towns)
         return fold_of_towns(towns) or (IMPORTED if imported else OTHER)
 
     @property
