@@ -61,7 +61,7 @@ class _Approach:
 
     def crosses(self, other: _Approach) -> bool:
         """Returns whether two approaches neither face each other nor merge side by side."""
-        return FACING <= opposition(*(_ending(each.lanes[0]) for each in (self, other))) <= np.pi - FACING
+        return bool(FACING <= opposition(_ending(self.lanes[0]), _ending(other.lanes[0])) <= np.pi - FACING)
 
 
 def _ending(lane: Lane) -> Lane:

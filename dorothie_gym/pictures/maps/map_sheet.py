@@ -181,7 +181,8 @@ _FINEST = 12.0  # [px/m]
 _SMALLEST_SHEET = 1400  # [px] on the long side
 _NAME_HEIGHT = 7.0  # [m] font size on the broadest roads
 _NAME_SPACING = 120.0  # [m]
-_STRIPS = 3  # smallest height of a sheet, in strips below the map
+_STRIPS = 3  # height of a flat sheet, in strips below the map
+_FEWEST_STRIPS = 2  # smallest height that is accepted
 _SMALLEST_TYPE = 0.0068  # of the long side: legible when the whole sheet is visible
 _LARGE_TYPE = 0.0105  # of the long side: prominent, on roads that are broad enough
 
@@ -220,7 +221,7 @@ def sheet_painter(
     size = sheet_size(town) if size is None else size
     names = [street.name for street in town.streets] if street_names is None else street_names
     _, edge, strip = _measures(town, names, size[0])
-    if size[1] < _STRIPS * strip:
+    if size[1] < _FEWEST_STRIPS * strip:
         raise ValueError(f"size: {size} is too small for a title and a map")
     x0, y0, x1, y1 = town_bounds(town, GROUND)
     inner = np.array([size[0] - 2 * edge, size[1] - edge - strip], dtype=float)

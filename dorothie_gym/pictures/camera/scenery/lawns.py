@@ -73,7 +73,7 @@ def build_lawns(layers: MapLayers, clearance: Clearance, buildings: list[Buildin
             add_garden(builder, garden, plot, ground, fine=False)
     places = np.array(trees).reshape(-1, 2)
     feet = np.column_stack((places, feet_on(ground, places)))
-    planted = stamped(small_tree(), feet, np.arange(len(places)) * 1.7, np.full(len(places), _TREE))
+    planted = stamped(small_tree(), feet, np.linspace(0.0, 1.7 * len(places), len(places)), np.full(len(places), _TREE))
     return joined([builder.build(), planted, *_shrubs(layers, room, ground)])
 
 
