@@ -17,14 +17,16 @@ from scipy.sparse.csgraph import connected_components
 from dorothie_gym.errors import InputFileError, TownError, did_you_mean
 from dorothie_gym.maps import generated, opendrive, yaml  # lazy: their parsers are slow to import
 from dorothie_gym.maps.cache import through_cache
+from dorothie_gym.maps.default_lights import Lights, split_lights, with_default_lights
 from dorothie_gym.maps.generated.specification import TownSeries, TownSpecification, is_generated, parse_specification
+from dorothie_gym.maps.import_notes import ImportNotes
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.open_street_map import is_street_map
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.import_notes import ImportNote, ImportNotes
+    from dorothie_gym.maps.import_notes import ImportNote
     from dorothie_gym.support.files import JsonValue
 
 _SUFFIXES = (".xodr", ".yaml", ".yml")
@@ -39,22 +41,29 @@ def town_names() -> tuple[str, ...]:
     )
 
 
-def load_town(name_or_path: str | Path) -> Town:
+def load_town(name_or_path: str | Path, *, lights: str | None = None) -> Town:
     """Loads a town by name, or from a file (`.xodr` for OpenDRIVE, `.yaml` or `.yml` for the town language).
 
     Names are those of shipped towns, and `generated:SEED` with the options `size`, `style` and `traffic`
-    (`dorothie_gym.maps.generated.specification`).
+    (`dorothie_gym.maps.generated.specification`). A path to an OpenDRIVE file may have the option `lights`, as in
+    `Town05.xodr,lights=default`.
 
     Towns are cached: within a process as objects, between processes as archives in the user's cache folder
     (`dorothie_gym.maps.cache`). An entry is valid until its file changes. Do not modify a town.
 
+    Args:
+        name_or_path: name or file.
+        lights: "default" gives an OpenDRIVE map without traffic lights some where main roads cross
+            (`dorothie_gym.maps.default_lights`), "map" does not. By default as the name states, or "map".
+
     Raises:
-        TownError: no town or file has this name, or the file is invalid.
+        TownError: no town or file has this name, or the file is invalid; `lights` is for OpenDRIVE files only.
     """
+    name_or_path, chosen = _lights_of(name_or_path, lights)
     if is_generated(str(name_or_path)):
         return _generate(parse_specification(str(name_or_path)))[0]
     with _located(name_or_path) as path:
-        return _load(path)
+        return _load(path, chosen)
 
 
 def town_at(source: str | Path | Town | TownSeries, seed: int) -> Town:
@@ -74,11 +83,35 @@ def import_report(name_or_path: str | Path) -> tuple[ImportNote, ...]:
     Raises:
         TownError: no town or file has this name, or the file is invalid.
     """
+    name_or_path, lights = _lights_of(name_or_path, None)
     if is_generated(str(name_or_path)):
         return _generate(parse_specification(str(name_or_path)))[1].sorted()
     with _located(name_or_path) as path:
         _stamp(path)
-        return _import(path)[1].sorted()
+        town, notes = _import(path)
+        if lights is Lights.DEFAULT:
+            with_default_lights(town, notes)
+        return notes.sorted()
+
+
+def _lights_of(name_or_path: str | Path, lights: str | None) -> tuple[str | Path, Lights]:
+    """Returns a town's name or path without the option for lights, and the source of its lights.
+
+    Raises:
+        TownError: there is no such source, or the town is no OpenDRIVE file.
+    """
+    name = str(name_or_path)
+    if lights is not None:
+        name = f"{split_lights(name)[0]},lights={lights}"
+    found, source = split_lights(name)
+    if source is Lights.DEFAULT and not found.lower().endswith(".xodr"):
+        remedy = "give the file of a map (.xodr)" if _is_shipped(found) else "name its junctions under 'lights'"
+        raise TownError(found, "lights", f"is for OpenDRIVE maps; {remedy}")
+    return (found if found != str(name_or_path) else name_or_path), source
+
+
+def _is_shipped(name: str) -> bool:
+    return is_generated(name) or name in town_names()
 
 
 @contextmanager
@@ -107,23 +140,32 @@ def _located(name_or_path: str | Path) -> Iterator[Path]:
 def find_town(name: str, maps: Path | None) -> Town | None:
     """Returns the town that a recording names, or None.
 
-    It is a shipped or generated one, or a file `<name>.xodr` or `.yaml` in `maps`.
+    It is a shipped or generated one, or a file `<name>.xodr` or `.yaml` in `maps`. The name states lights by default.
 
     Raises:
         TownError: the file is malformed.
     """
     if is_generated(name):
         return load_town(name)
+    name, lights = split_lights(name)
     if not _PLAIN_NAME.fullmatch(name):  # a name from a file must not be a path
         return None
     if name in town_names():
         return load_town(name)
-    candidates = [] if maps is None else [maps / f"{name}{suffix}" for suffix in _SUFFIXES]
-    return next((load_town(path) for path in candidates if path.is_file()), None)
+    suffixes = _SUFFIXES if lights is Lights.MAP else _SUFFIXES[:1]
+    candidates = [] if maps is None else [maps / f"{name}{suffix}" for suffix in suffixes]
+    return next((load_town(path, lights=lights) for path in candidates if path.is_file()), None)
 
 
-def _load(path: Path) -> Town:
-    return _read(*_stamp(path))
+def _load(path: Path, lights: Lights) -> Town:
+    file, modified, size = _stamp(path)
+    return _read(file, modified, size) if lights is Lights.MAP else _with_lights(file, modified, size)
+
+
+@lru_cache(maxsize=16)
+def _with_lights(path: Path, modified: int, size: int) -> Town:
+    """Adds default lights to each version of a file once per process."""
+    return with_default_lights(_read(path, modified, size), ImportNotes(str(path)))
 
 
 def _stamp(path: Path) -> tuple[Path, int, int]:

@@ -15,7 +15,7 @@ COUNTRY_TREE: Colour = (217, 226, 206)
 SIDEWALK: Colour = (221, 216, 205)
 SIDEWALK_EDGE: Colour = (200, 194, 181)
 KERB: Colour = (82, 88, 99)
-ROAD: Colour = (121, 128, 140)
+ROAD: Colour = (110, 117, 129)
 MEDIAN: Colour = (178, 203, 158)
 MEDIAN_TREE: Colour = (152, 184, 132)
 MEDIAN_KERB: Colour = (212, 212, 206)
@@ -51,7 +51,7 @@ SIGN_WHITE: Colour = (252, 252, 250)
 
 # Words.
 INK: Colour = (46, 54, 68)
-INK_SOFT: Colour = (112, 119, 131)
+INK_SOFT: Colour = (105, 112, 124)
 PAPER: Colour = (255, 255, 255)
 SHEET: Colour = (251, 248, 241)
 STREET_NAME: Colour = (255, 255, 255)
@@ -77,6 +77,15 @@ STATE: dict[str, Colour] = {
     "complete": (34, 160, 94),
     "abandoned": (196, 82, 82),
 }
+
+STATE_INK: dict[str, Colour] = {
+    "none": (98, 106, 120),
+    "pending": (150, 92, 6),
+    "ongoing": (30, 98, 222),
+    "complete": (20, 122, 70),
+    "abandoned": (176, 64, 64),
+}
+"""Colours of words about goals: darker, with a contrast of at least 4.5 to paper (WCAG 2.1, 1.4.3)."""
 
 # The panel beside the picture.
 PANEL: Colour = (249, 249, 247)

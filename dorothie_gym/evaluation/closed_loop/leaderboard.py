@@ -26,6 +26,7 @@ from dorothie_gym.evaluation.closed_loop.session_record import Amount
 from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, SubmissionCheck, check_submission
 from dorothie_gym.evaluation.closed_loop.usage import tokens_text
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
+from dorothie_gym.maps.default_lights import split_lights
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.language_model.usage import SILENT_SHARE
@@ -142,7 +143,7 @@ class LeaderboardEntry:
     def part(self) -> str:
         """Part of the page, a key of `PART_TITLES`."""
         towns = self.result.settings["towns"]
-        imported = all(str(town).lower().endswith(".xodr") for town in towns)
+        imported = all(split_lights(str(town))[0].lower().endswith(".xodr") for town in towns)
         return fold_of_towns(towns) or (IMPORTED if imported else OTHER)
 
     @property

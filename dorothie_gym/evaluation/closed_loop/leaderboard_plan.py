@@ -9,6 +9,7 @@ from typing import Final
 from dorothie_gym.evaluation.closed_loop.leaderboard import ENOUGH, IMPORTED
 from dorothie_gym.evaluation.closed_loop.many_rollouts import folder_name
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
+from dorothie_gym.maps.default_lights import split_lights
 from dorothie_gym.maps.folds import FOLD_TOWNS, TownFold
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, LANE_FOLLOW, Player
@@ -52,7 +53,7 @@ class LeaderboardPlan:
         unknown = [part for part in self.parts if part not in CHOICES]
         if unknown or not (self.parts or self.imported):
             raise ValueError(f"parts is {', '.join(self.parts) or 'empty'}; give some of {', '.join(CHOICES)}")
-        wrong = [name for name in self.imported if not name.lower().endswith(".xodr")]
+        wrong = [name for name in self.imported if not split_lights(name)[0].lower().endswith(".xodr")]
         if wrong:
             raise ValueError(f"imported has {wrong[0]}; give OpenDRIVE files (.xodr)")
         names = [player.name for player in self.co_wizards]

@@ -18,6 +18,7 @@ from dorothie_gym.lab.studies.items import Choice, Number
 from dorothie_gym.lab.studies.stages import QUESTIONNAIRES
 from dorothie_gym.lab.studies.study import HUMAN, Method, Scenario, Study
 from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.default_lights import split_lights
 from dorothie_gym.support.input_files import read_text
 from dorothie_gym.support.schemas import convert
 from dorothie_gym.tasks.parsing import load_template
@@ -223,7 +224,7 @@ def check_sources(study: Study, path: Path) -> None:
 def sources(scenario: Scenario, folder: Path) -> tuple[str, str | None]:
     """Returns town and storyboard of a scenario; files are looked up in a folder."""
     town, storyboard = scenario.town, scenario.storyboard
-    if town.endswith((".yaml", ".yml", ".xodr")):
+    if split_lights(town)[0].endswith((".yaml", ".yml", ".xodr")):
         town = str(folder / town)
     if storyboard is not None and storyboard.endswith(".json"):
         storyboard = str(folder / storyboard)

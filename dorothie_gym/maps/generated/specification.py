@@ -23,7 +23,7 @@ FIRST_TEST_SEED = 900_000_000_000
 """Towns of this and higher seeds are for tests only."""
 
 _SEED = re.compile("[0-9]{1,12}")
-_NEXT_NAME = re.compile(r",(?!\s*(?:size|style|traffic)\s*=)")
+_NEXT_NAME = re.compile(r",(?!\s*(?:size|style|traffic|lights)\s*=)")
 
 
 class TownSize(enum.StrEnum):
@@ -110,7 +110,7 @@ def parse_series(name: object) -> TownSeries | None:
 
 
 def split_names(text: str) -> list[str]:
-    """Returns the names in a list with commas; the options of a generated town belong to its name."""
+    """Returns the names in a list with commas; the options of a town belong to its name."""
     parts = [part.strip() for part in _NEXT_NAME.split(text)]
     return [part for part in parts if part]
 

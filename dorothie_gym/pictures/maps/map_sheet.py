@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dorothie_gym.maps.folds import TownFold
 from dorothie_gym.maps.model import Array, LinkType, SignalKind
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.maps.borders import BorderKind
@@ -23,11 +24,62 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.pictures.maps.map_layers import MapLayers
 
-_ROWS = 4
+_ROWS = 4  # of the legend beside the title, if it is broad enough
+_MOST_ROWS = 6
+_ROW = 2.2  # [units] height of a row of the legend
 _HIGH = 1.9  # [units] height of a swatch
 _WIDEST_SHEET = 3.2
+_ENTRY = _WIDEST_SHEET + 0.9  # [units] from the left end of an entry to its text
+_COLUMN_GAP = 2.2  # [units]
+_BESIDE_TITLE, _BESIDE_SCALE = 3.5, 3.0  # [units] between the legend and its neighbours
 _TITLE_SHARE = 0.42  # of the width of the sheet, for the name of the town
 _METRES = 8.0  # width of a swatch for shapes in metres
+
+_TEXTS = (
+    "landmark site", "traffic light", "stop", "yield", "crosswalk", "ways on from a lane", "one-way street",
+    "lanes of one direction", "between directions", "planted median", "bridge", "tunnel",
+)  # fmt: skip
+"""Texts of all entries that a legend may have, in their order."""
+
+
+class LegendPlace(NamedTuple):
+    """Place of the legend on a sheet, which has room for all entries that there may be.
+
+    Attributes:
+        rows: number of rows in a column.
+        below: whether it is below title and scale bar, as wide as the sheet, instead of between them.
+    """
+
+    rows: int
+    below: bool
+
+    @property
+    def height(self) -> float:
+        """Height that it needs in addition to that of the title [units]."""
+        return 0.6 + _ROW * self.rows if self.below else _ROW * max(0, self.rows - _ROWS)
+
+
+def legend_place(unit: float, beside: float, whole: float) -> LegendPlace:
+    """Returns the place of a legend with room for all entries.
+
+    Args:
+        unit: base length of the sheet [px].
+        beside: width between title and scale bar [px].
+        whole: width of the sheet without its edges [px].
+    """
+    for rows in range(_ROWS, _MOST_ROWS + 1):
+        if _columns_width(_TEXTS, rows, unit) <= beside:
+            return LegendPlace(rows, below=False)
+    rows = next((rows for rows in range(1, len(_TEXTS)) if _columns_width(_TEXTS, rows, unit) <= whole), len(_TEXTS))
+    return LegendPlace(rows, below=True)
+
+
+def _columns_width(texts: Sequence[str], rows: int, unit: float) -> float:
+    """Returns the width of columns of entries [px]."""
+    face = font(_key_type(unit))
+    columns = [texts[k : k + rows] for k in range(0, len(texts), rows)]
+    wide = sum(max(face.size(text)[0] for text in column) + _ENTRY * unit for column in columns)
+    return wide + (len(columns) - 1) * _COLUMN_GAP * unit
 
 
 class Legend:
@@ -43,37 +95,39 @@ class Legend:
         kinds = {border.kind for border in plan.borders.lines}
         signals = {post.kind for post in plan.posts}
         size = round(_HIGH * unit)
-        known: list[tuple[bool, str, Callable[[], pygame.Surface]]] = [
-            (bool(town.sites), "landmark site", lambda: pin_icon("7", round(0.72 * unit), 90)),
-            (SignalKind.TRAFFIC_LIGHT in signals, "traffic light", lambda: sign_icon(SignalKind.TRAFFIC_LIGHT, size)),
-            (SignalKind.STOP in signals, "stop", lambda: sign_icon(SignalKind.STOP, size)),
-            (SignalKind.YIELD in signals, "yield", lambda: sign_icon(SignalKind.YIELD, size)),
-            (bool(town.crosswalks), "crosswalk", self._crosswalk),
-            (bool(plan.arrows) and plan.detail.arrows, "ways on from a lane", self._arrow),
-            (any(True for _ in one_way_places(town, plan.borders)), "one-way street", self._one_way),
-            (BorderKind.LANE in kinds, "lanes of one direction", self._lanes),
-            (BorderKind.CENTRE in kinds, "between directions", self._centre),
-            (BorderKind.MEDIAN in kinds, "planted median", self._median),
-            (any(part.level > 0 for part in plan.stretches), "bridge", self._bridge),
-            (any(part.level < 0 for part in plan.stretches), "tunnel", self._tunnel),
-        ]
-        self.entries = tuple((text, draw) for wanted, text, draw in known if wanted)
+        known: dict[str, tuple[bool, Callable[[], pygame.Surface]]] = {
+            "landmark site": (bool(town.sites), lambda: pin_icon("7", round(0.72 * unit), 90)),
+            "traffic light": (
+                SignalKind.TRAFFIC_LIGHT in signals,
+                lambda: sign_icon(SignalKind.TRAFFIC_LIGHT, size),
+            ),
+            "stop": (SignalKind.STOP in signals, lambda: sign_icon(SignalKind.STOP, size)),
+            "yield": (SignalKind.YIELD in signals, lambda: sign_icon(SignalKind.YIELD, size)),
+            "crosswalk": (bool(town.crosswalks), self._crosswalk),
+            "ways on from a lane": (bool(plan.arrows) and plan.detail.arrows, self._arrow),
+            "one-way street": (any(True for _ in one_way_places(town, plan.borders)), self._one_way),
+            "lanes of one direction": (BorderKind.LANE in kinds, self._lanes),
+            "between directions": (BorderKind.CENTRE in kinds, self._centre),
+            "planted median": (BorderKind.MEDIAN in kinds, self._median),
+            "bridge": (any(part.level > 0 for part in plan.stretches), self._bridge),
+            "tunnel": (any(part.level < 0 for part in plan.stretches), self._tunnel),
+        }
+        self.entries = tuple((text, known[text][1]) for text in _TEXTS if known[text][0])
 
-    def draw(self, surface: pygame.Surface, left: float, right: float, top: float) -> None:
-        """Draws the legend in columns between two sides [px]; entries without room are omitted."""
+    def draw(self, surface: pygame.Surface, left: float, top: float, rows: int) -> float:
+        """Draws all entries in columns of a number of rows, from a corner [px] on; returns their right end [px]."""
         unit = self._unit
-        size = max(9, round(1.15 * unit))
         x = left
-        for column in range(0, len(self.entries), _ROWS):
-            rows = [(words(text, size, palette.INK), draw) for text, draw in self.entries[column : column + _ROWS]]
-            wide = max(text.get_width() for text, _ in rows) + (_WIDEST_SHEET + 0.9) * unit
-            if x + wide > right:
-                return
-            for k, (text, draw) in enumerate(rows):
-                middle = top + (0.6 + 2.2 * k) * unit
+        for column in range(0, len(self.entries), rows):
+            shown = [
+                (words(text, _key_type(unit), palette.INK), draw) for text, draw in self.entries[column : column + rows]
+            ]
+            for k, (text, draw) in enumerate(shown):
+                middle = top + (0.6 + _ROW * k) * unit
                 stamp(surface, draw(), np.array([x + _WIDEST_SHEET * unit / 2.0, middle]))
-                surface.blit(text, (round(x + (_WIDEST_SHEET + 0.9) * unit), round(middle - text.get_height() / 2.0)))
-            x += wide + 2.2 * unit
+                surface.blit(text, (round(x + _ENTRY * unit), round(middle - text.get_height() / 2.0)))
+            x += max(text.get_width() for text, _ in shown) + (_ENTRY + _COLUMN_GAP) * unit
+        return x - _COLUMN_GAP * unit
 
     def _swatch(self, *shapes: tuple[Array, palette.Colour], ground: palette.Colour = palette.ROAD) -> pygame.Surface:
         """Returns a swatch of map, `_METRES` wide, with its centre at (0, 0)."""
@@ -127,7 +181,8 @@ _FINEST = 12.0  # [px/m]
 _SMALLEST_SHEET = 1400  # [px] on the long side
 _NAME_HEIGHT = 7.0  # [m] font size on the broadest roads
 _NAME_SPACING = 120.0  # [m]
-_STRIPS = 3  # smallest height of a sheet, in strips below the map
+_STRIPS = 3  # height of a flat sheet, in strips below the map
+_FEWEST_STRIPS = 2  # smallest height that is accepted
 _SMALLEST_TYPE = 0.0068  # of the long side: legible when the whole sheet is visible
 _LARGE_TYPE = 0.0105  # of the long side: prominent, on roads that are broad enough
 
@@ -142,7 +197,8 @@ def sheet_size(town: Town) -> tuple[int, int]:
     width = max(width, 0.7 * height)
     unit = _unit(width)
     key = site_key(town, [street.name for street in town.streets], unit, width)
-    whole = np.array([width + 4.0 * unit, height + 2.0 * unit + _strip(unit, len(key))])
+    place = _legend_place(town, unit, width + 4.0 * unit)
+    whole = np.array([width + 4.0 * unit, height + 2.0 * unit + _strip(unit, len(key), place)])
     whole *= min(1.0, _LARGEST / whole.max())
     wide, high = round(float(whole[0])), round(float(whole[1]))
     # so does a flat one; see `sheet_painter`
@@ -165,7 +221,7 @@ def sheet_painter(
     size = sheet_size(town) if size is None else size
     names = [street.name for street in town.streets] if street_names is None else street_names
     _, edge, strip = _measures(town, names, size[0])
-    if size[1] < _STRIPS * strip:
+    if size[1] < _FEWEST_STRIPS * strip:
         raise ValueError(f"size: {size} is too small for a title and a map")
     x0, y0, x1, y1 = town_bounds(town, GROUND)
     inner = np.array([size[0] - 2 * edge, size[1] - edge - strip], dtype=float)
@@ -223,7 +279,15 @@ def _measures(town: Town, street_names: Sequence[str], width: int) -> tuple[floa
     """Returns unit, edge around the map and strip below it [px] for a sheet of a width [px]."""
     unit = _unit(width)
     edge = round(2.0 * unit)
-    return unit, edge, round(_strip(unit, len(site_key(town, street_names, unit, width - 2 * edge))))
+    lines = len(site_key(town, street_names, unit, width - 2 * edge))
+    return unit, edge, round(_strip(unit, lines, _legend_place(town, unit, width)))
+
+
+def _legend_place(town: Town, unit: float, width: float) -> LegendPlace:
+    """Returns the place of the legend on a sheet of a width [px], beside the widest title and scale bar."""
+    whole = width - 4.0 * unit
+    title = max(_title_width(town, fold, unit, width) for fold in (None, *TownFold))
+    return legend_place(unit, whole - title - (_BESIDE_TITLE + _WIDEST_SCALE + _BESIDE_SCALE) * unit, whole)
 
 
 def _unit(width: float) -> float:
@@ -231,9 +295,9 @@ def _unit(width: float) -> float:
     return max(9.0, width / 110.0)
 
 
-def _strip(unit: float, key_lines: int) -> float:
+def _strip(unit: float, key_lines: int, legend: LegendPlace) -> float:
     """Returns the height of the strip below the map [px], with the key of the sites below the legend."""
-    return (11.0 + (0.6 + _KEY_LINE * key_lines if key_lines else 0.0)) * unit
+    return (11.0 + legend.height + (0.6 + _KEY_LINE * key_lines if key_lines else 0.0)) * unit
 
 
 _KEY_LINE = 1.7  # [units] height of a line of the key
@@ -288,33 +352,44 @@ def _draw_sheet(surface: pygame.Surface, painter: MapPainter, fold: str | None) 
     pygame.draw.rect(surface, palette.INK, inner.inflate(2 * gap + 2, 2 * gap + 2), max(1, thick // 3))
     left, top = float(inner.left), inner.bottom + 1.9 * unit
     after = _draw_title(surface, painter.town, unit, left, top, fold)
-    before = _draw_scale(surface, painter.scale, unit, float(inner.right), top)
-    Legend(painter.town, painter.plan, unit).draw(surface, after + 3.5 * unit, before - 3.0 * unit, top)
+    _draw_scale(surface, painter.scale, unit, float(inner.right), top)
+    place = _legend_place(painter.town, unit, width)
+    corner = (left, top + 9.6 * unit) if place.below else (after + _BESIDE_TITLE * unit, top)
+    Legend(painter.town, painter.plan, unit).draw(surface, *corner, place.rows)
     for k, line in enumerate(site_key(painter.town, painter.street_names, unit, width - 2 * edge)):
         text = words(line, _key_type(unit), palette.INK)
-        surface.blit(text, (round(left + 0.2 * unit), round(top + (9.0 + _KEY_LINE * k) * unit)))
+        surface.blit(text, (round(left + 0.2 * unit), round(top + (9.0 + place.height + _KEY_LINE * k) * unit)))
 
 
 def _draw_title(surface: pygame.Surface, town: Town, unit: float, left: float, top: float, fold: str | None) -> float:
     """Draws name and figures; returns their right end [px]."""
+    surface.blit(_title_name(town, unit, surface.get_width()), (round(left), round(top - 0.3 * unit)))
+    for k, fact in enumerate(_title_facts(town, fold)):
+        line = words(fact, _key_type(unit), palette.INK_SOFT)
+        surface.blit(line, (round(left + 0.2 * unit), round(top + (4.5 + 1.7 * k) * unit)))
+    return left + _title_width(town, fold, unit, surface.get_width())
+
+
+def _title_width(town: Town, fold: str | None, unit: float, width: float) -> float:
+    """Returns the width of name and figures on a sheet of a width [px]."""
+    lines = [words(fact, _key_type(unit), palette.INK_SOFT) for fact in _title_facts(town, fold)]
+    return float(max(piece.get_width() for piece in (_title_name(town, unit, width), *lines)))
+
+
+def _title_name(town: Town, unit: float, width: float) -> pygame.Surface:
     name = _spaced(town.name.upper(), round(3.6 * unit), 0.5 * unit)
-    room = _TITLE_SHARE * surface.get_width()
-    if name.get_width() > room:
-        smaller = room / name.get_width()
-        name = _spaced(town.name.upper(), round(3.6 * unit * smaller), 0.5 * unit * smaller)
-    surface.blit(name, (round(left), round(top - 0.3 * unit)))
+    smaller = min(1.0, _TITLE_SHARE * width / max(1, name.get_width()))
+    return name if smaller == 1.0 else _spaced(town.name.upper(), round(3.6 * unit * smaller), 0.5 * unit * smaller)
+
+
+def _title_facts(town: Town, fold: str | None) -> list[str]:
     facts = [
         f"{town.kilometres:.1f} km of lanes  ·  {len(town.lanes)} lanes",
         f"{len(town.streets)} streets  ·  {len(town.junctions)} junctions  ·  {len(town.sites)} sites",
     ]
     if fold is not None:
         facts[0] += f"  ·  {fold}"
-    right = left + float(name.get_width())
-    for k, fact in enumerate(facts):
-        line = words(fact, max(9, round(1.15 * unit)), palette.INK_SOFT)
-        surface.blit(line, (round(left + 0.2 * unit), round(top + (4.5 + 1.7 * k) * unit)))
-        right = max(right, left + float(line.get_width()))
-    return right
+    return facts
 
 
 def _spaced(text: str, size: int, space: float) -> pygame.Surface:
@@ -329,9 +404,13 @@ def _spaced(text: str, size: int, space: float) -> pygame.Surface:
     return line
 
 
-def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float, top: float) -> float:
-    """Draws north arrow and scale bar; returns their left end [px]."""
-    metres = max((n for n in BAR_LENGTHS if n * scale <= 22.0 * unit), default=BAR_LENGTHS[0])
+_BAR, _BESIDE_BAR = 22.0, 6.5  # [units] largest length of the scale bar, and width of north arrow and numbers
+_WIDEST_SCALE = _BAR + _BESIDE_BAR + 2.0
+
+
+def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float, top: float) -> None:
+    """Draws north arrow and scale bar."""
+    metres = max((n for n in BAR_LENGTHS if n * scale <= _BAR * unit), default=BAR_LENGTHS[0])
     length = round(metres * scale)
     centre = right - 1.6 * unit
     for side, ink in ((-1.0, palette.INK), (1.0, palette.INK_SOFT)):
@@ -340,7 +419,7 @@ def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float
         pygame.draw.aalines(surface, ink, True, half.tolist())
     north = words("N", round(1.7 * unit), palette.INK, True)
     surface.blit(north, north.get_rect(midtop=(round(centre), round(top + 4.5 * unit))))
-    left = right - 6.5 * unit - length
+    left = right - _BESIDE_BAR * unit - length
     y, high = top + 4.9 * unit, max(3, round(0.5 * unit))
     for k in range(4):
         a, b = round(left + k * length / 4), round(left + (k + 1) * length / 4)
@@ -350,4 +429,3 @@ def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float
         value = metres * share
         text = words(f"{value:g}" + (" m" if share == 1.0 else ""), max(9, round(1.15 * unit)), palette.INK)
         surface.blit(text, text.get_rect(midbottom=(round(left + share * length), round(y - 0.35 * unit))))
-    return left - 2.0 * unit

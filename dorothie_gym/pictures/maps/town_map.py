@@ -12,21 +12,21 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import Array, Lane, SignalKind
 from dorothie_gym.pictures import palette
+from dorothie_gym.pictures.maps.floating_names import SUPERSAMPLING, draw_name
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.icons import lamp_colour, pin_icon, sign_icon, stamp
 from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.markings import ARROW_LENGTH, one_way_arrow, one_way_places, stop_bar
 from dorothie_gym.pictures.maps.medians import BACK_TO_BACK, pocket_places
-from dorothie_gym.pictures.maps.shapes import Shape, longer, strokes
+from dorothie_gym.pictures.maps.shapes import Shape
 from dorothie_gym.pictures.maps.street_names import Label, LabelPlacer, covering
-from dorothie_gym.pictures.text import set_along, words
+from dorothie_gym.pictures.text import words
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.libraries import pygame
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
 
-SUPERSAMPLING = 2
 GROUND = 14.0
 """Margin of country around the outermost roads [m]."""
 
@@ -34,8 +34,6 @@ _TILE = 1024  # [px] painted at once, so that large maps need little memory
 BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
 _SIGN = (4.2, 54)  # height of signs [m], and upper limit [px]
 _PIN = (2.9, 34)  # radius of pins [m], and upper limit [px]
-_NAME_GROUND = (0.25, 1.04)  # extra length and height of the plain road under a label, relative to the font size
-_HALO = 0.09  # relative to the font size
 
 
 class MapPainter:
@@ -65,6 +63,7 @@ class MapPainter:
         border: float | None = None,
         numbered: bool = False,
         smallest_sign: int = 12,
+        names_on_top: bool = False,
     ) -> None:
         """Fits a town into a picture.
 
@@ -79,6 +78,7 @@ class MapPainter:
             border: width of the country with trees around the roads [m]; by default up to the edge of the picture.
             numbered: whether landmark sites have numbered pins.
             smallest_sign: smallest height of lights and signs at any scale [px].
+            names_on_top: whether the map is painted without names, which are drawn later (`FloatingNames`).
 
         Raises:
             ValueError: `size` leaves no room inside `margin`, or there are too few names.
@@ -99,6 +99,7 @@ class MapPainter:
         )
         border = float(max(size)) / self.scale / 3.0 if border is None else border
         self.plan = MapLayers(town, scale=self.scale, border=border)
+        self._names_on_top = names_on_top
         self._pins = _sized(_PIN, self.scale, 0.7 * smallest_sign) if numbered else 0
         self._signs = _sized(_SIGN, self.scale, smallest_sign)
         placer = LabelPlacer(
@@ -123,6 +124,7 @@ class MapPainter:
         margin: int | tuple[int, int, int, int] = 24,
         type_sizes: tuple[int, int] = (20, 11),
         label_spacing: float = 380.0,
+        names_on_top: bool = False,
     ) -> MapPainter:
         """Returns a painter with a picture of sufficient size at a scale [px/m]; other arguments as in the class."""
         left, top, right, bottom = (margin,) * 4 if isinstance(margin, int) else margin
@@ -136,6 +138,7 @@ class MapPainter:
             type_sizes=type_sizes,
             label_spacing=label_spacing,
             border=GROUND + min(left, top, right, bottom) / scale,
+            names_on_top=names_on_top,
         )
 
     def surface(self, time: float | None = None) -> pygame.Surface:
@@ -203,6 +206,9 @@ class MapPainter:
     def _uncovered(self) -> Iterator[Shape]:
         """Yields the shapes of the map without the arrows, hatchings and dashes that a label would cover partly."""
         lanes, plan = self.town.lanes, self.plan
+        if self._names_on_top:
+            yield from plan.shapes
+            return
         along = np.array([0.0, 0.5, 1.0]) * ARROW_LENGTH
         arrows = [[lanes[a.lane].position(a.station + s) for s in along] for a in plan.arrows]
         places = {
@@ -290,30 +296,13 @@ class MapPainter:
         for k in np.flatnonzero(seen).tolist():
             points = (shapes[k].points - low) * (self.scale * factor)
             pygame.draw.polygon(tile, shapes[k].colour, points.tolist())
-        for label in self.labels:
+        for label in () if self._names_on_top else self.labels:
             path = label.path - corner
             beyond = (path < -3.0 * label.size) | (path > np.array(size) + 3.0 * label.size)
             if beyond.all(axis=0).any():
                 continue
-            _draw_name(tile, label, corner)
+            draw_name(tile, label, corner)
         return pygame.transform.smoothscale(tile, size)
-
-
-def _draw_name(tile: pygame.Surface, label: Label, corner: Array) -> None:
-    """Draws a label on a tile with its corner at a pixel: light on plain road, or dark with a halo beside the road."""
-    size = label.size * SUPERSAMPLING
-    for text, row in zip(label.rows, label.row_paths(), strict=True):
-        line = (row - corner) * SUPERSAMPLING
-        if label.beside:
-            for turn in np.arange(0.0, 2.0 * np.pi, np.pi / 6.0):
-                aside = _HALO * size * np.array([pn.cos(turn), pn.sin(turn)])
-                set_along(tile, text, line + aside, size, palette.SHEET)
-            set_along(tile, text, line, size, palette.INK)
-            continue
-        length, height = (share * size for share in _NAME_GROUND)
-        for piece in strokes(longer(line, length), height, 12):
-            pygame.draw.polygon(tile, palette.ROAD, piece.tolist())
-        set_along(tile, text, line, size, palette.STREET_NAME)
 
 
 def _sized(rule: tuple[float, int], scale: float, smallest: float) -> int:

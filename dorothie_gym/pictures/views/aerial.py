@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.pictures import palette
+from dorothie_gym.pictures.maps.floating_names import Box, FloatingNames, overlap
 from dorothie_gym.pictures.maps.town_map import MapPainter, draw_scale_bar
 from dorothie_gym.pictures.text import font
 from dorothie_gym.pictures.views.sprites import (
@@ -111,6 +112,9 @@ def _value(weather: Mapping[str, float], parameter: WeatherParameter) -> float:
 _WINDOW = 160.0  # [m] across the shorter side when the view follows the car
 _COUNTRY_AROUND = 30.0  # [m] of country around the base map of that view
 _PIN_TYPE = 13  # [px]
+_HEAD, _MARK, _CAR = 12.0, 13.0, 15.0  # [px] half the width of heads of pins, of marks of exceptions, and of the car
+_SPACING = 360.0  # [px] between two labels of the same street
+_PLACES = 0.3  # distance of the possible places of a name, relative to that of names
 _TOWNS_KEPT = 2
 
 
@@ -130,11 +134,11 @@ class AerialView:
         """
         self.size, self._goals_only = size, goals_only
         self._canvas = Canvas(size)
-        self._painters: dict[tuple[object, ...], MapPainter] = {}
+        self._painters: dict[tuple[object, ...], tuple[MapPainter, FloatingNames]] = {}
 
     def draw(self, scene: Scene, follow: bool) -> pygame.Surface:
         """Returns a new surface with the whole town, or with about 160 m of it around the car."""
-        painter = self._painter(scene, follow)
+        painter, names = self._painter(scene, follow)
         car = np.array([scene.car.x, scene.car.y])
         if follow:
             picture = painter.window(car, self.size, scene.time)
@@ -145,14 +149,31 @@ class AerialView:
         apply_weather(picture, scene.weather, scene.time)
         canvas = self._canvas
         canvas.begin(painter.scale, painter.origin + corner / painter.scale)
+        self._draw_ways(canvas, scene)
+        canvas.blit_on(picture)
+        boxes = names.draw(picture, self._kept_free(canvas, scene), corner)
+        canvas.begin(painter.scale, painter.origin + corner / painter.scale)
         self._draw_traffic(canvas, scene)
-        names = [_around(label.path - corner) for label in painter.labels]
-        self._draw_pins(canvas, scene, follow, names)
+        self._draw_pins(canvas, scene, follow, boxes)
         canvas.blit_on(picture)
         draw_scale_bar(picture, painter.scale, (14, self.size[1] - 14), 150)
         return picture
 
-    def _painter(self, scene: Scene, follow: bool) -> MapPainter:
+    def _kept_free(self, canvas: Canvas, scene: Scene) -> list[Box]:
+        """Returns boxes that street names leave free: of the scale bar, the car, the marks of exceptions, and pins."""
+        found = [self._scale_bar, _square(canvas.pixel((scene.car.x, scene.car.y)), _CAR)]
+        for mark in scene.exceptions:
+            found.append(_square(canvas.pixel((mark.x, mark.y)), _MARK))
+        for pin in scene.landmarks:
+            tip, (x, y) = canvas.pixel((pin.x, pin.y)), _head(canvas, pin).tolist()
+            found += [_square(tip, 2.0), _square(np.array([x, y]), _HEAD)]
+        return found
+
+    @property
+    def _scale_bar(self) -> Box:
+        return 14.0, self.size[1] - 48.0, 210.0, 34.0
+
+    def _painter(self, scene: Scene, follow: bool) -> tuple[MapPainter, FloatingNames]:
         names = None if scene.street_names is None else tuple(scene.street_names)
         # the painter keeps its town alive, so that its id stays unique as long as the entry
         key = (id(scene.town), names, follow)
@@ -166,25 +187,38 @@ class AerialView:
                     scale,
                     street_names=names,
                     type_sizes=(18, 12),
-                    label_spacing=360.0,
+                    label_spacing=_PLACES * _SPACING,
                     margin=round(_COUNTRY_AROUND * scale),
+                    names_on_top=True,
                 )
             else:
                 margin = (20, 40, 20, 52)
-                made = MapPainter(scene.town, size=self.size, street_names=names, margin=margin, type_sizes=(16, 11))
-            self._painters[key] = made
+                made = MapPainter(
+                    scene.town,
+                    size=self.size,
+                    street_names=names,
+                    margin=margin,
+                    type_sizes=(16, 11),
+                    label_spacing=_PLACES * _SPACING,
+                    names_on_top=True,
+                )
+            self._painters[key] = made, FloatingNames(made.labels, _SPACING)
         return self._painters[key]
 
-    def _draw_traffic(self, canvas: Canvas, scene: Scene) -> None:
+    def _draw_ways(self, canvas: Canvas, scene: Scene) -> None:
+        """Draws what lies below street names: the driven and the planned path."""
         car = scene.car
-        at = np.array([car.x, car.y])
         if car.lights:
-            draw_headlights(canvas, at, car.heading, car.length, car.width)
+            draw_headlights(canvas, np.array([car.x, car.y]), car.heading, car.length, car.width)
         draw_trail(canvas, scene.trail)
         draw_direction(canvas, scene.trail)
         if len(scene.trail):
             draw_start(canvas, scene.trail[0])
         draw_waypoints(canvas, scene.waypoints)
+
+    def _draw_traffic(self, canvas: Canvas, scene: Scene) -> None:
+        car = scene.car
+        at = np.array([car.x, car.y])
         for estimate in scene.estimates:
             colour = palette.STATE["none"] if estimate.label else palette.CAR
             draw_estimate(canvas, np.array([estimate.x, estimate.y]), estimate.covariance, colour)
@@ -197,10 +231,9 @@ class AerialView:
                 draw_exception(canvas, np.array([mark.x, mark.y]), number)
         draw_car(canvas, at, car.heading, car.length, car.width)
 
-    def _draw_pins(self, canvas: Canvas, scene: Scene, follow: bool, names: list[_Box]) -> None:
-        taken: list[_Box] = [(14.0, self.size[1] - 48.0, 210.0, 34.0)]  # the scale bar
-        x, y = canvas.pixel((scene.car.x, scene.car.y)).tolist()
-        taken.append((x - 15.0, y - 15.0, 30.0, 30.0))
+    def _draw_pins(self, canvas: Canvas, scene: Scene, follow: bool, names: list[Box]) -> None:
+        taken: list[Box] = [self._scale_bar]
+        taken.append(_square(canvas.pixel((scene.car.x, scene.car.y)), _CAR))
         seen: list[Pin] = []
         away: list[Pin] = []
         for pin in scene.landmarks:
@@ -210,7 +243,7 @@ class AerialView:
             done = pin.state == "complete"
             draw_pin(canvas, np.array([pin.x, pin.y]), np.array(pin.waypoint), colour, pin.hidden and not done, done)
             x, y = _head(canvas, pin).tolist()
-            taken.append((x - 12, y - 12, 24, 24))
+            taken.append(_square(np.array([x, y]), _HEAD))
         for pin in seen:
             self._write_name(canvas, pin, taken, names)
         if follow:
@@ -219,23 +252,23 @@ class AerialView:
                     continue
                 self._point_to(canvas, pin, taken)
 
-    def _write_name(self, canvas: Canvas, pin: Pin, taken: list[_Box], names: list[_Box]) -> None:
+    def _write_name(self, canvas: Canvas, pin: Pin, taken: list[Box], names: list[Box]) -> None:
         """Draws the name of a pin on the side where it covers least."""
         x, y = _head(canvas, pin).tolist()
         width, height = font(_PIN_TYPE, True).size(pin.label)[0] + 14, 22
-        options: list[_Box] = [
+        options: list[Box] = [
             (x + 15, y - height / 2, width, height),
             (x - 15 - width, y - height / 2, width, height),
             (x - width / 2, y - 17 - height, width, height),
             (x - width / 2, y + 17, width, height),
         ]
-        box = min(options, key=lambda b: sum(_overlap(b, other) for other in (*taken, *names)) + self._lost(b))
+        box = min(options, key=lambda b: sum(overlap(b, other) for other in (*taken, *names)) + self._lost(b))
         taken.append(box)
-        colour = palette.STATE[pin.state]
-        canvas.box(box, palette.PAPER, colour)
-        canvas.text(pin.label, box[0] + 7, box[1] + height / 2, _PIN_TYPE, colour, bold=True)
+        canvas.box(box, palette.PAPER, palette.STATE[pin.state])
+        ink = palette.STATE_INK[pin.state]
+        canvas.text(pin.label, box[0] + 7, box[1] + height / 2, _PIN_TYPE, ink, bold=True)
 
-    def _point_to(self, canvas: Canvas, pin: Pin, taken: list[_Box]) -> None:
+    def _point_to(self, canvas: Canvas, pin: Pin, taken: list[Box]) -> None:
         """Draws a note at the edge of the picture with the direction of a landmark outside it."""
         centre = np.array(self.size) / 2.0
         direction = canvas.pixel((pin.x, pin.y)) - centre
@@ -248,7 +281,7 @@ class AerialView:
         # One note above the other where several landmarks lie in the same direction.
         step = -(height + 4.0) if direction[1] > 0 else height + 4.0
         for _ in range(12):
-            if not any(_overlap(box, other) for other in taken):
+            if not any(overlap(box, other) for other in taken):
                 break
             box = (box[0], box[1] + step, width, height)
         taken.append(box)
@@ -260,12 +293,12 @@ class AerialView:
         canvas.pixel_polygon(
             np.array([tip + 6 * unit, tip - 4 * unit + 4.5 * side, tip - 4 * unit - 4.5 * side]), colour
         )
-        canvas.text(text, box[0] + 25, box[1] + height / 2, _PIN_TYPE - 1, colour)
+        canvas.text(text, box[0] + 25, box[1] + height / 2, _PIN_TYPE - 1, palette.STATE_INK[pin.state])
 
-    def _lost(self, box: _Box) -> float:
+    def _lost(self, box: Box) -> float:
         """Returns twice the area of a box outside the picture [px2]."""
         _x, _y, width, height = box
-        inside = _overlap(box, (0.0, 0.0, float(self.size[0]), float(self.size[1])))
+        inside = overlap(box, (0.0, 0.0, float(self.size[0]), float(self.size[1])))
         return 2.0 * (width * height - inside)
 
 
@@ -275,17 +308,7 @@ def _head(canvas: Canvas, pin: Pin) -> NDArray[np.float64]:
     return canvas.pixel(at) + PIN_LENGTH * pin_direction(at, np.array(pin.waypoint))
 
 
-_Box = tuple[float, float, float, float]
-
-
-def _around(path: NDArray[np.float64]) -> _Box:
-    """Returns the box around the path (n, 2) [px] of a label."""
-    (left, top), (right, bottom) = (path.min(axis=0) - 7.0).tolist(), (path.max(axis=0) + 7.0).tolist()
-    return left, top, right - left, bottom - top
-
-
-def _overlap(a: _Box, b: _Box) -> float:
-    """Returns the common area of two boxes (x, y, width, height)."""
-    wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-    high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-    return max(0.0, wide) * max(0.0, high)
+def _square(centre: NDArray[np.float64], half: float) -> Box:
+    """Returns a box around a point (2,) [px]."""
+    x, y = centre.tolist()
+    return x - half, y - half, 2.0 * half, 2.0 * half

@@ -78,7 +78,7 @@ class Panel:
         line = f"{scene.caption}  ·  {sky}" if scene.caption else sky
         room = width - 2 * _PAD
         if scene.car.lights:
-            pen.text("lights on", width - _PAD, 66, 13, palette.STATE["pending"], align=1.0)
+            pen.text("lights on", width - _PAD, 66, 13, palette.STATE_INK["pending"], align=1.0)
             room -= 76
         pen.text(shorten(line, 13, room), _PAD, 66, 13, palette.INK_SOFT)
         pen.line(_PAD, 86, width - _PAD)
@@ -94,7 +94,7 @@ class Panel:
             middle = top + 11
             pen.tick_box(_PAD + 8, middle, colour, state)
             ink = (
-                colour
+                palette.STATE_INK[state]
                 if state in ("complete", "ongoing")
                 else palette.INK_SOFT
                 if state == "abandoned"

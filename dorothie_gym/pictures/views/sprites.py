@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dorothie_gym.pictures import palette
+from dorothie_gym.pictures.maps.floating_names import SUPERSAMPLING
 from dorothie_gym.pictures.maps.shapes import disc, place, stroke
-from dorothie_gym.pictures.maps.town_map import SUPERSAMPLING
 from dorothie_gym.pictures.text import words
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm

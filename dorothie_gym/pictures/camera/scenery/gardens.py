@@ -70,9 +70,9 @@ def add_garden(builder: MeshBuilder, garden: Garden, plot: Plot, ground: Heights
             case Garden.HEDGE:
                 run.box((0.0, min(_HEDGE[0], plot.depth)), _HEDGE[1], _LEAVES[plot.tone % len(_LEAVES)])
             case Garden.FENCE:
-                run.fence(0.4 if fine else 1.6)
+                run.fence(0.4 if fine else 2.2)
             case Garden.FLOWERS:
-                run.flowers(0.55 if fine else 1.1)
+                run.flowers(0.55 if fine else 1.4)
 
 
 class _Run:
@@ -124,13 +124,11 @@ class _Run:
             middle = low + (k + 0.5) * (high - low) / count
             bloom = _BLOOMS[(self._plot.tone + k) % len(_BLOOMS)]
             half = min(0.42 * distance, 0.3)
-            self._builder.prism(
-                self._corners((0.1 * deep, 0.9 * deep), (middle - half, middle + half)),
-                self._high + _BED[1],
-                self._high + _BED[1] + 0.3,
-                top=self._corners((0.4 * deep, 0.6 * deep), (middle - 0.3 * half, middle + 0.3 * half)),
-                colour=bloom, kind=ObjectClass.VEGETATION,
-            )  # fmt: skip
+            feet = self._corners((0.1 * deep, 0.9 * deep), (middle - half, middle + half))
+            ring = np.column_stack((feet, np.full(4, self._high + _BED[1])))
+            tip = np.array([*feet.mean(axis=0), self._high + _BED[1] + 0.4])
+            sides = [[ring[(side + 1) % 4], tip, ring[side]] for side in range(4)]
+            self._builder.triangles(sides, colour=bloom, kind=ObjectClass.VEGETATION)
 
 
 @lru_cache(maxsize=SHRUBS)
@@ -139,10 +137,10 @@ def shrub_form(form: int) -> Mesh:
     rng = np.random.default_rng(100 + form)
     builder = MeshBuilder()
     leaves = np.array(_LEAVES[form % len(_LEAVES)], dtype=np.float64)
-    add_clump(builder, (0.0, 0.0, 0.5), (1.0, 0.75), leaves, rng, sides=5)
+    add_clump(builder, (0.0, 0.0, 0.35), (1.0, 0.9), leaves, rng, sides=5, open_below=True)
     if form % 2:
         bloom = np.array(_BLOOMS[form // 2 % len(_BLOOMS)], dtype=np.float64)
-        add_clump(builder, (0.15, 0.1, 0.95), (0.6, 0.42), bloom, rng, sides=4)
+        add_clump(builder, (0.15, 0.1, 0.95), (0.6, 0.42), bloom, rng, sides=3, open_below=True)
     return builder.build()
 
 

@@ -29,7 +29,7 @@ _TREE: Final = 1.2  # [m] radius of the crown of a garden tree
 _TREE_PLACES: Final = ((-1.6, -0.3), (-1.6, 0.3), (2.0, -0.5), (2.0, 0.5))
 """Places of a garden tree: metres behind the front, and to the right relative to the length, one crown further out."""
 
-_EVERY: Final = 15.0  # [m] of the edge of a road for each shrub
+_EVERY: Final = 24.0  # [m] of the edge of a road for each shrub
 _AWAY: Final = 4.5, 15.0  # [m] from the edge of the road to shrubs
 _RADII: Final = 0.45, 1.0  # [m]
 
@@ -73,7 +73,7 @@ def build_lawns(layers: MapLayers, clearance: Clearance, buildings: list[Buildin
             add_garden(builder, garden, plot, ground, fine=False)
     places = np.array(trees).reshape(-1, 2)
     feet = np.column_stack((places, feet_on(ground, places)))
-    planted = stamped(small_tree(), feet, np.arange(len(places)) * 1.7, np.full(len(places), _TREE))
+    planted = stamped(small_tree(), feet, np.linspace(0.0, 1.7 * len(places), len(places)), np.full(len(places), _TREE))
     return joined([builder.build(), planted, *_shrubs(layers, room, ground)])
 
 

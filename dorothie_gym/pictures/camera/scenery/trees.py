@@ -72,7 +72,7 @@ def tree_form(form: int) -> Mesh:
     for k in range(2):
         heading = 2.6 * k + form
         at = (0.42 * pn.cos(heading), 0.42 * pn.sin(heading), 2.25 + 0.2 * k)
-        add_clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=5)
+        add_clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=5, open_below=True)
     return builder.build()
 
 
@@ -83,8 +83,20 @@ def add_clump(
     colour: Array,
     rng: np.random.Generator,
     sides: int,
+    *,
+    open_below: bool = False,
 ) -> None:
-    """Adds an uneven ball of leaves, darker below."""
+    """Adds an uneven ball of leaves, darker below.
+
+    Args:
+        builder: receives the triangles.
+        centre: (x, y, z) [m].
+        radii: across and upwards [m].
+        colour: (3,).
+        rng: chooses the unevenness.
+        sides: number of sides.
+        open_below: whether the lower end is left out, because it is hidden.
+    """
     wide, high = radii
     levels = (0.0, 0.36, 0.68, 1.0)
     turns = np.arange(sides) * (2.0 * np.pi / sides)
@@ -98,7 +110,7 @@ def add_clump(
     corner = np.arange(sides)
     after = (corner + 1) % sides
     steps = corner / sides * 4.0
-    for k, (upper, lower) in enumerate(pairwise(rings)):
+    for k, (upper, lower) in enumerate(pairwise(rings[:-1] if open_below else rings)):
         shade = colour * (1.08, 0.95, 0.72)[k]
         corners = np.concatenate(
             (np.stack((lower, lower[after], upper[after]), axis=1), np.stack((lower, upper[after], upper), axis=1))
