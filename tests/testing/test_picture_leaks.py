@@ -33,7 +33,7 @@ SENSORS = EnvConfig(
         "rear": CameraConfig(width=60, height=40, mount=CameraMount(yaw=180.0)),
     },
     sensors=SensorConfig(
-        lidar=LidarConfig(channels=16, columns=180, range=60.0, outputs=tuple(LidarOutput)),
+        lidar=LidarConfig(channels=16, columns=180, range=40.0, outputs=tuple(LidarOutput)),
         radar=RadarConfig(), imu=True, gnss=True, lane_invasion=True, collision=True,
     ),
     world=CONFIG.world,
@@ -66,7 +66,7 @@ def test_hidden_landmarks_change_no_picture_while_out_of_view(town: str, config:
     env, pictures = DuoWizardEnv(town, config=config), 0
     for seed in [seed for seed in range(30) if has_hidden(town, seed)][:2]:
         pictures += check_hidden_landmarks(env, play_scripted, seed, 30).pictures
-    assert pictures > 10
+    assert pictures > 8
 
 
 @pytest.mark.slow
