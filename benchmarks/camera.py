@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, TypeAlias
 
@@ -21,13 +21,14 @@ from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.pictures.camera.pose import CameraPose, pose_on_car
-from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.session_pictures import scene_of
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.policies import make_policy
 from dorothie_gym.session.config import CameraConfig, CameraMount, CameraOutput, EnvConfig
+from dorothie_gym.session.sensor_config import SensorMount
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.support.user_cache import CACHE_VARIABLE
@@ -112,19 +113,10 @@ def measure(
         TownError: there is no such town, or its file is invalid.
     """
     progress("drive", 0.0)
-    engine = SessionEngine(
-        load_town(town),
-        config=EnvConfig(
-            decision_frequency=DRIVE_FREQUENCY,
-            max_seconds=seconds,
-            world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians),
-        ),
-    )
+    engine = _engine(town, vehicles, pedestrians, seconds)
     drive = _drive(engine, seed)
-    places = _places(engine.town, drive[-1])
-    scenario = engine.session.scenario
-    names = [name.label for name in scenario.street_names]
-    scene = SessionScene(town_scene(engine.town), names, scenario.storyboard.landmarks)
+    places = _places(engine.town, drive[-1], CameraMount())
+    scene = scene_of(engine.town, engine.scenario)
     kinds = [(size, parts, True) for size in sizes for parts in outputs]
     kinds += [(size, RGB, False) for size in sizes if RGB in outputs]
     kinds.sort(key=lambda kind: (kind[0], len(kind[1]), not kind[2]))
@@ -165,6 +157,30 @@ def measure(
     }
 
 
+def _engine(town: str, vehicles: int, pedestrians: int, seconds: float) -> SessionEngine:
+    return SessionEngine(
+        load_town(town),
+        config=EnvConfig(
+            decision_frequency=DRIVE_FREQUENCY,
+            max_seconds=seconds,
+            world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians),
+        ),
+    )
+
+
+def crowded_places(town: str, *, vehicles: int, pedestrians: int, seed: int) -> tuple[SessionScene, list[Shot], str]:
+    """Returns the scene of a session, views all over its town after 10 s, with a camera on the road, and its name."""
+    engine = _engine(town, vehicles, pedestrians, 60.0)
+    engine.reset(seed=seed)
+    world = engine.session.world
+    world.step(10 * FRAME_RATE)
+    crowd = Shot(CameraPose(0.0, 0.0, 0.0, 0.0), world.actors.arrays.copy(), world.weather, world.time, lights=False)
+    on_road = SensorMount(up=0.2)
+    shots = _places(engine.town, crowd, on_road)
+    road = [replace(shot, pose=replace(shot.pose, z=shot.pose.z - on_road.up)) for shot in shots]
+    return scene_of(engine.town, engine.scenario), road, engine.town.name
+
+
 def _drive(engine: SessionEngine, seed: int) -> list[Shot]:
     """Returns the camera's view at each decision of a session of the scripted participant and Co-Wizard."""
     shots: list[Shot] = []
@@ -186,7 +202,7 @@ def _drive(engine: SessionEngine, seed: int) -> list[Shot]:
     return shots
 
 
-def _places(town: Town, crowd: Shot) -> list[Shot]:
+def _places(town: Town, crowd: Shot, mount: SensorMount) -> list[Shot]:
     """Returns views from the middles of lanes all over a town, with the bodies of another view."""
     lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length >= _SHORTEST]
     chosen = [lanes[k * len(lanes) // PLACES] for k in range(PLACES)]
@@ -194,7 +210,7 @@ def _places(town: Town, crowd: Shot) -> list[Shot]:
     for lane in chosen:
         station = 0.5 * lane.length
         x, y = lane.position(station).tolist()
-        pose = pose_on_car(CameraMount(), x, y, lane.height_at(station), lane.heading_at(station))
+        pose = pose_on_car(mount, x, y, lane.height_at(station), lane.heading_at(station))
         shots.append(Shot(pose, crowd.arrays, crowd.weather, crowd.time, lights=False))
     return shots
 

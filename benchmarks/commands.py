@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
 
-SIMULATING: Final = ("world", "env", "vector", "camera", "rl", "speech", "sessions")
+SIMULATING: Final = ("world", "env", "vector", "camera", "lidar", "rl", "speech", "sessions")
 """Measurements of the simulation, which is compiled first."""
 
 BATCHES: Final = ("vector", "rl")
@@ -35,7 +35,7 @@ app = typer.Typer(
     name="python -m benchmarks",
     cls=CommandGroup,
     help="Measure speeds, each with a reference in the same run: world, environment of three agents, "
-    "batches of worlds, camera, speech, understanding, training, and import time.",
+    "batches of worlds, camera, lidar, speech, understanding, training, and import time.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -133,7 +133,7 @@ def camera(
     ] = None,
     outputs: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAMES", help="all, or of rgb,depth,semantic,instance,boxes; repeatable."),
+        typer.Option(metavar="NAMES", help="all, or some such as rgb,depth,optical_flow; repeatable."),
     ] = None,
     vehicles: Vehicles = 60,
     pedestrians: Pedestrians = 60,
@@ -158,6 +158,26 @@ def camera(
         )  # fmt: skip
 
     _run("camera", measured, picture, as_json, pictures=True)
+
+
+@app.command(cls=PictureCommand)
+def lidar(
+    town: Town = "midtown",
+    vehicles: Vehicles = 60,
+    pedestrians: Pedestrians = 60,
+    seed: Seed = 0,
+    repeats: Repeats = 5,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Turns of the lidar per second by channels and columns, on one core, compared with the ray casting of Embree."""
+
+    def measured(progress: Progress) -> Figures:
+        from benchmarks.lidar import measure
+
+        return measure(town, vehicles=vehicles, pedestrians=pedestrians, seed=seed, repeats=repeats, progress=progress)
+
+    _run("lidar", measured, picture, as_json, pictures=True)
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -277,6 +277,29 @@ def camera_report(figures: Figures) -> Report:
     )
 
 
+def lidar_report(figures: Figures) -> Report:
+    """Returns the summary of `lidar.measure`."""
+    rows = []
+    if figures["embree"] is not None:
+        value = 1000.0 / figures["embree"]["milliseconds"]
+        rows.append(Measurement(label="Embree, triangles only\n32 x 720", value=value, reference=True))
+    for row in figures["rows"]:
+        label = f"{row['channels']} x {row['columns']}\n{number(row['milliseconds'])} ms"
+        label += f", slowest {number(row['milliseconds_worst'])}"
+        rows.append(Measurement(label=label, value=_rate(row)))
+    first = figures["rows"][0]
+    return Report(
+        title="Lidar",
+        setting=f"{figures['town']}: {_count(figures['vehicles'], 'vehicle')}, "
+        f"{_count(figures['pedestrians'], 'pedestrian')}, mean over {_count(figures['places'], 'place')}; one core",
+        headline=f"{number(_rate(first))} turns of {first['channels']} x {first['columns']} rays per second",
+        unit="turns per second",
+        rows=tuple(rows),
+        notes=() if figures["embree"] is not None else ("embreex is not installed",),
+        machine=machine_line(figures["machine"]),
+    )
+
+
 def sessions_report(figures: Figures) -> Report:
     """Returns the summary of `sessions.measure`."""
     rows, notes = [], []

@@ -36,17 +36,21 @@ from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import fold_of, load_town
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, LandmarkName, WeatherParameter
 from dorothie_gym.pictures import town_picture
+from dorothie_gym.pictures.camera.body_snapshots import snapshot_of
 from dorothie_gym.pictures.camera.pose import pose_on_car
+from dorothie_gym.pictures.camera.range_sensors import CarState, Lidar
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.pictures.camera.scene_cache import town_scene
-from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.session_camera import EarlierWorld, SessionCamera
+from dorothie_gym.pictures.camera.session_pictures import scene_of
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.pictures.views.playback import Playback
 from dorothie_gym.pictures.views.session_views import SessionRenderer
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction
-from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, RenderView
+from dorothie_gym.session.config import CameraConfig, CameraMount, CameraOutput, EnvConfig, RenderView
 from dorothie_gym.session.recording import Session
+from dorothie_gym.session.sensor_config import LidarConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
@@ -186,6 +190,60 @@ def draw_camera(path: Path) -> None:
     _reduce(path)
 
 
+SENSORS_TOWN, SENSORS_SEED, SENSORS_LANDMARK = "midtown", 3, LandmarkName.IKEA
+FLOW_SCALE = 6.0
+"""Brightness of a movement of one pixel."""
+
+
+def draw_sensors(path: Path) -> None:
+    """Draws what several cameras and the lidar of a car show at one moment."""
+    engine = SessionEngine(SENSORS_TOWN, config=EnvConfig(world=WorldConfig(vehicles=60, pedestrians=60)))
+    engine.reset(seed=SENSORS_SEED)
+    world = engine.session.world
+    world.step(600)
+    scene = scene_of(engine.town, engine.scenario)
+    mark = next(mark for mark in scene.landmarks if mark.name is SENSORS_LANDMARK)
+    lane, station = engine.town.lanes[mark.lane], max(mark.station - 26.0, 0.0)
+    (x, y), before = lane.position(station).tolist(), lane.position(station - 1.5).tolist()
+    height, heading = lane.height_at(station), lane.heading_at(station)
+    earlier = EarlierWorld(*before, height, heading, snapshot_of(world.actors.arrays))
+    world.step(4)
+    size, parts = {"width": 320, "height": 240}, tuple(CameraOutput)
+    front = SessionCamera(scene, CameraConfig(**size, outputs=parts, metres_per_pixel=0.2))
+    arrays, weather = world.actors.arrays, world.weather
+    frame = front.render_from(front.pose_on(x, y, height, heading), arrays, weather, time=world.time, before=earlier)
+    sides = []
+    for yaw in (-90.0, 90.0, 180.0):
+        camera = SessionCamera(scene, CameraConfig(**size, mount=CameraMount(yaw=yaw)))
+        sides.append(
+            camera.render_from(camera.pose_on(x, y, height, heading), arrays, weather, time=world.time).colours
+        )
+    flow = np.asarray(frame.optical_flow)
+    moved = np.concatenate((128.0 + FLOW_SCALE * flow, np.full((*flow.shape[:2], 1), 128.0)), axis=-1)
+    faces = 127.5 + 127.5 * np.asarray(frame.normals)
+    lidar = Lidar(scene, LidarConfig())
+    turn = lidar.turn(CarState(x, y, height, heading, 0.0), arrays, weather)
+    pictures = [
+        sides[0], frame.colours, sides[1],
+        sides[2], np.clip(moved, 0.0, 255.0).astype(np.uint8), faces.astype(np.uint8),
+        CLASS_COLOURS[frame.classes], CLASS_COLOURS[np.asarray(frame.birds_eye)],
+        _plot_lidar(turn.points, turn.semantic, (240, 320)),
+    ]  # fmt: skip
+    rows = [np.concatenate(pictures[k : k + 3], axis=1) for k in (0, 3, 6)]
+    Image.fromarray(np.concatenate(rows)).save(path)
+    _reduce(path)
+
+
+def _plot_lidar(points: NDArray[np.float32], classes: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Returns the returns of a lidar from above, the car in the centre, 0.2 m in a pixel, in the colours of classes."""
+    picture = np.zeros((*size, 3), np.uint8)
+    rows = np.floor(0.5 * size[0] - points[..., 0] / 0.2).astype(int)
+    columns = np.floor(0.5 * size[1] + points[..., 1] / 0.2).astype(int)
+    inside = (points[..., 3] > 0.0) & (rows >= 0) & (rows < size[0]) & (columns >= 0) & (columns < size[1])
+    picture[rows[inside], columns[inside]] = CLASS_COLOURS[classes[inside]]
+    return picture
+
+
 DASHBOARD_DECISIONS = (20, 44, 52, 66)
 
 
@@ -295,6 +353,7 @@ PICTURES: Final[Mapping[str, Callable[[Path], None]]] = {
     "windscreen": draw_windscreen,
     "film": draw_film,
     "camera": draw_camera,
+    "sensors": draw_sensors,
     "dashboard": draw_dashboard,
     "bench_world": draw_benchmark,
     "leaderboard": draw_leaderboard,

@@ -74,14 +74,15 @@ def _export(rate: float, size: str, outputs: str | None, layout: str) -> rollout
         fail(f"--size is {size!r}; it must be like 480x320")
     if layout not in [each.value for each in rollouts.FrameLayout]:
         fail(f"--layout is {layout!r}; it must be one of {', '.join(rollouts.FrameLayout)}")
-    from dorothie_gym.session.config import CameraConfig, CameraOutput
+    from dorothie_gym.evaluation.rollout.frame_export import WRITTEN_OUTPUTS
+    from dorothie_gym.session.config import CameraConfig
 
-    known = [output.value for output in CameraOutput]
+    known = [output.value for output in WRITTEN_OUTPUTS]
     named = known if outputs is None else outputs.split(",")
     unknown = [name for name in named if name not in known]
     if unknown:
         fail(f"--outputs has {unknown[0]!r}; it must be of {', '.join(known)}")
-    chosen = tuple(output for output in CameraOutput if output.value in named)
+    chosen = tuple(output for output in WRITTEN_OUTPUTS if output.value in named)
     try:
         camera = CameraConfig(width=int(width), height=int(height), outputs=chosen)
         return rollouts.FrameExport(rate=rate, camera=camera, layout=rollouts.FrameLayout(layout))

@@ -157,8 +157,6 @@ def _collisions(events: Sequence[WorldEvent]) -> Array:
     table = np.zeros((COLLISIONS, len(CollisionColumn)))
     found = [event for event in events if event.kind is WorldEventKind.COLLISION]
     for row, event in zip(table, found, strict=False):
-        row[CollisionColumn.KIND] = parse_object_class(str(event.data["other"])).value
-        row[CollisionColumn.SPEED] = event.data["speed"]
-        row[CollisionColumn.OWN_FAULT] = event.data["own_fault"]
-        row[CollisionColumn.TIME] = event.frame / FRAME_RATE
+        kind, speed = parse_object_class(str(event.data["other"])), float(str(event.data["speed"]))
+        row[:] = kind.value, speed, bool(event.data["own_fault"]), event.frame / FRAME_RATE
     return table

@@ -149,12 +149,10 @@ class LiveSession:
         """Processes the events of a step of the world; returns the reward terms."""
         for event in events:
             self.log.add_world_event(event)
-        if self.observer.sensors is not None:
-            self.observer.sensors.update(events)
         self.note_arrivals()
         self.observer.delivered = self._deliver(begun.message)
         self.note_place()
-        self.observer.look()
+        self.observer.look(events)
         return self.config.rewards.terms(
             reached=self._subgoals.reached - begun.reached,
             success=self.success,
@@ -176,10 +174,6 @@ class LiveSession:
     def picture(self) -> CameraFrame | None:
         """Picture of the camera on the car at the current decision, boxes included; None without a camera."""
         return self.observer.picture(self.decisions)
-
-    def picture_of(self, camera: str) -> CameraFrame | None:
-        """Returns the picture of one of `EnvConfig.cameras` at the current decision; None without such a camera."""
-        return self.observer.picture(self.decisions, camera)
 
     def end(self, reason: str) -> None:
         """Closes the session."""
@@ -207,8 +201,7 @@ class LiveSession:
         """Counts a decision and forgets the events of the last one."""
         self.decisions += 1
         self.log.clear()
-        if self.observer.sensors is not None:
-            self.observer.sensors.begin_decision()
+        self.observer.begin_decision()
 
     def play_ad_wizard(self, action: RoleAction) -> str:
         """Carries out an action of the Ad-Wizard; returns its message to the participant."""

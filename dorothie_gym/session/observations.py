@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
     from dorothie_gym.session.beliefs import BeliefTracker
     from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.sim.traffic_rules import WorldEvent
     from dorothie_gym.sim.world import World
     from dorothie_gym.tasks.storyboard import Landmark, TaskState
 
@@ -427,8 +428,15 @@ class SessionObserver:
         self.write()
         self._views.write(EVERYTHING)
 
-    def look(self) -> None:
-        """Looks at the picture of another decision, if the roles see by the camera."""
+    def begin_decision(self) -> None:
+        """Lets the sensors note the present before the world is stepped."""
+        if self.sensors is not None:
+            self.sensors.begin_decision()
+
+    def look(self, events: Sequence[WorldEvent]) -> None:
+        """Reads the sensors after a step of the world, and looks at its picture if the roles see by the camera."""
+        if self.sensors is not None:
+            self.sensors.update(events)
         if self.camera_perception is not None:
             self.camera_perception.look()
             self._beliefs.recognised = self.camera_perception.recognised

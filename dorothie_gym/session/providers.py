@@ -19,7 +19,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.car_sensors import CrossedLines, car_sensor_fields
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.sensor_config import LidarConfig, LidarOutput, RadarConfig
-from dorothie_gym.session.spaces.fields import dict_space
+from dorothie_gym.session.spaces.fields import UNBOUNDED, dict_space
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.conversation import Utterance
@@ -185,7 +185,7 @@ def picture_spaces(config: CameraConfig, name: str = "") -> dict[str, spaces.Box
         CameraOutput.DEPTH: spaces.Box(0.0, np.inf, size, np.float32),
         CameraOutput.SEMANTIC: spaces.Box(0, 255, size, np.uint8),
         CameraOutput.INSTANCE: spaces.Box(int(_KEYS.min), int(_KEYS.max), size, np.int32),
-        CameraOutput.OPTICAL_FLOW: spaces.Box(-np.inf, np.inf, (*size, 2), np.float32),
+        CameraOutput.OPTICAL_FLOW: spaces.Box(-UNBOUNDED, UNBOUNDED, (*size, 2), np.float32),
         CameraOutput.NORMALS: spaces.Box(-1.001, 1.001, (*size, 3), np.float32),
         CameraOutput.BIRDS_EYE: spaces.Box(0, 255, size, np.uint8),
     }
@@ -203,7 +203,7 @@ def _lidar_spaces(config: LidarConfig) -> dict[str, spaces.Box]:
 
 
 def _radar_spaces(config: RadarConfig) -> dict[str, spaces.Box]:
-    return {RADAR_FIELD: spaces.Box(-np.inf, np.inf, (config.rows * config.columns, 4), np.float32)}
+    return {RADAR_FIELD: spaces.Box(-UNBOUNDED, UNBOUNDED, (config.rows * config.columns, 4), np.float32)}
 
 
 def sensor_spaces(config: EnvConfig, role: Role) -> dict[str, spaces.Space[Any]]:

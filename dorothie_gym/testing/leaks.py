@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 import numpy as np
 
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.pictures.camera.range_sensors import Lidar, Radar
 from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
-from dorothie_gym.pictures.camera.session_camera import SessionCamera
-from dorothie_gym.pictures.camera.session_pictures import camera_of
+from dorothie_gym.pictures.camera.session_pictures import camera_of, car_state, scene_of
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA
+from dorothie_gym.session.car_sensors import car_sensor_fields
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, PerceptionModel
-from dorothie_gym.session.providers import FIELDS, OBSERVERS
+from dorothie_gym.session.providers import OBSERVERS, sensor_spaces
 from dorothie_gym.session.scenario import Scenario, draw_scenario
 from dorothie_gym.session.spaces.actions import noop
+from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.storyboard import TaskMessages
 from dorothie_gym.testing.playing import (
     ByAgent,
@@ -30,13 +32,14 @@ from dorothie_gym.testing.playing import (
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
+    from dorothie_gym.sim.world import World
 
 CO_WIZARD = str(Role.CO_WIZARD)
 AD_WIZARD = str(Role.AD_WIZARD)
 PARTICIPANT = str(Role.PARTICIPANT)
 
-PICTURES: Final = frozenset(FIELDS.values())
-"""Fields of observations that are pictures."""
+_BESIDE: Final = 40.0
+"""Distance from the place of a landmark within which all of its model lies [m]."""
 
 
 def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decisions: int = 60) -> None:
@@ -48,9 +51,10 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     first arrival, which all roles may notice, and with an idle Ad-Wizard, because its refusals depend on the task). The
     participant's observation must differ, or the check would be meaningless.
 
-    Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
-    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,
-    everything is compared until one is in view for the first time; afterwards, the Co-Wizard and the car may know it.
+    Pictures, lidar and radar may show a hidden landmark. The pictures and scans of the Co-Wizard and of the participant
+    must be equal at every decision at which no hidden landmark is in view of a camera or sensor in either session. With
+    perception by the camera, everything is compared until one is in view for the first time; afterwards, the Co-Wizard
+    and the car may know it.
 
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
@@ -101,13 +105,14 @@ def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decision
     again, in_view_again = _with_views(env, play_again(env, moved, actions))
     where = f"hidden landmarks moved, seed {seed}"
     by_camera = env.unwrapped.config.perception is PerceptionModel.CAMERA
+    pictures = _scene_fields(env.unwrapped.config)
     views = list(map(bool.__or__, in_view, in_view_again))
     for k, (decision, (observations, infos)) in enumerate(zip(played, again, strict=False)):
         if by_camera and any(views[: k + 1]):
             break  # the Co-Wizard's knowledge may affect where the car stops
         if not views[k]:
-            _check_pictures(where, k, decision.observations, observations)
-        one, other = (_without_pictures(part) for part in (decision.observations, observations))
+            _check_pictures(where, k, decision.observations, observations, pictures)
+        one, other = (_without(pictures, part) for part in (decision.observations, observations))
         _check_equal(where, k, (one, decision.infos), (other, infos))
         field = first_unequal(one[PARTICIPANT]["objects"], other[PARTICIPANT]["objects"], "objects")
         assert field is None, f"{where}, decision {k}: the participant's observation {field} differs"
@@ -121,16 +126,41 @@ def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decision
 _Played = TypeVar("_Played")
 
 
+class _Viewers:
+    """Cameras and sensors of a session, with the samples of what the roles see, or see by."""
+
+    def __init__(self, town: Town, scenario: Scenario, config: EnvConfig) -> None:
+        self._cameras = [camera_of(town, scenario, each) for each in _cameras(config)]
+        scene, sensors = scene_of(town, scenario), config.sensors
+        lidar = [] if sensors.lidar is None else [Lidar(scene, sensors.lidar)]
+        self._scanners = [*lidar, *([] if sensors.radar is None else [Radar(scene, sensors.radar)])]
+        self._hidden = [mark for mark in scenario.storyboard.landmarks if mark.hidden]
+        from_above = [each for each in config.all_cameras.values() if CameraOutput.BIRDS_EYE in each.outputs]
+        self._reach = max(
+            (0.5 * each.metres_per_pixel * pm.hypot(each.width, each.height) + _BESIDE for each in from_above),
+            default=0.0,
+        )
+
+    def sees_hidden(self, world: World) -> bool:
+        """Returns whether a hidden landmark is in view."""
+        x, y = world.car.position.tolist()
+        if any(pm.hypot(mark.position[0] - x, mark.position[1] - y) < self._reach for mark in self._hidden):
+            return True
+        car, bodies = car_state(world), world.actors.arrays
+        scans = [scanner.scan(car, bodies, world.weather).instance for scanner in self._scanners]
+        scans += [camera.render(world).keys for camera in self._cameras]
+        keys = [landmark_key(mark.index) for mark in self._hidden]
+        return any(bool(np.isin(each, keys).any()) for each in scans)
+
+
 def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[_Played], list[bool]]:
     """Returns the results of a session, and for each decision whether a picture has a sample of a hidden landmark."""
-    played, views, cameras = list[_Played](), list[bool](), list[SessionCamera]()
+    played, views, viewers = list[_Played](), list[bool](), list[_Viewers]()
     for decision in playing:
         session = env.unwrapped.session
         if not played:
-            cameras = [camera_of(env.unwrapped.town, session.scenario, each) for each in _cameras(session.config)]
-        keys = [landmark_key(mark.index) for mark in session.scenario.storyboard.landmarks if mark.hidden]
-        instances = [camera.render(session.world).instance for camera in cameras]
-        views.append(any(each is not None and bool(np.isin(each, keys).any()) for each in instances))
+            viewers = [_Viewers(env.unwrapped.town, session.scenario, session.config)]
+        views.append(viewers[0].sees_hidden(session.world))
         played.append(decision)
     return played, views
 
@@ -140,7 +170,7 @@ def _cameras(config: EnvConfig) -> list[CameraConfig]:
 
     RGB has several samples in a pixel; labels have one, in the centre, which is none of these.
     """
-    cameras = [] if config.camera is None else [config.camera]
+    cameras = [*config.all_cameras.values()]
     if config.perception is PerceptionModel.CAMERA:
         cameras.append(PERCEPTION_CAMERA)
     return [
@@ -156,17 +186,23 @@ def _cameras(config: EnvConfig) -> list[CameraConfig]:
     ]
 
 
-def _check_pictures(where: str, k: int, observations: ByAgent, others: ByAgent) -> None:
+def _scene_fields(config: EnvConfig) -> frozenset[str]:
+    """Returns the fields of observations that may show a landmark: pictures, lidar and radar."""
+    blind = {field.name for field in car_sensor_fields(config.sensors, config.frames)}
+    return frozenset(sensor_spaces(config, Role.CO_WIZARD)) - blind
+
+
+def _check_pictures(where: str, k: int, observations: ByAgent, others: ByAgent, names: frozenset[str]) -> None:
     for role in OBSERVERS:
         one, other = observations[str(role)], others[str(role)]
-        for name in PICTURES:
+        for name in sorted(names):
             field = first_unequal(one.get(name), other.get(name), name)
             assert field is None, f"{where}, decision {k}: the picture {field} of {role} differs"
 
 
-def _without_pictures(observations: ByAgent) -> ByAgent:
+def _without(names: frozenset[str], observations: ByAgent) -> ByAgent:
     return {
-        agent: {name: value for name, value in observation.items() if name not in PICTURES}
+        agent: {name: value for name, value in observation.items() if name not in names}
         for agent, observation in observations.items()
     }
 

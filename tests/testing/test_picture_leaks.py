@@ -11,19 +11,33 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS, load_town
 from dorothie_gym.pictures.camera.camera_perception import CameraPerception
 from dorothie_gym.pictures.camera.scenery import landmarks as landmark_models
-from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig, PerceptionModel
+from dorothie_gym.session.config import CameraConfig, CameraMount, CameraOutput, EnvConfig, PerceptionModel
 from dorothie_gym.session.scenario import draw_scenario
+from dorothie_gym.session.sensor_config import LidarConfig, LidarOutput, RadarConfig, SensorConfig
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.testing.leaks import check_hidden_landmarks, check_observations_do_not_leak
 from dorothie_gym.testing.playing import play_scripted
 
 ALL = tuple(output for output in CameraOutput if output is not CameraOutput.BOXES)
+IN_VIEW = tuple(output for output in ALL if output is not CameraOutput.BIRDS_EYE)
 CONFIG = EnvConfig(
-    camera=CameraConfig(width=120, height=80, outputs=ALL),
+    camera=CameraConfig(width=120, height=80, outputs=IN_VIEW),
     perception=PerceptionModel.CAMERA,
     world=WorldConfig(vehicles=6, pedestrians=4),
 )
 SYMBOLIC = EnvConfig(camera=CONFIG.camera, world=CONFIG.world)
+FROM_ABOVE = EnvConfig(camera=CameraConfig(width=120, height=80, outputs=ALL), world=CONFIG.world)
+SENSORS = EnvConfig(
+    cameras={
+        "left": CameraConfig(width=60, height=40, mount=CameraMount(yaw=-90.0), outputs=IN_VIEW),
+        "rear": CameraConfig(width=60, height=40, mount=CameraMount(yaw=180.0)),
+    },
+    sensors=SensorConfig(
+        lidar=LidarConfig(channels=16, columns=180, range=40.0, outputs=tuple(LidarOutput)),
+        radar=RadarConfig(), imu=True, gnss=True, lane_invasion=True, collision=True,
+    ),
+    world=CONFIG.world,
+)  # fmt: skip
 
 
 def has_hidden(town: str, seed: int) -> bool:
@@ -38,19 +52,26 @@ def test_pictures_and_what_is_seen_by_them_do_not_leak() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("town", "config"),
-    [("brookside", CONFIG), ("midtown", CONFIG), ("brookside", SYMBOLIC)],
-    ids=["brookside", "midtown", "symbolic"],
+    [
+        ("brookside", CONFIG),
+        ("midtown", CONFIG),
+        ("brookside", SYMBOLIC),
+        ("brookside", SENSORS),
+        ("midtown", SENSORS),
+        ("brookside", FROM_ABOVE),
+    ],
+    ids=["brookside", "midtown", "symbolic", "sensors", "sensors-midtown", "from-above"],
 )
 def test_hidden_landmarks_change_no_picture_while_out_of_view(town: str, config: EnvConfig) -> None:
     env, pictures = DuoWizardEnv(town, config=config), 0
     for seed in [seed for seed in range(30) if has_hidden(town, seed)][:2]:
         pictures += check_hidden_landmarks(env, play_scripted, seed, 30).pictures
-    assert pictures > 10
+    assert pictures > 8
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("town", [*DEVELOPMENT_TOWNS, *SEEN_TOWNS])
-@pytest.mark.parametrize("config", [CONFIG, SYMBOLIC], ids=["camera", "symbolic"])
+@pytest.mark.parametrize("config", [CONFIG, SYMBOLIC, SENSORS], ids=["camera", "symbolic", "sensors"])
 def test_hidden_landmarks_change_no_picture_in_many_sessions(town: str, config: EnvConfig) -> None:
     env = DuoWizardEnv(town, config=config)
     compared = [
@@ -80,16 +101,35 @@ class HintingEnv(DuoWizardEnv):
     def _hint(self, observations: Any) -> Any:
         hidden = next(landmark for landmark in self.scenario.storyboard.landmarks if landmark.hidden)
         for agent in ("participant", "co_wizard"):
-            if agent in observations:
+            if self.field in observations.get(agent, {}):
                 observations[agent][self.field].flat[0] = int(abs(hidden.position[0]) * 7) % 100
         return observations
 
 
-@pytest.mark.parametrize("field", ["camera", "semantic"])
-def test_a_pixel_that_tells_the_place_is_found(field: str) -> None:
-    env = HintingEnv("brookside", config=SYMBOLIC)
+@pytest.mark.parametrize(
+    ("config", "field"),
+    [(SYMBOLIC, "camera"), (SYMBOLIC, "semantic"), (SYMBOLIC, "normals"), (SENSORS, "left_camera")],
+)
+def test_a_pixel_that_tells_the_place_is_found(config: EnvConfig, field: str) -> None:
+    env = HintingEnv("brookside", config=config)
     env.field = field
     with pytest.raises(AssertionError, match=f"the picture {field} of participant differs"):
+        check_hidden_landmarks(env, play_scripted, out_of_view(env), 3)
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        ("lidar", "the picture lidar of co_wizard"),
+        ("radar", "the picture radar of co_wizard"),
+        ("accelerometer", "observation accelerometer"),
+        ("gnss", "observation gnss"),
+    ],
+)
+def test_a_reading_that_tells_the_place_is_found(field: str, message: str) -> None:
+    env = HintingEnv("brookside", config=SENSORS)
+    env.field = field
+    with pytest.raises(AssertionError, match=message):
         check_hidden_landmarks(env, play_scripted, out_of_view(env), 3)
 
 

@@ -62,6 +62,16 @@ class FrameLayout(StrEnum):
     """`rgba/41.jpg` by SDN's frames (10 Hz)."""
 
 
+WRITTEN_OUTPUTS: Final = (
+    CameraOutput.RGB,
+    CameraOutput.DEPTH,
+    CameraOutput.SEMANTIC,
+    CameraOutput.INSTANCE,
+    CameraOutput.BOXES,
+)
+"""Outputs that have files."""
+
+
 @shared
 @dataclass(frozen=True, kw_only=True)
 class FrameExport:
@@ -73,21 +83,27 @@ class FrameExport:
         layout: names of the files.
 
     Raises:
-        ValueError: the rate is out of its range.
+        ValueError: the rate is out of its range, or an output has no files.
     """
 
     rate: float = 2.0
-    camera: CameraConfig = field(default_factory=lambda: CameraConfig(outputs=tuple(CameraOutput)))
+    camera: CameraConfig = field(default_factory=lambda: CameraConfig(outputs=WRITTEN_OUTPUTS))
     layout: FrameLayout = FrameLayout.NATIVE
 
     def __post_init__(self) -> None:
         most = 10.0 if self.layout is FrameLayout.SDN else float(FRAME_RATE)
         if not 0.01 <= self.rate <= most:
             raise ValueError(f"FrameExport.rate is {self.rate:g}; it must be in 0.01..{most:g} in this layout")
+        for output in self.camera.outputs:
+            if output not in WRITTEN_OUTPUTS:
+                raise ValueError(
+                    f"FrameExport.camera.outputs contains {output.value!r}; it must be of {', '.join(WRITTEN_OUTPUTS)}"
+                )
 
     def to_json(self) -> Page:
         """Returns the settings in JSON types."""
-        camera = self.camera
+        camera, mount = self.camera, self.camera.mount
+        sideways = {name: getattr(mount, name) for name in ("right", "yaw", "roll") if getattr(mount, name)}
         return {
             "rate": self.rate,
             "width": camera.width,
@@ -97,7 +113,7 @@ class FrameExport:
             "antialiasing": camera.antialiasing,
             "shadows": camera.shadows,
             "layout": self.layout.value,
-            "mount": {"forward": camera.mount.forward, "up": camera.mount.up, "pitch": camera.mount.pitch},
+            "mount": {"forward": mount.forward, "up": mount.up, "pitch": mount.pitch} | sideways,
         }
 
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.models.model_bank import PlacementRecord
     from dorothie_gym.pictures.camera.pose import View
 
+MOST = 1e5
+"""Largest movement that is written [pixels]: of surfaces that were close beside the camera."""
+
 
 @concurrent
 def write_normals(
@@ -163,5 +166,6 @@ def _write_pixel(before: View, dx: float, dy: float, dz: float, y: int, x: int, 
         flow[y, x, 0], flow[y, x, 1] = 0.0, 0.0
         return
     scale = before.focal / depth
-    flow[y, x, 0] = x + 0.5 - 0.5 * before.width - (dx * axes[0, 0] + dy * axes[0, 1] + dz * axes[0, 2]) * scale
-    flow[y, x, 1] = y + 0.5 - 0.5 * before.height + (dx * axes[1, 0] + dy * axes[1, 1] + dz * axes[1, 2]) * scale
+    right = x + 0.5 - 0.5 * before.width - (dx * axes[0, 0] + dy * axes[0, 1] + dz * axes[0, 2]) * scale
+    down = y + 0.5 - 0.5 * before.height + (dx * axes[1, 0] + dy * axes[1, 1] + dz * axes[1, 2]) * scale
+    flow[y, x, 0], flow[y, x, 1] = min(max(right, -MOST), MOST), min(max(down, -MOST), MOST)

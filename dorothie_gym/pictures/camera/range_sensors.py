@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.pictures.camera.body_placing import Bodies, BodyPlacer
 from dorothie_gym.pictures.camera.cells import sorted_by_cell
-from dorothie_gym.pictures.camera.mesh import empty_mesh
+from dorothie_gym.pictures.camera.mesh import TOWN, empty_mesh
 from dorothie_gym.pictures.camera.pose import pose_on_car, view_from
 from dorothie_gym.pictures.camera.range_scan import RayGrid, new_scan, ray_grid, read_scan, scan_scene
 from dorothie_gym.pictures.camera.road_slopes import rise_at
@@ -127,7 +127,9 @@ class Lidar(RangeSensor):
     def __init__(self, scene: SessionScene, config: LidarConfig) -> None:
         self.config = config
         azimuths = np.arange(config.columns) * (2.0 * math.pi / config.columns)
-        altitudes = np.radians(np.linspace(config.lower_fov, config.upper_fov, config.channels))
+        altitudes: Array = np.radians(
+            np.linspace(config.lower_fov, config.upper_fov, config.channels), dtype=np.float64
+        )
         super().__init__(scene, config.mount, ray_grid(azimuths, altitudes, config.range, whole=True))
 
     def turn(
@@ -212,7 +214,7 @@ class Radar(RangeSensor):
 
 def _centred(field: float, count: int) -> Array:
     """Returns the centres of equal parts of a field of view around 0."""
-    return (np.arange(count) + 0.5) * (field / count) - 0.5 * field
+    return np.asarray((np.arange(count) + 0.5) * (field / count) - 0.5 * field, dtype=np.float64)
 
 
 def _velocities(keys: NDArray[np.int32], bodies: Bodies, heading: float) -> tuple[Array, Array]:
@@ -228,5 +230,5 @@ def _velocities(keys: NDArray[np.int32], bodies: Bodies, heading: float) -> tupl
     if not len(known):
         return np.zeros(len(keys)), np.zeros(len(keys))
     at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
-    speed = np.where(known[at] == keys, speed[at], 0.0)
+    speed = np.where((known[at] == keys) & (keys != TOWN), speed[at], 0.0)  # the car itself may have that key
     return speed * (cos[at] * c + sin[at] * s), speed * (sin[at] * c - cos[at] * s)

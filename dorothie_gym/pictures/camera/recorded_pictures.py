@@ -21,9 +21,10 @@ from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.ontology.spellings import parse_landmark, parse_sensor
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.body_snapshots import BodySnapshot
+from dorothie_gym.pictures.camera.range_sensors import CarState
 from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.scenery.lots import Lot
-from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.session_camera import EarlierWorld, SessionCamera
 from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes, solid_boxes
 from dorothie_gym.pictures.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.session.recording.events import EventType
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.town import LightColour, Town
     from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
     from dorothie_gym.pictures.camera.pose import CameraPose
+    from dorothie_gym.pictures.camera.range_sensors import Lidar, Radar, Returns
     from dorothie_gym.session.config import CameraConfig
     from dorothie_gym.session.recording.header import LandmarkRow
     from dorothie_gym.session.recording.session import Session
@@ -116,12 +118,20 @@ class RecordedPictures:
         for frame in self.frames(rate):
             yield frame, self.picture(frame)
 
-    def picture(self, frame: int) -> CameraFrame:
+    def picture(self, frame: int, *, since: int | None = None) -> CameraFrame:
         """Returns the picture at a frame (30 Hz); beyond the first and last frame that of the nearest.
 
         The exceptions and actions of the frame itself show afterwards, as in the session.
+
+        Args:
+            frame: the frame.
+            since: frame from which optical flow is measured; None for no movement.
         """
         frame = min(max(frame, self.first_frame), self.last_frame)
+        before = None
+        if since is not None:
+            car = self.car(since)
+            before = EarlierWorld(car.x, car.y, car.height, car.heading, self.bodies(since))
         return self.camera.render_from(
             self.pose(frame),
             self.bodies(frame),
@@ -131,7 +141,18 @@ class RecordedPictures:
             faults=self._faulty(frame),
             own=_NO_BODY,
             traffic_lights=self._traffic_lights(frame),
+            before=before,
         )
+
+    def lidar_turn(self, frame: int, lidar: Lidar) -> Returns:
+        """Returns the whole turn of a lidar on the scene of `camera` at a frame, as `Lidar.turn`."""
+        return lidar.turn(
+            self.car(frame), self.bodies(frame), self.weather(frame), faults=self._faulty(frame), own=_NO_BODY
+        )
+
+    def radar_detections(self, frame: int, radar: Radar) -> NDArray[np.float32]:
+        """Returns the detections of a radar on the scene of `camera` at a frame, as `Radar.detections`."""
+        return radar.detections(self.car(frame), self.bodies(frame), self.weather(frame), own=_NO_BODY)
 
     def solid_boxes(self, frame: int) -> SolidBoxes:
         """Returns the 3D boxes of the bodies near the car at a frame, hidden ones included."""
@@ -140,18 +161,23 @@ class RecordedPictures:
 
     def pose(self, frame: int) -> CameraPose:
         """Returns the pose of the camera at a frame."""
+        car = self.car(frame)
+        return self.camera.pose_on(car.x, car.y, car.height, car.heading)
+
+    def car(self, frame: int) -> CarState:
+        """Returns the state of the car at a frame."""
         rows = self._session.trajectory
         k = max(int(np.searchsorted(rows["frame"], frame, side="right")) - 1, 0)
         after = min(k + 1, len(rows) - 1)
         steps = int(rows["frame"][after] - rows["frame"][k])
         share = (frame - int(rows["frame"][k])) / steps if steps else 0.0
         here, there = rows[k], rows[after]
-        x, y = (float(here[name] + share * (there[name] - here[name])) for name in ("x", "y"))
+        x, y, speed = (float(here[name] + share * (there[name] - here[name])) for name in ("x", "y", "speed"))
         height = float(self._car_heights[k] + share * (self._car_heights[after] - self._car_heights[k]))
         heading = float(here["heading"])
         if share:
             heading += share * wrap_radians(float(there["heading"]) - heading)
-        return self.camera.pose_on(x, y, height, heading)
+        return CarState(x, y, height, heading, speed)
 
     def weather(self, frame: int) -> Weather:
         """Returns the last recorded weather at a frame; a clear noon if there is none."""

@@ -36,7 +36,7 @@ for _colour in Colour:
     _PAINTS[0, _colour], _PAINTS[1, _colour] = LENS_OFF[_colour], LENS_ON[_colour]
 
 
-class Moment(NamedTuple):
+class EarlierWorld(NamedTuple):
     """A world at an earlier time.
 
     Attributes:
@@ -54,7 +54,7 @@ class Moment(NamedTuple):
     bodies: Bodies
 
     @classmethod
-    def of(cls, world: World) -> Moment:
+    def of(cls, world: World) -> EarlierWorld:
         """Returns the present moment of a world."""
         car = world.car
         x, y = car.position.tolist()
@@ -92,7 +92,7 @@ class SessionCamera:
         rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
         return pose_on_car(self.config.mount, x, y, z, heading, rise)
 
-    def render(self, world: World, before: Moment | None = None) -> CameraFrame:
+    def render(self, world: World, before: EarlierWorld | None = None) -> CameraFrame:
         """Returns the picture that the camera takes of a world; optical flow is measured from `before`."""
         car = world.car
         x, y = car.position.tolist()
@@ -113,7 +113,7 @@ class SessionCamera:
         faults: Collection[Sensor] = (),
         own: int = CAR_KEY,
         traffic_lights: Mapping[int, LightColour] | None = None,
-        before: Moment | None = None,
+        before: EarlierWorld | None = None,
     ) -> CameraFrame:
         """Returns the picture from a pose.
 

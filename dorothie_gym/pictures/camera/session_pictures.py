@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.pictures.camera.range_sensors import CarState, Lidar, Radar
 from dorothie_gym.pictures.camera.scene_cache import town_scene
-from dorothie_gym.pictures.camera.session_camera import Moment, SessionCamera
+from dorothie_gym.pictures.camera.session_camera import EarlierWorld, SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.providers import FIELDS, LIDAR_FIELDS, RADAR_FIELD, field_of
@@ -52,7 +52,7 @@ class SessionPictures(CachedViews):
     def __init__(self, world: World, scenario: Scenario, config: EnvConfig) -> None:
         self._world, self._scenario, self._config = world, scenario, config
         self._needs_before = any(CameraOutput.OPTICAL_FLOW in camera.outputs for camera in config.all_cameras.values())
-        self._before: Moment | None = None
+        self._before: EarlierWorld | None = None
 
     @cached_property
     def _scene(self) -> SessionScene:
@@ -78,7 +78,7 @@ class SessionPictures(CachedViews):
     def begin_decision(self) -> None:
         """Notes the present, which optical flow is measured from, before the world is stepped."""
         if self._needs_before:
-            self._before = Moment.of(self._world)
+            self._before = EarlierWorld.of(self._world)
 
     def frame(self, decision: int, name: str = "") -> CameraFrame | None:
         """Returns the picture of a camera at the current decision, of this number; None for no such camera."""
