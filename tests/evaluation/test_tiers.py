@@ -15,7 +15,7 @@ from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.scenario import ReferenceDrive, draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.time_allowed import reference_seconds, time_allowed
+from dorothie_gym.session.time_allowed import reference_seconds, time_allowed, time_extended
 from dorothie_gym.sim.config import AutomaticBraking
 
 
@@ -75,6 +75,15 @@ def test_time_is_a_multiple_of_the_reference_of_the_scenario() -> None:
     assert time_allowed(town, scenario, config) == min(1000.0, round(2.0 * reference_seconds(town, scenario)))
     assert time_allowed(town, measured, replace(config, max_seconds=300.0)) == 300.0
     assert time_allowed(town, measured, EnvConfig()) == 900.0
+
+
+def test_an_added_task_lengthens_the_time_in_proportion() -> None:
+    config = EnvConfig(time_factor=2.0, max_seconds=1000.0)
+    assert time_extended(400.0, 4, 5, config) == 500.0
+    assert time_extended(400.0, 4, 3, config) == 400.0
+    assert time_extended(900.0, 2, 3, config) == 1000.0
+    assert time_extended(900.0, 2, 3, EnvConfig()) == 900.0
+    assert ReferenceDrive(seconds=100.0, exchanges=1, subgoals=4).seconds_for(5) == 125.0
 
 
 def test_records_without_tiers_are_those_of_before() -> None:

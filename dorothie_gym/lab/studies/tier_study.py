@@ -39,7 +39,8 @@ def tier_study(example: str, tier: Tier) -> str:
 def _replaced(text: str, blocks: Mapping[str, str]) -> str:
     """Returns a YAML text with other contents of some of its top-level blocks."""
     for name, content in blocks.items():
-        text, count = re.subn(rf"(?m)^{name}:\n(?:[ #].*\n)+", lambda _, n=name, c=content: f"{n}:\n{c}", text)
+        block = f"{name}:\n{content}".replace("\\", r"\\")
+        text, count = re.subn(rf"(?m)^{name}:\n(?:[ #].*\n)+", block, text)
         if count != 1:
             raise ValueError(f"the example has {count} blocks {name!r}; it must have one")
     return text

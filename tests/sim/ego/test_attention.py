@@ -72,6 +72,7 @@ def waiting_at_red(config: WorldConfig, action: PhysicalAction) -> World:
     roads = lit_crossing("ew")
     length = roads.lanes[way_in("s")].length
     world = World(roads, config, seed=np.random.SeedSequence(1), departure=(way_in("s"), length - 5.0))
+    world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
     world.step(FRAME_RATE)
     assert world.planner.held
@@ -98,6 +99,7 @@ def test_start_far_before_a_red_light_stops_at_it() -> None:
     roads = lit_crossing("ew")
     length = roads.lanes[way_in("s")].length
     world = World(roads, PERCEIVED, seed=np.random.SeedSequence(1), departure=(way_in("s"), length - 30.0))
+    world.planner.command(PhysicalAction.J_TURN, 0, 0.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
     world.step(FRAME_RATE)
     world.planner.command(PhysicalAction.START, 0, 0.0)
