@@ -22,6 +22,7 @@ from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import envs, policies, storyboards, towns
 from dorothie_gym.cli.options import CommandGroup, PictureCommand
+from dorothie_gym.cli.reference_times import reference_times
 from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.sessions import compare, film, replay
@@ -60,6 +61,7 @@ app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
 app.command()(rollout)
+app.command("reference-times")(reference_times)
 app.command("cross-play")(cross_play)
 app.command()(leaderboard)
 app.command()(submit)

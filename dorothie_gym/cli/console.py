@@ -13,6 +13,7 @@ from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors, needs
 from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
+from dorothie_gym.cli.tier_options import TierName, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.lab import console as seats
@@ -52,6 +53,7 @@ def console(
         float | None, typer.Option(min=1.0, max=86400.0, help="End a session after this simulated time [s].")
     ] = None,
     word_errors: WordErrors = None,
+    tier: TierName = None,
     absence: Annotated[
         float, typer.Option(min=0.0, max=86400.0, help="Time that a person who must play has to come back [s].")
     ] = 60.0,
@@ -76,9 +78,12 @@ def console(
     check_libraries("console")
     compile_first(pictures=pictures)
     with reporting_errors():
-        config = replace(_config(max_seconds, word_errors, absence, after_absence, while_away, pictures), speech=speech)
+        found = tier_of(tier)
+        config = replace(
+            _config(max_seconds, word_errors, absence, after_absence, while_away, pictures), speech=speech, tier=tier
+        )
         if resume is None:
-            room = _room(town or DEFAULT_TOWN, storyboard, seed, roles, out, config)
+            room = _room(town or (found.town if found else DEFAULT_TOWN), storyboard, seed, roles, out, config)
         else:
             out = out or resume.resolve().parent
             room = _resumed_room(resume, town, storyboard, roles, out, config)

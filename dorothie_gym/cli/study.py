@@ -12,6 +12,7 @@ import typer
 from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import FAILED, Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
+from dorothie_gym.cli.tier_options import TierName, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.lab import studies
 from dorothie_gym.support.files import write_atomically
@@ -30,15 +31,21 @@ Site = Annotated[str, typer.Option("--address", metavar="URL", help="Address of 
 @study.command()
 def init(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="New file, such as study.yaml.")],
+    tier: TierName = None,
 ) -> None:
-    """Write an example study to change: two conditions, consent, instructions, questionnaires, debriefing."""
+    """Write an example study to change: two conditions, consent, instructions, questionnaires, debriefing.
+
+    With --tier, people play the Co-Wizard with the settings, partners and towns of that tier.
+    """
     if file.exists():
         fail(f"{file}: exists; give the name of a new file")
+    found = tier_of(tier)
     with reporting_errors():
         from importlib.resources import files
 
         example = files("dorothie_gym.lab.studies") / "data" / "example.yaml"
-        write_atomically(file, example.read_text(encoding="utf-8"))
+        text = example.read_text(encoding="utf-8")
+        write_atomically(file, text if found is None else studies.tier_study(text, found))
     stdout().print(f"{file} is an example. Change it, then: dorothie-gym study check {file}", soft_wrap=True)
 
 

@@ -109,8 +109,8 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         render_view: str = "map",
         tier: str | None = None,
     ) -> None:
-        town, config, _ = tier_settings(tier, town, config)
-        self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
+        place, settings, _ = tier_settings(tier, town, config)
+        self.engine = SessionEngine(place, storyboard, config=settings, max_cycles=max_cycles)
         rate = self.engine.config.decision_frequency
         self.metadata = {**_METADATA, **metadata_at(rate)}
         self.render_mode = render_mode

@@ -110,12 +110,12 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         Raises:
             ValueError: an argument is out of its range.
         """
-        town, config, _ = tier_settings(tier, town, config)
-        if config is not None and config.perception is PerceptionModel.CAMERA:
+        place, settings, _ = tier_settings(tier, town, config)
+        if settings is not None and settings.perception is PerceptionModel.CAMERA:
             raise ValueError('config.perception is "camera"; batches do not perceive by it: make single environments')
-        if config is not None and config.channel is ChannelKind.SPEECH:
+        if settings is not None and settings.channel is ChannelKind.SPEECH:
             raise ValueError('config.channel is "speech"; batches do not speak: make single environments')
-        super().__init__(num_envs, town, config or EnvConfig(), render_mode, threads, autoreset_mode)
+        super().__init__(num_envs, place, settings or EnvConfig(), render_mode, threads, autoreset_mode)
         rate = self.config.decision_frequency
         self.metadata = {**self.metadata, "render_fps": metadata_at(rate)["render_fps"]}
         self.limits = SpaceLimits.for_towns(self.towns)

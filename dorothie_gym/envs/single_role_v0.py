@@ -91,8 +91,8 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         if role not in AGENT_ROLES:
             raise ValueError(f"role is {str(role)!r}; it must be one of {', '.join(AGENT_ROLES)}")
         self.role = Role(role)
-        town, config, usual = tier_settings(tier, town, config, self.role)
-        self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
+        place, settings, usual = tier_settings(tier, town, config, self.role)
+        self.engine = SessionEngine(place, storyboard, config=settings, max_cycles=max_cycles)
         rate = self.engine.config.decision_frequency
         self.metadata = metadata_at(rate)
         self.render_mode = render_mode

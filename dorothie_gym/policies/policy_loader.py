@@ -53,9 +53,9 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
         name: "scripted", "silent" (does nothing) or "random" (samples the action space); for participant and Co-Wizard
             also "scripted:" with traits of the persona ("scripted:talkativeness=0.8..1", see
             `dorothie_gym.policies.persona`), for the Ad-Wizard with its options ("scripted:rate=4,spacing=12", see
-            `dorothie_gym.policies.ad_wizard_options`); for the Co-Wizard also "lane-follow" (follows its lane, never talks), or a
-            shipped model such as "pretrained:maskable-ppo"; "llm:" with the name of a language model at the endpoint
-            `OPENAI_BASE_URL`.
+            `dorothie_gym.policies.ad_wizard_options`); for the Co-Wizard also "lane-follow" (follows its lane, never
+            talks), or a shipped model such as "pretrained:maskable-ppo"; "llm:" with the name of a language model at
+            the endpoint `OPENAI_BASE_URL`.
         role: role of the policy.
         limits: sizes of the spaces.
 

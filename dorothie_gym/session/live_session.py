@@ -30,7 +30,7 @@ from dorothie_gym.session.spaces.actions import (
     Physical,
     RoleAction,
 )
-from dorothie_gym.session.time_allowed import time_allowed
+from dorothie_gym.session.time_allowed import time_allowed, time_extended
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.world import World
 from dorothie_gym.tasks.storyboard import TaskState
@@ -71,7 +71,7 @@ class LiveSession:
         scenario: storyboard, street names and departure.
         config: settings.
         limits: sizes of the spaces.
-        seconds_allowed: time after which the session is truncated [s].
+        seconds_allowed: time after which the session is truncated, if no subgoal is added [s].
         world: simulated world.
         task: progress in the storyboard.
         beliefs: goals and places of hidden landmarks as the Co-Wizard has stated them.
@@ -111,6 +111,7 @@ class LiveSession:
             town, config.world, seed=world_seed, departure=scenario.departure, network=network, arrays=arrays
         )
         self.task = TaskState(scenario.storyboard)
+        self._planned = len(self.task.live)
         self.beliefs = BeliefTracker(town, scenario)
         self._exceptions = ExceptionExecutor(self.world, self.task, limits.props)
         self.dialogue = DialogueChannel(
@@ -184,6 +185,11 @@ class LiveSession:
         """Closes the session between two decisions; the events are then those of the end only."""
         self.log.clear()
         self.end(reason.value)
+
+    @property
+    def time_limit(self) -> float:
+        """Time after which the session is truncated, with its subgoals so far [s]."""
+        return time_extended(self.seconds_allowed, self._planned, len(self.task.live), self.config)
 
     @property
     def success(self) -> bool:

@@ -43,6 +43,10 @@ class ReferenceDrive:
     exchanges: int
     subgoals: int
 
+    def seconds_for(self, live: int) -> float:
+        """Returns the reference time for a number of live subgoals: more in proportion if some were added [s]."""
+        return self.seconds * max(1.0, live / self.subgoals) if self.subgoals else self.seconds
+
 
 REFERENCE: Final = "reference"
 """Field of `SessionHeader.extra` with the reference of the scenario: the fields of `ReferenceDrive`."""

@@ -202,7 +202,7 @@ class SessionEngine(Restorable):
     def _out_of_time(self, session: LiveSession) -> bool:
         if self.max_cycles is not None:
             return session.decisions >= self.max_cycles
-        return session.world.time >= session.seconds_allowed - 1e-9
+        return session.world.time >= session.time_limit - 1e-9
 
     # --- the current decision ---------------------------------------------------------------------------------------
 

@@ -42,6 +42,20 @@ def time_allowed(town: Town, scenario: Scenario, config: EnvConfig) -> float:
     return max(config.max_seconds, float(round(_SLACK * reference_seconds(town, scenario))))
 
 
+def time_extended(seconds: float, planned: int, live: int, config: EnvConfig) -> float:
+    """Returns the time allowed [s] after subgoals were added: with `EnvConfig.time_factor`, more in proportion.
+
+    Args:
+        seconds: time allowed at the start [s].
+        planned: number of live subgoals at the start.
+        live: number of live subgoals now; with fewer than at the start the time stays.
+        config: settings of the session.
+    """
+    if config.time_factor is None or live <= planned or not planned:
+        return seconds
+    return min(config.max_seconds, seconds * live / planned)
+
+
 def reference_seconds(town: Town, scenario: Scenario) -> float:
     """Returns the expected time of the cheapest routes from errand to errand in the order of the story [s].
 

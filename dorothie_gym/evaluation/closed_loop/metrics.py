@@ -158,7 +158,7 @@ class TimelyCompletion(ClosedLoopMetric):
         if record.reference is None:
             return 0.0, 0.0
         share, counts = DrivingScore().parts(record)
-        return share * min(1.0, TIMELY * record.reference.seconds / max(record.seconds, 1e-9)), counts
+        return share * min(1.0, TIMELY * record.reference.seconds_for(record.live) / max(record.seconds, 1e-9)), counts
 
 
 TIMELY: Final = 2.0

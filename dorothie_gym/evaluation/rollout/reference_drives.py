@@ -19,12 +19,14 @@ from typing import TYPE_CHECKING, Final, TypedDict
 from dorothie_gym._version import __version__
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.evaluation.rollout.play import play_session
+from dorothie_gym.maps.catalogue import town_at
+from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.scenario import ReferenceDrive, Scenario
+from dorothie_gym.session.scenario import ReferenceDrive, Scenario, draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.time_allowed import reference_seconds
 from dorothie_gym.support.files import write_atomically
@@ -94,6 +96,26 @@ def measure_drive(town: Town, scenario: Scenario) -> ReferenceDrive:
     return ReferenceDrive(
         seconds=round(session.duration, 3), exchanges=len(Units(session).exchanges), subgoals=len(live)
     )
+
+
+class DriveTask:
+    """Measures references in one process.
+
+    Args:
+        stops: range of the number of stops of the storyboards, see `EnvConfig.stops`.
+        known: references that need not be measured again, by `drive_key`.
+    """
+
+    def __init__(self, stops: tuple[int, int] | None, known: Mapping[str, ReferenceDrive]) -> None:
+        self._stops, self._known = stops, known
+
+    def __call__(self, task: tuple[str, int]) -> tuple[str, ReferenceDrive]:
+        """Returns key and reference of the scenario of a town and a seed."""
+        name, seed = task
+        town = town_at(parse_series(name) or name, seed)
+        scenario = draw_scenario(town, None, seed, self._stops)
+        key = drive_key(scenario, town.name)
+        return key, self._known[key] if key in self._known else measure_drive(town, scenario)
 
 
 @functools.cache

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from dorothie_gym.session.config import CameraConfig, EnvConfig
+from dorothie_gym.evaluation.tiers import find_tier
+from dorothie_gym.session.config import CameraConfig, ChannelKind, EnvConfig
 
 
 class WhileAway(enum.StrEnum):
@@ -65,9 +66,11 @@ class ConsoleConfig:
         speech: whether people can speak into a microphone and hear the others.
         absence: rules for people who leave.
         repeatable: whether people at the seats may begin another session after the last one.
+        tier: name of the `Tier` whose settings the sessions have; words stay text, and times and word errors that
+            differ from the defaults replace those of the tier.
 
     Raises:
-        ValueError: a value is out of range; names the field.
+        ValueError: a value is out of range, or there is no such tier; names the field.
     """
 
     decision_frequency: float = 10.0
@@ -79,6 +82,7 @@ class ConsoleConfig:
     speech: bool = False
     absence: AbsenceRules = field(default_factory=AbsenceRules)
     repeatable: bool = True
+    tier: str | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.picture_quality <= 95:
@@ -88,8 +92,17 @@ class ConsoleConfig:
 
     def environment(self) -> EnvConfig:
         """Returns the settings of the engine."""
-        return EnvConfig(
-            decision_frequency=self.decision_frequency,
-            max_seconds=self.max_seconds,
-            word_error_rate=self.word_error_rate,
+        if self.tier is None:
+            return EnvConfig(
+                decision_frequency=self.decision_frequency,
+                max_seconds=self.max_seconds,
+                word_error_rate=self.word_error_rate,
+            )
+        found = replace(
+            find_tier(self.tier).config, decision_frequency=self.decision_frequency, channel=ChannelKind.TEXT
         )
+        if self.max_seconds != ConsoleConfig.max_seconds:
+            found = replace(found, max_seconds=self.max_seconds, time_factor=None)
+        if self.word_error_rate != ConsoleConfig.word_error_rate:
+            found = replace(found, word_error_rate=self.word_error_rate)
+        return found

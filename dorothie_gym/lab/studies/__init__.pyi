@@ -17,3 +17,4 @@ from .study import Admission as Admission
 from .study import Study as Study
 from .study_file import check_sources as check_sources
 from .study_file import read_study as read_study
+from .tier_study import tier_study as tier_study

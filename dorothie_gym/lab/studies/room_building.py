@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -47,7 +48,7 @@ class RoomBuilder:
         tutorial = self._study.tutorial
         assert tutorial is not None
         absence = AbsenceRules(while_away=WhileAway.PAUSE, then=AfterAbsence.WAIT)
-        config = self._config(tutorial.seconds, 0.0, absence)
+        config = replace(self._config(tutorial.seconds, 0.0, absence), tier=None)
         plans = {each: plan_seat(HUMAN if each is role else "scripted", each) for each in AGENT_ROLES}
         return Room(self._engine(tutorial.scenario, config), plans, config, seed=self._study.assignment.seed)
 
@@ -104,6 +105,7 @@ class RoomBuilder:
             speech=self._study.session.speech,
             absence=absence,
             repeatable=False,
+            tier=self._study.session.tier,
         )
 
     def _engine(self, scenario: Scenario, config: ConsoleConfig) -> SessionEngine:

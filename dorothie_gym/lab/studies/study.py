@@ -96,11 +96,13 @@ class SessionSettings(_Part, frozen=True, kw_only=True):
         pictures: whether seats look through the windscreen.
         speech: whether people can speak into a microphone and hear the others, in addition to typing; speech is
             recorded with the session.
+        tier: name of a `Tier` whose settings the sessions have, such as "rough"; see `ConsoleConfig.tier`.
     """
 
     max_seconds: Annotated[float, Meta(ge=5.0, le=7200.0)] = 900.0
     pictures: bool = True
     speech: bool = False
+    tier: Label | None = None
 
 
 class Tutorial(_Part, frozen=True, kw_only=True):

@@ -12,6 +12,7 @@ import msgspec
 import yaml
 
 from dorothie_gym.errors import DorothieGymError, InputFileError, PolicyLoadError, one_line, short_repr
+from dorothie_gym.evaluation.tiers import find_tier
 from dorothie_gym.lab.console.seating import Occupancy, plan_seat
 from dorothie_gym.lab.studies.expectations import explain
 from dorothie_gym.lab.studies.items import Choice, Number
@@ -201,6 +202,11 @@ def check_sources(study: Study, path: Path) -> None:
     Raises:
         InputFileError: one is missing or cannot be used; the message names the field.
     """
+    if study.session.tier is not None:
+        try:
+            find_tier(study.session.tier)
+        except ValueError as error:
+            raise InputFileError(path, str(error), "session.tier") from None
     scenarios = [(f"scenarios[{k}]", scenario) for k, scenario in enumerate(study.scenarios)]
     if study.tutorial is not None:
         scenarios.append(("tutorial.scenario", study.tutorial.scenario))

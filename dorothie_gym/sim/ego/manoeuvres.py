@@ -69,8 +69,7 @@ BEGIN = 0
 """Number of the request for a new path; the others are numbers of `PhysicalAction`."""
 
 SENT_ON = 8.0
-"""Way for which a car with `AutomaticBraking.PERCEIVED` passes lights and stop signs after the action Start [m]; set by
-hand: the first car before a line stands nearer, the second one does not."""
+"""Way for which Start passes lights and stop signs with `AutomaticBraking.PERCEIVED` [m]: about one car's place."""
 
 LAST_PIECE = 0.5
 """End of a lane that is laid where nothing else is left [m]."""

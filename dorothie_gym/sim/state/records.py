@@ -73,10 +73,8 @@ class EgoRecord:
     stopped_until: Int64  # frame up to which it stands after a collision, and length of such stands [frames]
     collision_stop: Int64
     collisions: Int64  # number of collisions by its own fault
-    attentive: (
-        Flag  # whether its brakes act only on bodies in view for a while (`WorldConfig.braking`), and that [frames]
-    )
-    attention: Int64
+    attentive: Flag  # whether its brakes act only on bodies in view for a time (`WorldConfig.braking`)
+    attention: Int64  # that time [frames]
     sent: Float  # way for which it passes red lights and stop signs, because it has just been started [m]
     events: Int32  # rows of `events`, `breaches` and `trace` in use
     breaches: Int32

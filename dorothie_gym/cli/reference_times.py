@@ -1,0 +1,64 @@
+"""`dorothie-gym reference-times`: references of the scenarios of a rollout."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dorothie_gym.cli.completion import complete_towns
+from dorothie_gym.cli.options import AsJson, Players
+from dorothie_gym.cli.output import fail, print_json, reporting_errors, session_progress, stdout
+from dorothie_gym.cli.tier_options import TierName, tier_of
+from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.evaluation import closed_loop
+from dorothie_gym.evaluation.rollout.processes import run_tasks
+from dorothie_gym.evaluation.rollout.reference_drives import DriveTask, read_drives, write_drives
+from dorothie_gym.support.processors import available_processors
+
+
+def reference_times(
+    out: Annotated[Path, typer.Option(metavar="FILE.json", help="File of the references; those in it are kept.")],
+    tier: TierName = "standard",
+    towns: Annotated[
+        str | None,
+        typer.Option(metavar="FOLD|all|NAME,...", help="Towns in place of the tier's.", autocompletion=complete_towns),
+    ] = None,
+    sessions: Annotated[int, typer.Option(min=1, help="Number of scenarios in all towns together.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, as of `rollout`.")] = 0,
+    workers: Players = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure the reference times of the scenarios that `rollout` plays with the same tier, towns and seed.
+
+    The scripted participant and Co-Wizard play each scenario with exact words and acts, in the usual traffic and
+    without an Ad-Wizard.
+    """
+    with reporting_errors():
+        found = tier_of(tier)
+        if found is None:
+            fail("--tier is empty; give the name of a tier")
+        try:
+            chosen = found.towns if towns is None else closed_loop.parse_towns(towns)
+            plans = closed_loop.RolloutSettings(towns=chosen, sessions=sessions, seed=seed).plans()
+        except ValueError as error:
+            fail(str(error))
+        known = read_drives(out) if out.is_file() else {}
+        compile_first()
+        drives = dict(known)
+        tasks = [(plan.town, plan.seed) for plan in plans]
+        with session_progress(quiet=as_json) as on_session:
+            on_session(0, len(tasks))
+            prepare = partial(DriveTask, found.config.stops, known)
+            measured = run_tasks(prepare, tasks, workers=workers or available_processors())
+            for number, (key, drive) in enumerate(measured, start=1):
+                drives[key] = drive
+                write_drives(out, drives)
+                on_session(number, len(tasks))
+    added = len(drives) - len(known)
+    if as_json:
+        print_json({"file": str(out), "drives": len(drives), "added": added})
+        return
+    stdout().print(f"{len(drives)} references in {out}, {added} of them new", markup=False, soft_wrap=True)
