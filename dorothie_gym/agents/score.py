@@ -17,7 +17,10 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from dorothie_gym.maps.routing import Place
+    from dorothie_gym.maps.town import Town
     from dorothie_gym.session.live_session import LiveSession
 
 SUCCESS_SHARE: Final = 0.2
@@ -41,6 +44,7 @@ class TaskProgress:
         self._session = session
         self._reached = 0
         self._places: list[Place] = []
+        self._ways: dict[Place, _Way] = {}
         self.note()
 
     def note(self) -> None:
@@ -48,7 +52,7 @@ class TaskProgress:
         task, car = self._session.task, self._session.world.planner
         reached = sum(task.reached(i) for i in task.live)
         if reached != self._reached:
-            self._reached, self._places = reached, []
+            self._reached, self._places, self._ways = reached, [], {}
         self._places.append((car.lane, car.station))
 
     @property
@@ -61,14 +65,31 @@ class TaskProgress:
         """Returns the covered share of the way to the subgoal that was approached most, of those that may be next."""
         task, town, best = self._session.task, self._session.world.town, 0.0
         for i in task.live:
-            if not task.allowed(i):
-                continue
-            mark, cost = task.storyboard.landmarks[task.landmark_of(i)], CostToGo(town)
-            cost.aim((mark.lane, mark.station))
-            costs = [cost.from_place(*place) for place in self._places]
-            if math.isfinite(costs[0]) and costs[0] > _LEAST_WAY:
-                best = max(best, 1.0 - min(costs) / costs[0])
-        return min(max(best, 0.0), 1.0)
+            if task.allowed(i):
+                mark = task.storyboard.landmarks[task.landmark_of(i)]
+                way = self._ways.setdefault((mark.lane, mark.station), _Way(town, (mark.lane, mark.station)))
+                best = max(best, way.covered(self._places))
+        return min(best, 1.0)
+
+
+class _Way:
+    """Way to a subgoal: its cost at the first place, and at the nearest one so far."""
+
+    def __init__(self, town: Town, goal: Place) -> None:
+        self._cost = CostToGo(town)
+        self._cost.aim(goal)
+        self._seen, self._first, self._nearest = 0, math.inf, math.inf
+
+    def covered(self, places: Sequence[Place]) -> float:
+        """Returns the covered share of the way; reads the places that have been added."""
+        for place in places[self._seen :]:
+            cost = self._cost.from_place(*place)
+            if self._seen == 0:
+                self._first = cost
+            self._seen, self._nearest = self._seen + 1, min(self._nearest, cost)
+        if not _LEAST_WAY < self._first < math.inf:
+            return 0.0
+        return 1.0 - self._nearest / self._first
 
 
 def score_of(session: LiveSession, progress: TaskProgress, role: Role) -> float:

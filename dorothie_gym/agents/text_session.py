@@ -196,17 +196,23 @@ class TextSession:
 
     # --- The end ------------------------------------------------------------------------------------------------------
 
+    @property
+    def score(self) -> float:
+        """Score so far, in [0, 1]; raises `AgentSessionError` before the first reset."""
+        progress = self._begun()
+        return score_of(self.engine.session, progress, self.role)
+
     def finish(self) -> Outcome:
         """Ends the session, over or not, and returns its outcome; later answers have no effect.
 
         Raises:
             AgentSessionError: `reset` was not called.
         """
-        progress = self._begun()
+        self._begun()
         self._truncated = self._truncated or not self.engine.over
         summary, usage = self.engine.summary(), usage_of(self._partners, self._states)
         return Outcome(
-            score=score_of(self.engine.session, progress, self.role),
+            score=self.score,
             success=summary["success"],
             reached=summary["subgoals"]["reached"],
             live=summary["subgoals"]["live"],

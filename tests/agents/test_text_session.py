@@ -6,10 +6,11 @@ import gc
 import json
 import math
 import random
+import weakref
 
 import pytest
 
-from dorothie_gym.agents import TextSession, Turn, merged_page
+from dorothie_gym.agents import TextSession, merged_page
 from dorothie_gym.errors import AgentSessionError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
@@ -251,10 +252,12 @@ def _pages(session: TextSession) -> list[str]:
     return pages
 
 
-def test_dropped_sessions_leave_nothing_behind(session: TextSession) -> None:
+def test_dropped_sessions_leave_nothing_behind() -> None:
+    dropped = []
+    for seed in range(4):
+        session = TextSession(config=MINUTE)
+        session.reset(seed)
+        dropped.append(weakref.ref(session))
+    del session
     gc.collect()
-    before = sum(isinstance(each, Turn | TextSession) for each in gc.get_objects())
-    for seed in range(8):
-        TextSession(config=MINUTE).reset(seed)
-    gc.collect()
-    assert sum(isinstance(each, Turn | TextSession) for each in gc.get_objects()) <= before
+    assert [each() for each in dropped] == [None] * 4
