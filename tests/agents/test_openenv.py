@@ -38,7 +38,7 @@ def url() -> Iterator[str]:
     server = subprocess.Popen(command)
     address = f"http://127.0.0.1:{port}"
     try:
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + 270
         while True:
             try:
                 urllib.request.urlopen(f"{address}/health", timeout=1)
