@@ -15,6 +15,7 @@ DorothieGymError
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
 ├── EndpointError        the endpoint of a language model rejects all calls
+├── AgentSessionError    a session for an agent is used before it has begun
 ├── PolicyStateError     the state of a policy lacks what a part of the policy needs
 ├── PredictionError      predictions cannot be scored
 ├── FeatureStoreError    cached features are damaged
@@ -141,6 +142,10 @@ class PolicyLoadError(DorothieGymError, ValueError):
 
 class EndpointError(DorothieGymError, RuntimeError):
     """The endpoint of a language model rejects the calls of a session; the message has the words of the server."""
+
+
+class AgentSessionError(DorothieGymError, RuntimeError):
+    """A session for a language-model agent does not allow a call now; the message says what to call first."""
 
 
 class PolicyStateError(DorothieGymError, RuntimeError):

@@ -25,6 +25,7 @@ from dorothie_gym.cli.options import CommandGroup, PictureCommand
 from dorothie_gym.cli.reference_times import reference_times
 from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
+from dorothie_gym.cli.serve import serve
 from dorothie_gym.cli.sessions import compare, film, replay
 from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
@@ -65,6 +66,7 @@ app.command("reference-times")(reference_times)
 app.command("cross-play")(cross_play)
 app.command()(leaderboard)
 app.command()(submit)
+app.command()(serve)
 app.command()(replay)
 app.command()(film)
 app.command()(frames)

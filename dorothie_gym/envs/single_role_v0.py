@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.envs.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.casting import partners_of
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
@@ -100,7 +100,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         limits = self.engine.limits
         self.observation_space = deepcopy(self.engine.observation_space(self.role))
         self.action_space = deepcopy(action_space(self.role, limits))
-        self.partners = self._cast({**usual, **(partners or {})})
+        self.partners = partners_of(self.role, {**usual, **(partners or {})}, limits)
         self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))
         self._states: dict[Role, object] = {}
 
@@ -199,18 +199,3 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
             "the role": self.role,
             "the partners": partners,
         }
-
-    def _cast(self, wanted: Mapping[str, str | AnyPolicy]) -> dict[Role, AnyPolicy]:
-        others = [role for role in AGENT_ROLES if role is not self.role]
-        for name in wanted:
-            if name not in others:
-                raise ValueError(f"partners has {str(name)!r}; the others are {' and '.join(others)}")
-        cast: dict[Role, AnyPolicy] = {}
-        for role in others:
-            policy = wanted.get(role, "scripted")
-            cast[role] = make_policy(policy, role, self.engine.limits) if isinstance(policy, str) else policy
-            if cast[role].role is not role:
-                raise ValueError(f"partners has a policy of {cast[role].role} for {role}")
-            if cast[role].limits != self.engine.limits:
-                raise ValueError(f"the policy of {role} has other SpaceLimits than the town's: {self.engine.limits}")
-        return cast

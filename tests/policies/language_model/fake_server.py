@@ -70,7 +70,9 @@ class _Handler(BaseHTTPRequestHandler):
         page = {
             "id": "x",
             "object": "chat.completion",
-            "usage": {"prompt_tokens": 100, "completion_tokens": 7},
+            "created": 1,
+            "model": self.server.requests[-1]["model"],
+            "usage": {"prompt_tokens": 100, "completion_tokens": 7, "total_tokens": 107},
             "choices": [{"index": 0, "message": answer, "finish_reason": ended}],
             **fields,
         }

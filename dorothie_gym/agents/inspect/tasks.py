@@ -1,0 +1,113 @@
+"""Tasks for Inspect: `inspect eval dorothie_gym/co_wizard --model ...`."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import anyio.to_thread
+from inspect_ai import Epochs, Task, task
+from inspect_ai.dataset import MemoryDataset, Sample
+from inspect_ai.model import ChatMessageSystem, ChatMessageUser, GenerateConfig, ResponseSchema, get_model
+from inspect_ai.scorer import Score, mean, scorer, stderr
+from inspect_ai.solver import solver
+from inspect_ai.util import JSONSchema
+
+from dorothie_gym.agents.text_session import TextSession
+from dorothie_gym.maps.folds import DEFAULT_TOWN
+from dorothie_gym.ontology.roles import Role
+
+if TYPE_CHECKING:
+    from inspect_ai.scorer import Scorer, Target
+    from inspect_ai.solver import Generate, Solver, TaskState
+
+FIRST_SEED: Final = 7000
+"""Usual seed of the first session."""
+
+_OUTCOME: Final = "outcome"
+
+
+@task
+def co_wizard(
+    samples: int = 10,
+    epochs: int = 3,
+    town: str = DEFAULT_TOWN,
+    first_seed: int = FIRST_SEED,
+    remember: int = 0,
+    max_turns: int = 400,
+) -> Task:
+    """The model drives and talks; scripted policies play the others.
+
+    Args:
+        samples: number of sessions.
+        epochs: number of times that each is played; `pass_k_N` is the share of those in which all of them succeed.
+        town: name of a town.
+        first_seed: seed of the first session; the others follow.
+        remember: number of earlier pages, with their answers, that the model is shown.
+        max_turns: number of answers after which a session is truncated.
+    """
+    return _task(Role.CO_WIZARD, samples, epochs, town, first_seed, remember, max_turns)
+
+
+@task
+def participant(
+    samples: int = 10,
+    epochs: int = 3,
+    town: str = DEFAULT_TOWN,
+    first_seed: int = FIRST_SEED,
+    remember: int = 0,
+    max_turns: int = 400,
+) -> Task:
+    """The model has errands and guides the scripted Co-Wizard; arguments as in `co_wizard`."""
+    return _task(Role.PARTICIPANT, samples, epochs, town, first_seed, remember, max_turns)
+
+
+def _task(role: Role, samples: int, epochs: int, town: str, first_seed: int, remember: int, max_turns: int) -> Task:
+    seeds = range(first_seed, first_seed + samples)
+    dataset = [
+        Sample(input="(the pages of the session)", id=f"{town}-{seed}", metadata={"seed": seed}) for seed in seeds
+    ]
+    reducers = ["mean", f"pass_k_{epochs}"] if epochs > 1 else ["mean"]
+    return Task(
+        dataset=MemoryDataset(dataset, name=f"dorothie-{role}"),
+        solver=play_session(role, town, remember, max_turns),
+        scorer=session_score(),
+        epochs=Epochs(epochs, reducers),
+    )
+
+
+@solver
+def play_session(role: str, town: str, remember: int, max_turns: int) -> Solver:
+    """Returns the solver, which plays a session by its pages; arguments as in `co_wizard`."""
+
+    async def solve(state: TaskState, generate: Generate) -> TaskState:
+        in_thread: Any = anyio.to_thread.run_sync
+        session = await in_thread(partial(TextSession, role, town, max_turns=max_turns))
+        model, system = get_model(), ChatMessageSystem(content=session.system)
+        past: list[Any] = []
+        turn = await in_thread(session.reset, state.metadata["seed"])
+        try:
+            while not turn.done:
+                page = ChatMessageUser(content=turn.page)
+                answers = ResponseSchema(name="answer", json_schema=JSONSchema.model_validate(turn.schema))
+                output = await model.generate([system, *past, page], config=GenerateConfig(response_schema=answers))
+                past = [*past, page, output.message][-2 * remember :] if remember else []
+                state.messages += [page, output.message]
+                turn = await in_thread(session.answer, output.completion)
+        finally:  # a limit of the sample ends the solver by an exception: what was reached counts
+            state.store.set(_OUTCOME, session.finish().numbers())
+        state.completed = True
+        return state
+
+    return solve
+
+
+@scorer(metrics={"success": [mean(), stderr()], "score": [mean(), stderr()]})
+def session_score() -> Scorer:
+    """Returns the scorer: success and score; the other figures are metadata, which no reducer reads."""
+
+    async def score(state: TaskState, target: Target) -> Score:
+        found: dict[str, float] = state.store.get(_OUTCOME) or {}
+        return Score(value={name: found.get(name, 0.0) for name in ("success", "score")}, metadata=dict(found))
+
+    return score

@@ -1,0 +1,91 @@
+"""Pages that show only what has changed since the last one, and the whole page again from the changes.
+
+A page has lines `Title: words`, and lists: a line `Title:` with lines `- item` below. A page of changes has the lines
+and lists that differ. Of the conversation it has the new lines, and of the places those whose words differ: distances
+of places change all the time, and are shown with the whole page only. A line `No longer:` names what has gone.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+_GONE: Final = "No longer"
+_GROWING: Final = "Conversation"
+_PLACES: Final = "Places"
+_ALWAYS: Final = ("Time", "Just now")
+_NUMBER: Final = re.compile(r"\d+")
+
+Sections = dict[str, list[str]]
+"""Lines of a page by title; the first line has the title."""
+
+
+def page_changes(before: str, page: str) -> str:
+    """Returns the changes of a page.
+
+    Args:
+        before: the page that was shown last, as a whole.
+        page: the present page.
+    """
+    old, new = _sections(before), _sections(page)
+    lines: list[str] = []
+    for title, section in new.items():
+        lines += section if title not in old or title in _ALWAYS else _changed(title, old[title], section)
+    gone = [title for title in old if title not in new]
+    if gone:
+        lines.append(f"{_GONE}: {'; '.join(gone)}")
+    return "\n".join(lines)
+
+
+def _changed(title: str, old: Sequence[str], new: Sequence[str]) -> list[str]:
+    """Returns the lines of a section that both pages have, if it has changed."""
+    if title.startswith(_GROWING):
+        items = [line for line in new[1:] if line not in old]
+    elif title.startswith(_PLACES):
+        known = {_NUMBER.sub("", line) for line in old}
+        items = [line for line in new[1:] if _NUMBER.sub("", line) not in known]
+    else:
+        return list(new) if list(new) != list(old) else []
+    return [new[0], *items] if items else []
+
+
+def merged_page(before: str, changes: str) -> str:
+    """Returns the whole page after changes; distances of places are those of the last whole page.
+
+    Args:
+        before: the whole page before.
+        changes: output of `page_changes`, or a whole page.
+    """
+    sections, new = _sections(before), _sections(changes)
+    gone = new.pop(_GONE, [])
+    for title in gone[0].partition(": ")[2].split("; ") if gone else ():
+        sections.pop(title, None)
+    for title, section in new.items():
+        sections[title] = _with_items(sections, title, section)
+    return "\n".join(line for section in sections.values() for line in section)
+
+
+def _with_items(sections: Mapping[str, Sequence[str]], title: str, section: Sequence[str]) -> list[str]:
+    """Returns a section with the items that were not repeated."""
+    old = sections.get(title, section[:1])
+    if title.startswith(_GROWING):
+        return [section[0], *(line for line in old[1:] if line not in section), *section[1:]]
+    if title.startswith(_PLACES):
+        names = {_name(line): line for line in [*old[1:], *section[1:]]}
+        return [section[0], *names.values()]
+    return list(section)
+
+
+def _name(line: str) -> str:
+    return line.partition(", ")[0]
+
+
+def _sections(page: str) -> Sections:
+    sections: Sections = {}
+    title = ""
+    for line in page.split("\n"):
+        if not line.startswith("- "):
+            title = line.partition(":")[0]
+        sections.setdefault(title, []).append(line)
+    return sections

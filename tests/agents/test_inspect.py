@@ -1,0 +1,80 @@
+"""Tasks of Inspect, found by their entry point, with the rule program as the model.
+
+They need an environment of their own: `pip install '.[inspect]' pytest pytest-timeout hypothesis`, then
+`python -m pytest -m integrations tests/agents/test_inspect.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dorothie_gym.agents import TextSession
+from tests.agents.players import play, reader_of
+
+inspect_ai = pytest.importorskip("inspect_ai", reason="needs an environment with the extra 'inspect'")
+pytestmark = [pytest.mark.integrations, pytest.mark.filterwarnings("default")]
+
+models = pytest.importorskip("inspect_ai.model")
+
+
+class Rules(models.ModelAPI):
+    """The rule program of a role as a model; a share of its answers is spoilt."""
+
+    def __init__(
+        self,
+        model_name: str,
+        base_url: Any = None,
+        api_key: Any = None,
+        config: Any = None,
+        spoilt: float = 0.0,
+        **_: Any,
+    ) -> None:
+        super().__init__(model_name, base_url, api_key, [], config or models.GenerateConfig())
+        self.reader, self.spoilt, self.random = reader_of(model_name), spoilt, random.Random(0)
+
+    async def generate(self, input: Any, tools: Any, tool_choice: Any, config: Any) -> Any:
+        page = next(message for message in reversed(input) if message.role == "user").text
+        wrong = self.random.random() < self.spoilt
+        return models.ModelOutput.from_content(self.model_name, "no" if wrong else json.dumps(self.reader(page)))
+
+
+@models.modelapi(name="rules")
+def rules() -> type[Any]:
+    return Rules
+
+
+def run(task: str, tmp_path: Path, spoilt: float = 0.0, **arguments: object) -> Any:
+    role = task.partition("/")[2]
+    model = models.get_model(f"rules/{role}", spoilt=spoilt)
+    (log,) = inspect_ai.eval(task, model=model, task_args=arguments, log_dir=str(tmp_path), display="none")
+    assert log.status == "success", log.error
+    return log
+
+
+def test_ten_sessions_succeed_and_are_those_of_the_text_session(tmp_path: Path) -> None:
+    log = run("dorothie_gym/co_wizard", tmp_path, samples=10, epochs=1, town="brookside", first_seed=9100)
+    values = [next(iter(sample.scores.values())) for sample in log.samples]
+    assert sum(score.value["success"] for score in values) >= 9
+    expected = play(TextSession("co_wizard", "brookside"), reader_of("co_wizard"), 9100)
+    assert values[0].metadata == expected.numbers()
+
+
+def test_pass_k_is_the_share_of_sessions_that_succeed_every_time(tmp_path: Path) -> None:
+    log = run("dorothie_gym/co_wizard", tmp_path, samples=2, epochs=2, town="brookside")
+    assert {(score.reducer, score.name): score.metrics["mean"].value for score in log.results.scores} == {
+        (reducer, name): pytest.approx(1.0) for reducer in ("mean", "pass_k_2") for name in ("success", "score")
+    }
+
+
+def test_spoilt_answers_and_limits_lower_the_score_and_raise_nothing(tmp_path: Path) -> None:
+    log = run("dorothie_gym/co_wizard", tmp_path, spoilt=1.0, samples=1, epochs=1)
+    (score,) = (next(iter(sample.scores.values())) for sample in log.samples)
+    assert score.value == {"success": 0.0, "score": 0.0} and score.metadata["faults"] == 20
+    log = run("dorothie_gym/participant", tmp_path, samples=1, epochs=1, max_turns=3)
+    (score,) = (next(iter(sample.scores.values())) for sample in log.samples)
+    assert score.metadata["turns"] == 3 and 0.0 <= score.value["score"] < 1.0
