@@ -24,7 +24,7 @@ from dorothie_gym.baselines.roles.co_wizard.features import ordered_exit
 from dorothie_gym.baselines.roles.co_wizard.files import FILES
 from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, SPEEDS, Update, WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.network import HeardNumbers
-from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedDecision, LearnedState
 from dorothie_gym.baselines.roles.learned_role.inference import MISSING
 from dorothie_gym.baselines.roles.learned_role.policy import drawn
 from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources, filled
@@ -177,7 +177,7 @@ class Silent(LearnedCoWizard):
 
     def play_all(
         self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState], *, silent: bool = False
-    ) -> list[Turn]:
+    ) -> list[LearnedDecision]:
         """Takes decisions; nothing is to be said."""
         return super().play_all(observations, states, silent=True)
 

@@ -10,6 +10,9 @@ from dorothie_gym.support.copying import shared
 FRAME_RATE = 30
 """Physics substeps, and frames of a recording, a second (paper, appendix B.2)."""
 
+FAULT_SECONDS = 30.0
+"""Duration of a sensor fault [s] (design)."""
+
 FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "brake", "lane")
 """Columns of the ego's trajectory: metres, radians, m/s, normalised controls; `lane` is the lane's id."""
 

@@ -20,7 +20,7 @@ from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.batch.worlds import alone
-from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
+from dorothie_gym.sim.config import FAULT_SECONDS, FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.decision_setup import note_props
 from dorothie_gym.sim.ego.ego_controller import Car, CarRecord, EgoController, LocalPlanner
 from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.sensing.visibility import Visibility
 
 _step_share = fixed(step_share)
-
-FAULT_SECONDS = 30.0
-"""Duration of a sensor fault [s] (design)."""
 
 
 def parts_of(frames: int) -> list[int]:

@@ -19,7 +19,7 @@ from dorothie_gym.baselines.roles.co_wizard.decision import (
 )
 from dorothie_gym.baselines.roles.co_wizard.examples import Example, correcting_example, make_example
 from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory, initial_values
-from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, Turn
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedDecision
 from dorothie_gym.baselines.roles.co_wizard.remarks import sources
 from dorothie_gym.baselines.roles.co_wizard.teacher import CALM, Lesson, Teacher
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
@@ -87,7 +87,7 @@ class Pupil:
         self.last: DialogueMove | None = None
 
     def decide(
-        self, observation: ObservationMapping, on_example: OnExample, turn: Turn | None = None
+        self, observation: ObservationMapping, on_example: OnExample, turn: LearnedDecision | None = None
     ) -> tuple[CoWizardPercept, WorkingMemory, Lesson]:
         """Lets the teacher decide, and hands on the example; returns percept, memory after listening, and lesson.
 
@@ -223,7 +223,7 @@ class CoWizardPractice:
         self._pupil.did(percept, memory, turn.action.physical, remarks)
         return replace(turn.action, speech=speech)
 
-    def _correct(self, turn: Turn, memory: WorkingMemory, lesson: Lesson) -> None:
+    def _correct(self, turn: LearnedDecision, memory: WorkingMemory, lesson: Lesson) -> None:
         """Passes on an example of how the player's memory returns to the teacher's, if something was just heard.
 
         Without a new utterance, the network would learn to change its memory without a cause.

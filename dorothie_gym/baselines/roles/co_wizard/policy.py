@@ -77,7 +77,7 @@ class LearnedState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Turn:
+class LearnedDecision:
     """Decision of the player.
 
     Attributes:
@@ -139,7 +139,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         """As `act` for several sessions, with one forward pass for all; the results are equal."""
         return [(turn.action, turn.state) for turn in self.play_all(observations, states)]
 
-    def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> Turn:
+    def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> LearnedDecision:
         """Takes a decision; returns all that it consists of.
 
         Args:
@@ -151,7 +151,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
 
     def play_all(
         self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState], *, silent: bool = False
-    ) -> list[Turn]:
+    ) -> list[LearnedDecision]:
         """As `play` for several sessions, at least one."""
         begun = [_begin(observation, state, silent) for observation, state in zip(observations, states, strict=True)]
         memories = self._listen(begun)
@@ -270,7 +270,9 @@ def _begin(observation: ObservationMapping, state: LearnedState, silent: bool) -
     return _Begun(state, percept, rng, voice, queued, silent or not voice.idle)
 
 
-def _finish(turn: _Begun, memory: WorkingMemory, physical: Physical | None, remarks: tuple[Remark, ...]) -> Turn:
+def _finish(
+    turn: _Begun, memory: WorkingMemory, physical: Physical | None, remarks: tuple[Remark, ...]
+) -> LearnedDecision:
     """Speaks, and returns the whole decision."""
     percept, view = turn.percept, turn.percept.view
     voice = turn.voice.plan(*remarks)
@@ -283,7 +285,7 @@ def _finish(turn: _Begun, memory: WorkingMemory, physical: Physical | None, rema
         other_speaking=view.other_speaking,
     )
     mental, attention = finished(percept, memory, physical, remarks)
-    return Turn(
+    return LearnedDecision(
         percept=percept,
         memory=memory,
         action=CoWizardAction(speech=speech, physical=physical, mental=mental),

@@ -23,7 +23,7 @@ from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTA
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import ACTORS, SessionWorld
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, Sensor, WeatherParameter
-from dorothie_gym.sim.world import FAULT_SECONDS
+from dorothie_gym.sim.config import FAULT_SECONDS
 
 if TYPE_CHECKING:
     from dorothie_gym.session.recording.events import Event

@@ -20,10 +20,9 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, O
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.session.recording.events import Event, EventType
 from dorothie_gym.session.recording.surroundings import ActorKind
-from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.config import FAULT_SECONDS, FRAME_RATE
 from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.sim.world import FAULT_SECONDS
 from dorothie_gym.support.portable_math import wrap_degrees
 
 if TYPE_CHECKING:

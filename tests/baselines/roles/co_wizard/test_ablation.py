@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.co_wizard_ablation import make
 from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
-from dorothie_gym.baselines.roles.co_wizard.policy import Turn
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedDecision
 from dorothie_gym.baselines.roles.learned_role.practice import observed
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy, pretrained_folder
@@ -27,7 +27,7 @@ def engine() -> SessionEngine:
     return SessionEngine("brookside")
 
 
-def turns(row: str, engine: SessionEngine) -> Iterator[Turn]:
+def turns(row: str, engine: SessionEngine) -> Iterator[LearnedDecision]:
     """Plays a row beside the scripted roles."""
     player = make(row, pretrained_folder("pretrained:co-wizard"), Role.CO_WIZARD, engine.limits)
     others: dict[Role, AnyPolicy] = {
