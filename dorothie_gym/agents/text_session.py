@@ -19,7 +19,7 @@ from dorothie_gym.agents.tools import LOOK, TOOLS, WAIT, ToolSpec, waiting_label
 from dorothie_gym.agents.turn import Outcome, Turn
 from dorothie_gym.errors import AgentSessionError, short_repr
 from dorothie_gym.evaluation.rollout.play import personas_of, pitches_of, usage_of
-from dorothie_gym.maps.folds import DEFAULT_TOWN
+from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.casting import partners_of
 from dorothie_gym.policies.language_model.answer_schema import MAX_ANSWER, AnswerSchema, ChoiceField
@@ -60,25 +60,27 @@ class TextSession:
 
     Args:
         role: role of the agent: "co_wizard", "participant" or "ad_wizard".
-        town: name of a town, path of a map, or a `Town`.
+        town: name of a town, path of a map, or a `Town`; by default that of the tier, or `DEFAULT_TOWN`.
         config: settings of the sessions, also as a mapping.
         partners: policy of other roles, or its name, by role; "scripted" for those that are not named.
+        tier: name of a `Tier`, which gives town, settings and partners that are not given themselves.
         pages: whole pages, or changes.
         max_turns: number of answers and tool calls after which the session is truncated.
         max_faults: number of refused answers and tool calls after which the session is truncated.
         quiet_time: longest time between two turns [s]; an answer may request a shorter one.
 
     Raises:
-        ValueError: an argument is out of its range, or there is no such role or policy.
+        ValueError: an argument is out of its range, or there is no such role, policy or tier.
     """
 
     def __init__(
         self,
         role: Role | str = Role.CO_WIZARD,
-        town: str | Path | Town = DEFAULT_TOWN,
+        town: str | Path | Town | None = None,
         *,
         config: EnvConfig | Mapping[str, object] | None = None,
         partners: Mapping[str, str | AnyPolicy] | None = None,
+        tier: str | None = None,
         pages: PageStyle | str = PageStyle.FULL,
         max_turns: int = 400,
         max_faults: int = 20,
@@ -93,9 +95,10 @@ class TextSession:
                 raise ValueError(f"{name} is {short_repr(limit)}; it must be a whole number of at least 1")
         self.role, self.pages = Role(role), PageStyle(pages)
         self.max_turns, self.max_faults = max_turns, max_faults
-        self.engine = SessionEngine(town, config=config)
+        place, settings, usual = tier_settings(tier, town, config, self.role)
+        self.engine = SessionEngine(place, config=settings)
         self._turns = RoleTurns(self.role, self.engine.limits, quiet_time)
-        self._partners = partners_of(self.role, partners or {}, self.engine.limits)
+        self._partners = partners_of(self.role, {**usual, **(partners or {})}, self.engine.limits)
         self._progress: TaskProgress | None = None
 
     @property

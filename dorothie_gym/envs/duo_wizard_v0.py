@@ -22,8 +22,8 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.envs.tier_settings import tier_settings
 from dorothie_gym.envs.turn_based_duo_wizard import TurnBasedDuoWizard
+from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.session.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
-from dorothie_gym.envs.tier_settings import tier_settings
 from dorothie_gym.errors import short_repr
+from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import ChannelKind, EnvConfig, PerceptionModel, RenderView, checked_view
 from dorothie_gym.session.providers import sensor_spaces

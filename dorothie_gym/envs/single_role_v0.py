@@ -12,7 +12,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.envs.tier_settings import tier_settings
+from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.casting import partners_of
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed

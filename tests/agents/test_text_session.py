@@ -12,6 +12,7 @@ import pytest
 
 from dorothie_gym.agents import TextSession, merged_page
 from dorothie_gym.errors import AgentSessionError
+from dorothie_gym.evaluation.tiers import ROUGH
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.session.config import EnvConfig
@@ -261,3 +262,11 @@ def test_dropped_sessions_leave_nothing_behind() -> None:
     del session
     gc.collect()
     assert [each() for each in dropped] == [None] * 4
+
+
+def test_tier_gives_town_settings_and_partners() -> None:
+    rough = TextSession("participant", tier="rough")
+    assert (rough.engine.town.name, rough.engine.config) == (ROUGH.town, ROUGH.config)
+    assert TextSession("participant", "brookside", tier="rough").engine.town.name == "brookside"
+    with pytest.raises(ValueError, match="rough"):
+        TextSession(tier="rouhg")

@@ -1,4 +1,4 @@
-"""Argument `tier` of the environments that play sessions."""
+"""Argument `tier` of environments and text sessions."""
 
 from __future__ import annotations
 
