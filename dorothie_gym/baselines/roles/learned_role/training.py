@@ -148,21 +148,29 @@ class RoleLearner(Generic[Network, Batch, Example, Settings]):
 
 
 class _PracticeSessions(Generic[Network, Batch, Example, Settings]):
-    """Plays sessions of practice."""
+    """Plays sessions of practice: with acts observed for odd seeds, and hidden for even ones.
+
+    With hidden acts, player and teacher hear through the parser, and its errors are part of the examples.
+    """
 
     def __init__(self, role: LearnedRole[Network, Batch, Example, Settings], folder: Path, settings: Settings) -> None:
         torch.set_num_threads(1)
         self._role, self._settings = role, settings
         self._network, page = role.files.load(folder)
         self._vocabulary = page.vocabulary
-        self._config = EnvConfig(max_seconds=settings.max_seconds)
-        self._engines: dict[str, SessionEngine] = {}
+        self._engines: dict[tuple[str, bool], SessionEngine] = {}
 
     def __call__(self, plan: PracticePlan) -> None:
-        engine = self._engines.setdefault(plan.town, SessionEngine(plan.town, config=self._config))
+        engine = self._engine(plan.town, observe_acts=plan.seed % 2 == 1)
         found: list[Example] = []
         self._role.practise(self._network, self._vocabulary, engine, plan.seed, found.append, self._settings)
         _write(self._role.examples, found, plan.file)
+
+    def _engine(self, town: str, *, observe_acts: bool) -> SessionEngine:
+        if (town, observe_acts) not in self._engines:
+            config = EnvConfig(max_seconds=self._settings.max_seconds, observe_acts=observe_acts)
+            self._engines[town, observe_acts] = SessionEngine(town, config=config)
+        return self._engines[town, observe_acts]
 
 
 def _write(examples: type[Batch], found: Sequence[Any], file: Path) -> None:
