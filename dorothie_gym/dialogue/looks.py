@@ -129,9 +129,9 @@ def read_look(text: str) -> Appearance:
 _GARDENS: Final = MappingProxyType(
     {
         "tree": "tree beside it",
-        "hedge": "hedge in front",
-        "fence": "white fence in front",
-        "flowers": "flowers in front",
+        "hedge": "hedge along the front",
+        "fence": "white picket fence",
+        "flowers": "flowers along the front",
     }
 )
 _FEATURES: Final = MappingProxyType(
@@ -157,7 +157,8 @@ _PATTERNS: Final = MappingProxyType(
             rf"|\b(?:house|building|facade|walls?) (?:is|are) {_COLOUR}\b",
             "storeys": r"\b(one|single|two|three|[123])[- ](?:stor(?:ey|eys|y|ies)|floors?)\b",
             "roof": rf"\b{_COLOUR} roof\b|\broof is {_COLOUR}\b",
-            "garden": r"\b(?:a|the) (?:tree|hedge)\b|\b(?:a|the)(?: white)? fence\b|\bflowers in front\b",
+            "garden": r"\b(?:a|the) (?:tree|hedge)\b|\b(?:a|the)(?: white)?(?: picket)? fence\b"
+            r"|\bflowers (?:along the|in) front\b",
             "frames": rf"\b{_COLOUR} (?:window frames|windows|frames)\b",
             "coat": rf"\b{_COLOUR} (?:coat|jacket)\b|\b(?:coat|jacket) is {_COLOUR}\b",
             "trousers": rf"\b{_COLOUR} (?:trousers|pants)\b",

@@ -76,7 +76,7 @@ class MapPainter:
             label_spacing: smallest distance between two labels with the same name [px].
             label_distance: distance beyond which a name is repeated even across arrows [m].
             border: width of the country with trees around the roads [m]; by default up to the edge of the picture.
-            numbered: whether landmark sites have numbered pins.
+            numbered: whether landmark sites have numbered pins, and names stay inside the margin, as on a sheet.
             smallest_sign: smallest height of lights and signs at any scale [px].
             names_on_top: whether the map is painted without names, which are drawn later (`FloatingNames`).
 
@@ -106,7 +106,7 @@ class MapPainter:
             names=names[: len(town.streets)],
             scale=self.scale,
             origin=self.origin,
-            frame=(0, 0, *size),
+            frame=(left, top, size[0] - right, size[1] - bottom) if numbered else (0, 0, *size),
             sizes=type_sizes,
             spacing=label_spacing,
             farthest=label_distance * self.scale,

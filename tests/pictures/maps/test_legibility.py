@@ -172,3 +172,12 @@ def test_a_map_with_names_on_top_has_none_itself() -> None:
         for each in (painter, other)
     )
     assert (having > 220).sum() > (without > 220).sum()
+
+
+@pytest.mark.parametrize("name", ["generated:2,size=large,style=grid", "generated:2,size=large,style=mixed"])
+def test_names_on_a_sheet_stay_inside_its_frame(name: str) -> None:
+    painter = sheet_painter(load_town(name), (900, 700))
+    _, edge, strip = map_sheet._measures(painter.town, painter.street_names, 900)
+    for label in painter.labels:
+        assert (label.path >= edge).all()
+        assert (label.path <= (900 - edge, 700 - strip)).all()

@@ -9,7 +9,7 @@ import numpy as np
 
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.camera.atlas import Texture
-from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, Surface, oriented
+from dorothie_gym.pictures.camera.mesh import Mesh, MeshBuilder, oriented
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on
 from dorothie_gym.pictures.camera.scenery.trees import add_clump
 from dorothie_gym.pictures.maps.shapes import disc
@@ -151,7 +151,7 @@ def small_tree() -> Mesh:
     builder = MeshBuilder()
     builder.prism(
         disc((0.0, 0.0), 0.09, 4), -0.2, 1.4, colour=_BARK, kind=ObjectClass.VEGETATION, texture=Texture.BARK,
-        closed=(False, False), surface=Surface.NONE,
+        closed=(False, False),
     )  # fmt: skip
     add_clump(builder, (0.0, 0.0, 2.0), (1.0, 1.05), np.array(_LEAVES[1], dtype=np.float64), rng, sides=6)
     return builder.build()
