@@ -31,6 +31,7 @@ from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.dialogue_channel import CabinState, signal_to_noise
+from dorothie_gym.session.sensor_config import LidarConfig, LidarOutput, RadarConfig, SensorConfig, SensorMount
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.tasks import bind, load_template, template_names
@@ -161,6 +162,31 @@ def test_the_camera_page_has_the_defaults_of_all_settings() -> None:
     missing = [field.name for field in dataclasses.fields(CameraConfig) if f"`{field.name}`" not in text]
     missing += [output.name for output in CameraOutput if f"`{output.name}`" not in text]
     assert missing == []
+
+
+def test_the_example_of_the_sensors_page_reads_them() -> None:
+    names: dict[str, Any] = {}
+    exec(compile(example("sensors.md", "python"), "sensors.md", "exec"), names)
+    seen, points = names["seen"], names["points"]
+    assert seen["left_camera"].shape == seen["rear_camera"].shape == (80, 120, 3)
+    assert points.ndim == 2 and points.shape[1] == 4 and len(points) > 1000
+    assert {"optical_flow", "radar", "accelerometer", "collision"} <= set(seen)
+
+
+def test_the_sensors_page_has_the_defaults_of_all_settings() -> None:
+    text = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    lidar, radar = LidarConfig(), RadarConfig()
+    for values in (
+        (lidar.channels,), (lidar.columns,), (lidar.range,), (lidar.upper_fov, lidar.lower_fov), (lidar.rate,),
+        (radar.rows, radar.columns), (radar.horizontal_fov, radar.vertical_fov), (radar.range,),
+    ):  # fmt: skip
+        assert f"| {', '.join(f'{value:g}' for value in values)} |" in text
+    kinds = (LidarConfig, RadarConfig, SensorMount, SensorConfig)
+    missing = [field.name for kind in kinds for field in dataclasses.fields(kind) if f"`{field.name}`" not in text]
+    missing += [output.name for output in LidarOutput if f"`{output.name}`" not in text]
+    assert [name for name in missing if name not in ("lidar", "radar")] == []
+    assert f"SensorMount(up={lidar.mount.up:g})" in text
+    assert f"SensorMount(forward={radar.mount.forward:g}, up={radar.mount.up:g})" in text
 
 
 def test_the_predictions_of_their_page_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

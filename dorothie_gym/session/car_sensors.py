@@ -126,10 +126,12 @@ class CarSensors:
 
     def _read(self, events: Sequence[WorldEvent], before: Motion) -> None:
         world, sensors, readings = self._world, self._sensors, dict[str, NDArray[np.generic]]()
-        inertial, self._before = read_inertial_unit(world, before, self._frames)
         if sensors.imu:
+            inertial, self._before = read_inertial_unit(world, before, self._frames)
             readings["accelerometer"], readings["gyroscope"] = inertial.accelerometer, inertial.gyroscope
             readings["compass"] = np.array([inertial.compass])
+        else:
+            self._before = Motion.of(world)
         if sensors.gnss:
             readings["gnss"] = np.array(read_receiver(world))
         if sensors.lane_invasion:

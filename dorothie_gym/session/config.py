@@ -220,7 +220,12 @@ class EnvConfig:
     @property
     def has_sensors(self) -> bool:
         """Whether the car has a camera or another sensor."""
-        return self.camera is not None or bool(self.cameras) or self.sensors.is_on
+        return self.draws or self.sensors.measures
+
+    @property
+    def draws(self) -> bool:
+        """Whether there is a camera, lidar or radar, which need the scene of the session."""
+        return self.camera is not None or bool(self.cameras) or self.sensors.scans
 
     @property
     def frames(self) -> int:

@@ -224,6 +224,11 @@ class SensorConfig:
                 raise ValueError(f"SensorConfig.{name} is {getattr(self, name)!r}; it must be True or False")
 
     @property
-    def is_on(self) -> bool:
-        """Whether there is any sensor."""
-        return self != SensorConfig()
+    def scans(self) -> bool:
+        """Whether there is a sensor that scans the scene of the session."""
+        return self.lidar is not None or self.radar is not None
+
+    @property
+    def measures(self) -> bool:
+        """Whether there is a sensor that needs no scene."""
+        return self.imu or self.gnss or self.lane_invasion or self.collision

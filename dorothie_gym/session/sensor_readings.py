@@ -29,22 +29,25 @@ class SensorReadings:
 
     def __init__(self, world: World, scenario: Scenario, config: EnvConfig) -> None:
         self._names = {role: tuple(sensor_spaces(config, role)) for role in OBSERVERS}
-        self._pictures: Pictures = draw_pictures(world, scenario, config)
-        self._car = CarSensors(world, config, lines_of)
+        self._pictures: Pictures | None = draw_pictures(world, scenario, config) if config.draws else None
+        self._car = CarSensors(world, config, lines_of) if config.sensors.measures else None
 
     def begin_decision(self) -> None:
         """Notes the present before the world is stepped."""
-        self._pictures.begin_decision()
+        if self._pictures is not None:
+            self._pictures.begin_decision()
 
     def update(self, events: Sequence[WorldEvent]) -> None:
         """Reads the sensors after a step of the world, with its events."""
-        self._car.update(events)
+        if self._car is not None:
+            self._car.update(events)
 
     def readings(self, decision: int, role: Role = Role.CO_WIZARD) -> Mapping[str, NDArray[np.generic]]:
         """Returns the fields of a role at the current decision of this number; callers must not write to them."""
         names = self._names.get(role, ())
-        found = {name: value for name, value in self._car.readings.items() if name in names}
-        return found | self._pictures.readings(decision, names)
+        known = {} if self._car is None else self._car.readings
+        found = {name: value for name, value in known.items() if name in names}
+        return found if self._pictures is None else found | self._pictures.readings(decision, names)
 
     def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
         """Adds the fields of the current decision to the observations of the roles, which own their arrays."""
@@ -55,4 +58,4 @@ class SensorReadings:
 
     def picture(self, decision: int, name: str = "") -> CameraFrame | None:
         """Returns the picture of a camera, boxes included; None for no such camera."""
-        return self._pictures.frame(decision, name)
+        return None if self._pictures is None else self._pictures.frame(decision, name)

@@ -133,6 +133,7 @@ def test_copies_and_states_continue_with_equal_readings() -> None:
             np.testing.assert_array_equal(other[name], after[0][name], err_msg=name)
 
 
+@pytest.mark.long
 def test_environments_pass_the_checks_of_gymnasium_and_pettingzoo() -> None:
     config = replace(CONFIG, cameras={"left": SIDES["left"]})  # depths are infinite, against which Gymnasium warns
     parallel_api_test(DuoWizardEnv("brookside", config=config), num_cycles=4)

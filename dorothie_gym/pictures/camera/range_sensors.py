@@ -126,7 +126,7 @@ class Lidar(RangeSensor):
 
     def __init__(self, scene: SessionScene, config: LidarConfig) -> None:
         self.config = config
-        azimuths = np.arange(config.columns) * (2.0 * math.pi / config.columns)
+        azimuths = np.asarray(np.arange(config.columns) * (2.0 * math.pi / config.columns), dtype=np.float64)
         altitudes: Array = np.radians(
             np.linspace(config.lower_fov, config.upper_fov, config.channels), dtype=np.float64
         )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.labels import write_labels
+from dorothie_gym.pictures.camera.range_sensors import Lidar
 from dorothie_gym.pictures.camera.scene_cache import town_scene
-from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.session_camera import EarlierWorld, SessionCamera
+from dorothie_gym.pictures.camera.session_pictures import car_state
 from dorothie_gym.pictures.camera.shading import shade
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
+from dorothie_gym.session.sensor_config import LidarConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.warm_up import TOWN, Progress, reporting
 from dorothie_gym.sim.config import WorldConfig
@@ -35,3 +38,5 @@ def warm_up(progress: Progress | None = None) -> None:
         x, y = world.car.position.tolist()
         pose = camera.pose_on(x, y, float(world.car.height), 0.0)
         camera.render_from(pose, world.actors.arrays, rain, time=0.0, head_lights=True, faults=(Sensor.BLUR,))
+        camera.render(world, EarlierWorld.of(world))
+        Lidar(scene, LidarConfig(channels=2, columns=8)).turn(car_state(world), world.actors.arrays, world.weather)

@@ -18,10 +18,12 @@ from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 from dorothie_gym.pictures.camera.pose import pose_on_car
+from dorothie_gym.pictures.camera.range_sensors import Lidar, Radar
 from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.recording import EventType, Session, Surroundings
+from dorothie_gym.session.sensor_config import LidarConfig, RadarConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping
 from dorothie_gym.sim.config import WorldConfig
@@ -119,6 +121,27 @@ def test_a_recorded_picture_equals_the_live_one_but_for_gait_and_brake_lights(
         bodies |= keys(again)
     assert np.mean(equal) >= 0.999
     assert len([key for key in bodies if key > 0]) > 10 and any(key < 0 for key in bodies)
+
+
+def test_recorded_flow_and_turns_of_the_lidar_are_those_of_the_session(
+    played: Played, recorded: RecordedPictures, town: Town
+) -> None:
+    flow: list[float] = []
+    for frame in [frame for frame in played.pictures if frame > FRAMES][::6]:
+        live, again = played.pictures[frame], recorded.picture(frame, since=frame - FRAMES)
+        assert live.optical_flow is not None and again.optical_flow is not None
+        flow.append(float((np.abs(live.optical_flow - again.optical_flow).max(axis=-1) < 0.05).mean()))
+    assert min(flow) > 0.95 and np.mean(flow) > 0.98
+    still = recorded.picture(450)
+    assert still.optical_flow is not None and not still.optical_flow.any()
+    lidar, car = Lidar(recorded.camera.scene, LidarConfig(columns=180)), recorded.car(450)
+    turn = recorded.lidar_turn(450, lidar)
+    np.testing.assert_array_equal(turn.points, recorded.lidar_turn(450, lidar).points)
+    assert (turn.points[..., 3] > 0.0).mean() > 0.5
+    radar = Radar(recorded.camera.scene, RadarConfig())
+    detections = recorded.radar_detections(450, radar)
+    moving = detections[detections[:, 0] > 0.0]
+    assert np.median(moving[:, 3]) == pytest.approx(-car.speed, abs=0.2)  # most of them see the town
 
 
 def test_pictures_do_not_depend_on_those_drawn_before(played: Played, recorded: RecordedPictures, town: Town) -> None:
