@@ -145,14 +145,16 @@ def with_breaks(text: str, *, answering: bool = True) -> str:
     words = [plain_word(word) for word in raw]
     if not answering and words[0] not in _YES_AND_NO:
         return with_breaks(text)
-    begin = 0
+    begin, behind = 0, _behind_answer(words, 0)
     changed = False
     for place in range(1, len(raw)):
         if raw[place - 1].endswith(_MARKS):
-            begin = place
+            begin, behind = place, _behind_answer(words, place)
+        elif place != behind and not _may_begin_clause(words[place]):
+            continue
         elif _begins_clause(words, begin, place) and (answering or begin):
             raw[place - 1] += ","
-            begin, changed = place, True
+            begin, behind, changed = place, _behind_answer(words, place), True
     if raw[-1][-1] not in _MARKS and _asks_for_agreement(words):
         raw[-2] = raw[-2] if words[-1] not in _AGREED or raw[-2].endswith(_MARKS) else f"{raw[-2]},"
         raw[-1] += "?"
@@ -160,11 +162,23 @@ def with_breaks(text: str, *, answering: bool = True) -> str:
     return " ".join(raw) if changed else text
 
 
+def _behind_answer(words: Sequence[str], begin: int) -> int:
+    """Returns the place behind the answer or sign at a place; -1 if there is none."""
+    answer = _breaks().answers.longest(words, begin)
+    return -1 if answer is None else begin + answer.length
+
+
+@functools.lru_cache(maxsize=4096)
+def _may_begin_clause(word: str) -> bool:
+    """Returns whether a clause that follows no answer may begin with a word."""
+    starts = _breaks().starts.may_begin(word) or _breaks().tags.may_begin(word)
+    return starts or word in _POSSESSIVE or word in _BEFORE_ORDERS
+
+
 def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     """Returns whether a clause begins at a place of the words, behind the one that began at `begin`."""
     breaks = _breaks()
-    answer = breaks.answers.longest(words, begin)
-    if answer is not None and answer.length == place - begin:
+    if place == _behind_answer(words, begin):
         return _answered(words, begin, place)
     found = breaks.starts.longest(words, place)
     if found is None and _has_subject(words, place):

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.conversation import Span
 from dorothie_gym.dialogue.directions import word_lists
 from dorothie_gym.dialogue.formulas import formula_move, formula_moves
-from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, split_words, strings
+from dorothie_gym.dialogue.lexicon import split_words
+from dorothie_gym.dialogue.move_cues import move_cues
 from dorothie_gym.dialogue.move_decision import (
     belong_together,
     decide,
@@ -22,24 +22,19 @@ from dorothie_gym.dialogue.move_decision import (
     stand_apart,
 )
 from dorothie_gym.dialogue.nlu import ParsedText, understand
-from dorothie_gym.dialogue.pattern_index import PatternIndex, bits
+from dorothie_gym.dialogue.pattern_index import bits
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import behind_signs
 from dorothie_gym.dialogue.span_features import span_features
 from dorothie_gym.dialogue.span_tagger import retagged
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
-from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot, SlotValue
-from dorothie_gym.ontology.spellings import parse_move
 
 _SENTENCE_END = re.compile(r"(?<=[.?!])(?<!\b(?:Mr|Ms|Dr)\.)(?<!\bMrs\.)\s+")
 
 _COMMA = re.compile(r",(?=\s|$)")
 """Comma between words; one inside of a word, as in a number, separates nothing."""
-
-_DOMAIN_RULE = "%domain"
-_WORD_LISTS = ("domain", "small_talk", "reports")
 
 _HEADS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.EXPLAIN})
 """Moves after which a command is a separate act: "no, stop"; "I can hardly see, slow down"."""
@@ -154,59 +149,6 @@ _ROADS = frozenset({"lane", "lanes", "road", "junction", "traffic", "jam", "turn
 """Words that no small talk holds."""
 
 
-@dataclass(frozen=True)
-class MoveRule:
-    """Rule with the cues of one move.
-
-    Attributes:
-        move: the move.
-        masked: pattern over masked words.
-        acted: pattern over words with actions masked as well.
-        domain: whether any driving-domain word is a cue.
-        words: words of which one must occur before the patterns are tried; empty for no condition.
-    """
-
-    move: DialogueMove
-    masked: re.Pattern[str] | None
-    acted: re.Pattern[str] | None
-    domain: bool
-    words: frozenset[str]
-
-
-@dataclass(frozen=True)
-class MoveCues:
-    """Cues of all moves.
-
-    Attributes:
-        rules: rules in order; the first match decides.
-        answers: for each preceding move, replacements of the classified move.
-        domain: words of the driving domain.
-        small_talk: words of small talk.
-        reports: words that report a wish, which exclude small talk.
-    """
-
-    rules: tuple[MoveRule, ...]
-    answers: Mapping[DialogueMove, Mapping[DialogueMove, DialogueMove]]
-    domain: frozenset[str]
-    small_talk: frozenset[str]
-    reports: frozenset[str]
-
-    @functools.cached_property
-    def masked(self) -> PatternIndex:
-        """Index of the rules by their patterns over masked words."""
-        return PatternIndex([rule.masked for rule in self.rules])
-
-    @functools.cached_property
-    def acted(self) -> PatternIndex:
-        """Index of the rules by their patterns over words with actions masked."""
-        return PatternIndex([rule.acted for rule in self.rules])
-
-    @functools.cached_property
-    def by_domain(self) -> int:
-        """Rules for which any word of the driving domain is a cue, as the index numbers them."""
-        return sum(1 << number for number, rule in enumerate(self.rules) if rule.domain)
-
-
 @functools.lru_cache(maxsize=4096)
 def guess_act(text: str, after: DialogueMove | None = None) -> DialogueAct:
     """Classifies move and slots of a text.
@@ -244,7 +186,7 @@ def act_of(parsed: ParsedText, after: DialogueMove | None = None) -> DialogueAct
     elif move is DialogueMove.EXPLAIN and _is_bare_place(parsed):
         move = DialogueMove.INSTRUCT  # "first things first, the Ikea"
     if after is not None:
-        changes = _cues().answers.get(after)
+        changes = move_cues().answers.get(after)
         # Small talk remains irrelevant, unless it is a bare answer: "the blue one".
         if changes is not None and (move is not DialogueMove.IRRELEVANT or not _is_small_talk(parsed)):
             move = changes.get(move, move)
@@ -279,7 +221,7 @@ def _move_of(parsed: ParsedText) -> DialogueMove:
     sentence, acted = parsed.masked.strip(" ,"), parsed.acted.strip(" ,")
     if _is_small_talk(parsed):
         return DialogueMove.IRRELEVANT
-    words, cues = set(sentence.split()), _cues()
+    words, cues = set(sentence.split()), move_cues()
     masked_cues, acted_cues = cues.masked.possible(words), cues.acted.possible(acted.split())
     for number in bits(masked_cues | acted_cues | cues.by_domain):
         rule = cues.rules[number]
@@ -312,7 +254,7 @@ def _is_small_talk(parsed: ParsedText) -> bool:
     words = set(parsed.masked.split())
     if not words.isdisjoint(_ROADS):
         return False
-    return not words.isdisjoint(_cues().small_talk) and words.isdisjoint(_cues().reports)
+    return not words.isdisjoint(move_cues().small_talk) and words.isdisjoint(move_cues().reports)
 
 
 def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
@@ -362,7 +304,7 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
         return spans  # nothing was said that could be answered or corrected
     if any(_joins_sentences(part, spans) for part, _ in found):
         return spans
-    changes = _cues().answers.get(after) if after is not None else None
+    changes = move_cues().answers.get(after) if after is not None else None
     if changes is not None and found[0][1] is not DialogueMove.IRRELEVANT:
         found[0] = found[0][0], changes.get(found[0][1], found[0][1])
     ruled = {(span.text, span.act.move): span for span in spans}
@@ -467,42 +409,3 @@ def _starts_statement(head: str, rest: str, first: DialogueAct, second: Dialogue
 
 def _is_clause(text: str) -> bool:
     return _CLAUSE.match(understand(text).masked) is not None
-
-
-@functools.cache
-def _cues() -> MoveCues:
-    data = read_data("cues.yaml")
-    terms = {
-        "{soft}": data.get("soft", ""),
-        "{verb}": f"(?:{'|'.join(strings('cues.yaml: verbs', data.get('verbs')))})",
-    }
-    rules = tuple(_rule(f"cues.yaml: moves[{n}]", rule, terms) for n, rule in enumerate(data.get("moves", [])))
-    ruled = {rule.move for rule in rules}
-    if missing := [move.label for move in DialogueMove if move not in ruled]:
-        raise PhraseFileError(f"dorothie_gym/dialogue/data/cues.yaml: moves has no rule for {', '.join(missing)}")
-    answers = {
-        parse_move(before): {parse_move(guess): parse_move(move) for guess, move in changes.items()}
-        for before, changes in data.get("answers", {}).items()
-    }
-    words = {name: frozenset(strings(f"cues.yaml: {name}", data.get(name))) for name in _WORD_LISTS}
-    return MoveCues(rules, answers, **words)
-
-
-def _rule(where: str, rule: YamlMapping, terms: Mapping[str, str]) -> MoveRule:
-    texts = list(strings(f"{where}.cues", rule.get("cues")))
-    for name, expression in terms.items():
-        texts = [text.replace(name, expression) for text in texts]
-    try:
-        move = parse_move(rule["move"])
-        acted = _either([text[1:] for text in texts if text.startswith("@")])
-        masked = _either([text for text in texts if text[0] not in "@%"])
-    except (re.error, OntologyError) as error:
-        raise PhraseFileError(f"{where}: {error}") from error
-    words = frozenset(strings(f"{where}.words", rule.get("words", [])))
-    return MoveRule(move, masked, acted, _DOMAIN_RULE in texts, words)
-
-
-def _either(patterns: list[str]) -> re.Pattern[str] | None:
-    for pattern in patterns:
-        re.compile(pattern)  # compiled separately, so that the error message shows the faulty pattern
-    return re.compile("|".join(f"(?:{pattern})" for pattern in patterns)) if patterns else None

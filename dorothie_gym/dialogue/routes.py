@@ -115,8 +115,7 @@ class PlanPart:
 
     def __post_init__(self) -> None:
         for name, required in self._names():
-            value = getattr(self, name)
-            if value is not None or required:
+            if (value := getattr(self, name)) is not None or required:
                 _check(f"{type(self).__name__}.{name}", name, value)
 
     @classmethod

@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from dorothie_gym.dialogue.dialogue_act_classifier import _cues
+from dorothie_gym.dialogue.move_cues import move_cues
 from dorothie_gym.dialogue.nlu import _propositions, understand
 from dorothie_gym.dialogue.pattern_index import PatternIndex, bits, required_parts
 from tests.dialogue.annotated_utterances import read_annotated
@@ -36,7 +36,7 @@ def test_index_names_the_patterns_that_can_match():
 
 
 def test_index_loses_no_match_of_the_cues():
-    rules = _cues().rules
+    rules = move_cues().rules
     tables = [
         ([rule.masked for rule in rules], "masked"),
         ([rule.acted for rule in rules], "acted"),
