@@ -45,7 +45,7 @@ def compile_first(*, batches: bool = False, pictures: bool = False) -> None:
     batches = batches and not navigation.is_warm()
     pictures = pictures and not _is_camera_warm()
     if batches or pictures or not sessions.is_warm():
-        compile_with_progress(batches=batches, pictures=pictures)
+        compile_with_progress(batches=batches, pictures=pictures, rare=False)
 
 
 def _is_camera_warm() -> bool:
@@ -54,13 +54,14 @@ def _is_camera_warm() -> bool:
     return pictures.is_warm()
 
 
-def compile_with_progress(*, everything: bool = False, batches: bool, pictures: bool) -> int:
+def compile_with_progress(*, everything: bool = False, batches: bool, pictures: bool, rare: bool = True) -> int:
     """Compiles with a progress bar on a terminal.
 
     Args:
         everything: whether to compile the functions of `Town-v0` as well.
         batches: see `compile_first`.
         pictures: see `compile_first`.
+        rare: see `session.warm_up.warm_up`.
 
     Returns:
         The number of functions.
@@ -85,7 +86,7 @@ def compile_with_progress(*, everything: bool = False, batches: bool, pictures: 
             begun = done
             progress.update(bar, completed=done, total=planned, description=name)
 
-        sessions.warm_up(show, everything=everything)
+        sessions.warm_up(show, everything=everything, rare=rare)
         total, begun = begun, 0
         if batches:
             navigation.warm_up(show)

@@ -1,11 +1,13 @@
 """Compilation of the simulation ahead of its use, in two processes where there are two processors.
 
 Half of the work is the loop over substeps (`sim.step.step_share`), which a second process compiles at the same time:
-it leaves the machine code in the cache, where the first one finds it.
+it leaves the machine code in the cache, where the first one finds it. Functions that the first seconds of a session may
+not call follow there, while the session is already played.
 """
 
 from __future__ import annotations
 
+import atexit
 import os
 import subprocess
 import sys
@@ -20,6 +22,7 @@ from numba.core import event
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology.roles import AGENT_ROLES
+from dorothie_gym.session.actor_table import write_actors
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import noop
@@ -51,9 +54,15 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 _HELPER: Final = """
 import os, sys, threading
 threading.Thread(target=lambda: os._exit(len(os.read(0, 1))), daemon=True).start()  # the parent's end closes stdin
-from dorothie_gym.session.warm_up import compile_loop
-compile_loop(lambda name, *_: print(name, flush=True))
+from dorothie_gym.session.warm_up import LOOP_DONE, compile_loop, compile_rare, reporting
+with reporting(lambda name, *_: print(name, flush=True)):
+    compile_loop()
+    print(LOOP_DONE, flush=True)
+    compile_rare()
 """
+
+LOOP_DONE: Final = "the loop is compiled"
+"""Line of the second process between its two tasks."""
 
 
 def is_warm() -> bool:
@@ -61,18 +70,21 @@ def is_warm() -> bool:
     return not isinstance(step_share, CompiledFunction) or step_share.is_cached()
 
 
-def warm_up(progress: Progress | None = None, *, everything: bool = False) -> None:
+def warm_up(progress: Progress | None = None, *, everything: bool = False, rare: bool = True) -> None:
     """Compiles the functions of sessions that are not yet in the cache.
 
     Args:
         progress: called when the compilation of a function begins, perhaps in another thread.
         everything: whether to compile the functions of `Town-v0` as well.
+        rare: whether to compile functions that the first seconds of a session may not call before the return. Without
+            it a second process, if there is one, compiles them afterwards; it ends with this process at the latest.
     """
-    with reporting(progress) as report, _helper(report) as wait:
+    with reporting(progress) as report, _helper(report, goes_on=not rare) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
         engine.session.observer.observe()
-        _compile_rare()
+        if rare:
+            compile_rare()
         _call_what_follows_a_step(engine.session.world)
         if everything:
             _play(TownEnv())
@@ -94,9 +106,11 @@ def _examples() -> tuple[TownArrays, WorldArrays]:
     return town, empty_world(town, vehicles=0, pedestrians=0)
 
 
-def _compile_rare() -> None:
-    """Compiles functions that the first seconds of a session may not call."""
+def compile_rare() -> None:
+    """Compiles functions that the first seconds of a session may not call, and those of recordings."""
     town, world = _examples()
+    if isinstance(write_actors, CompiledFunction):
+        write_actors.compile_for(world, np.zeros((0, 8), dtype=np.int64), np.zeros((0, 8)))
     if isinstance(look_around, CompiledFunction) and isinstance(closest_walk, CompiledFunction):
         look_around.compile_for(world, 0, np.zeros((0, 2)))
         closest_walk.compile_for(town, Footway.STREET, 0.0, 0.0, 0.0)
@@ -167,8 +181,13 @@ def reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def _helper(report: Callable[[str], None]) -> Iterator[Callable[[], None]]:
-    """Compiles the loop in a second process; yields a function that waits for its end."""
+def _helper(report: Callable[[str], None], *, goes_on: bool) -> Iterator[Callable[[], object]]:
+    """Compiles the loop in a second process; yields a function that waits until it is done.
+
+    Args:
+        report: called with the names of the functions that it compiles.
+        goes_on: whether the process may go on with rare functions after the block.
+    """
     if is_warm() or available_processors() < 2:
         yield lambda: None
         return
@@ -182,20 +201,34 @@ def _helper(report: Callable[[str], None]) -> Iterator[Callable[[], None]]:
             stderr=subprocess.DEVNULL,
             text=True,
         )
-    reader = threading.Thread(target=_forward, args=(process, report), daemon=True)
-    reader.start()
+    done = threading.Event()
+    threading.Thread(target=_forward, args=(process, report, done), daemon=True).start()
     try:
-        yield reader.join  # if the process failed, this one compiles the missing functions
+        yield done.wait  # if the process failed, this one compiles the missing functions
+    except BaseException:
+        goes_on = False
+        raise
     finally:
-        assert process.stdin is not None
-        process.kill()
-        process.stdin.close()
-        process.wait()
+        if goes_on:
+            atexit.register(_stop, process)
+        else:
+            _stop(process)
 
 
-def _forward(process: subprocess.Popen[str], report: Callable[[str], None]) -> None:
-    """Reports the names that the second process prints, until it ends."""
+def _stop(process: subprocess.Popen[str]) -> None:
+    assert process.stdin is not None
+    process.kill()
+    process.stdin.close()
+    process.wait()
+
+
+def _forward(process: subprocess.Popen[str], report: Callable[[str], None], done: threading.Event) -> None:
+    """Reports the names that the second process prints, until it ends; sets an event when the loop is compiled."""
     assert process.stdout is not None
     with process.stdout:
         for line in process.stdout:
-            report(f"dorothie_gym.{line.strip()}")
+            if line.strip() == LOOP_DONE:
+                done.set()
+            elif not done.is_set():
+                report(f"dorothie_gym.{line.strip()}")
+    done.set()

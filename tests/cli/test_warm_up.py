@@ -31,7 +31,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Pretends to compile two functions on a terminal; the list grows by each call's choice to compile everything."""
     found: list[bool] = []
 
-    def compile_two(progress: Callable[[str, int, int], None], *, everything: bool) -> None:
+    def compile_two(progress: Callable[[str, int, int], None], *, everything: bool, rare: bool) -> None:
         found.append(everything)
         for done, name in enumerate(NAMES, start=1):
             progress(name, done, len(NAMES))
@@ -84,7 +84,7 @@ def test_cold_run_shows_what_is_compiled_before_the_session(asked: list[bool], m
 def test_commands_that_step_batches_compile_them_first(
     asked: list[bool], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: Typer, words: list[str], stepped: bool
 ) -> None:
-    def interrupt(progress: Callable[[str, int, int], None], *, everything: bool) -> None:
+    def interrupt(progress: Callable[[str, int, int], None], *, everything: bool, rare: bool) -> None:
         raise KeyboardInterrupt  # the command itself is not to run
 
     def interrupt_batch(progress: Callable[[str, int, int], None]) -> None:

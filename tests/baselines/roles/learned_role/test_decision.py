@@ -27,7 +27,7 @@ def test_times_and_distances_are_bounded():
     assert time_scales(-1.0) == time_scales(0.0) and time_scales(2.0 * AWAY) == time_scales(AWAY)
     assert age_scales(5.0, -np.inf) == time_scales(AWAY) and age_scales(5.0, 5.0)[0] == 1.0
     assert distance_scales(np.inf, (25.0,)) == distance_scales(1000.0, (25.0,))
-    assert one_hot(1, 3) == [0.0, 1.0, 0.0] and not any(one_hot(-1, 3)) and not any(one_hot(3, 3))
+    assert one_hot(1, 3) == (0.0, 1.0, 0.0) and not any(one_hot(-1, 3)) and not any(one_hot(3, 3))
 
 
 def test_numbers_are_drawn_by_their_shares():
