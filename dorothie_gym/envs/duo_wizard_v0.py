@@ -80,7 +80,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
 
     ## Arguments
     - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`. `"generated:SEED"` is a generated town;
-      `"generated"` is another one for each seed of a session.
+      `"generated"` is another one for each seed of a session. None for `"millbrook"`, or the town of the tier.
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
     - `config`: `EnvConfig`, or a mapping of its fields.
     - `render_mode`: None, `"rgb_array"` or `"human"`.

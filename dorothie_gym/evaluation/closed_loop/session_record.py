@@ -15,6 +15,7 @@ from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTANCE, kind_of, time_met
 from dorothie_gym.evaluation.analysis.units import Units
+from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT
 from dorothie_gym.evaluation.closed_loop.sub_scores import ConductPage, ConductRecord, conduct_of
 from dorothie_gym.evaluation.closed_loop.task_progress import (
     TaskRecord,
@@ -245,7 +246,6 @@ def _on_road(session: Session, events: int) -> tuple[Place, ...]:
 
 # --- Record of a driven session ---------------------------------------------------------------------------------------
 
-TIMEOUT: Final = "timeout"
 HIT_BY_OTHERS: Final = "hit_by_others"
 """Name of the collisions that others caused; they are counted and have no penalty."""
 
