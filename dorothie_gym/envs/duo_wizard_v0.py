@@ -109,8 +109,13 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         render_view: str = "map",
         tier: str | None = None,
     ) -> None:
-        place, settings, _ = tier_settings(tier, town, config)
-        self.engine = SessionEngine(place, storyboard, config=settings, max_cycles=max_cycles)
+        usual = tier_settings(tier)
+        self.engine = SessionEngine(
+            usual.town if town is None else town,
+            storyboard,
+            config=usual.config if config is None else config,
+            max_cycles=max_cycles,
+        )
         rate = self.engine.config.decision_frequency
         self.metadata = {**_METADATA, **metadata_at(rate)}
         self.render_mode = render_mode

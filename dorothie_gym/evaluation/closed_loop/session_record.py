@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Final, NotRequired, TypeAlias, TypedDict
 
 import numpy as np
@@ -337,7 +337,12 @@ class SessionRecord:
         if self.conduct is not None:
             page["conduct"] = self.conduct.to_json()
         if self.reference is not None:
-            page["reference"] = ReferencePage(**asdict(self.reference))
+            reference = self.reference
+            page["reference"] = {
+                "seconds": reference.seconds,
+                "exchanges": reference.exchanges,
+                "subgoals": reference.subgoals,
+            }
         return page
 
     @classmethod
