@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dorothie_gym.evaluation.tiers import find_tier
 from dorothie_gym.maps.folds import DEFAULT_TOWN
+from dorothie_gym.session.config import EnvConfig
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
-    from dorothie_gym.session.config import EnvConfig
 
 
 class TierSettings(NamedTuple):
