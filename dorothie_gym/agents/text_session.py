@@ -95,10 +95,12 @@ class TextSession:
                 raise ValueError(f"{name} is {short_repr(limit)}; it must be a whole number of at least 1")
         self.role, self.pages = Role(role), PageStyle(pages)
         self.max_turns, self.max_faults = max_turns, max_faults
-        place, settings, usual = tier_settings(tier, town, config, self.role)
-        self.engine = SessionEngine(place, config=settings)
+        usual = tier_settings(tier, self.role)
+        self.engine = SessionEngine(
+            usual.town if town is None else town, config=usual.config if config is None else config
+        )
         self._turns = RoleTurns(self.role, self.engine.limits, quiet_time)
-        self._partners = partners_of(self.role, {**usual, **(partners or {})}, self.engine.limits)
+        self._partners = partners_of(self.role, {**usual.partners, **(partners or {})}, self.engine.limits)
         self._progress: TaskProgress | None = None
 
     @property

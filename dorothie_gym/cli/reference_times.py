@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,8 +13,7 @@ from dorothie_gym.cli.output import fail, print_json, reporting_errors, session_
 from dorothie_gym.cli.tier_options import TierName, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import closed_loop
-from dorothie_gym.evaluation.rollout.processes import run_tasks
-from dorothie_gym.evaluation.rollout.reference_drives import DriveTask, read_drives, write_drives
+from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.support.processors import available_processors
 
 
@@ -45,17 +43,18 @@ def reference_times(
             plans = closed_loop.RolloutSettings(towns=chosen, sessions=sessions, seed=seed).plans()
         except ValueError as error:
             fail(str(error))
-        known = read_drives(out) if out.is_file() else {}
+        known = rollouts.read_drives(out) if out.is_file() else {}
         compile_first()
         drives = dict(known)
         tasks = [(plan.town, plan.seed) for plan in plans]
         with session_progress(quiet=as_json) as on_session:
             on_session(0, len(tasks))
-            prepare = partial(DriveTask, found.config.stops, known)
-            measured = run_tasks(prepare, tasks, workers=workers or available_processors())
+            measured = rollouts.measure_drives(
+                tasks, found.config.stops, known, workers=workers or available_processors()
+            )
             for number, (key, drive) in enumerate(measured, start=1):
                 drives[key] = drive
-                write_drives(out, drives)
+                rollouts.write_drives(out, drives)
                 on_session(number, len(tasks))
     added = len(drives) - len(known)
     if as_json:

@@ -80,7 +80,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
 
     ## Arguments
     - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`. `"generated:SEED"` is a generated town;
-      `"generated"` is another one for each seed of a session.
+      `"generated"` is another one for each seed of a session. None for `"millbrook"`, or the town of the tier.
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
     - `config`: `EnvConfig`, or a mapping of its fields.
     - `render_mode`: None, `"rgb_array"` or `"human"`.
@@ -109,8 +109,13 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         render_view: str = "map",
         tier: str | None = None,
     ) -> None:
-        place, settings, _ = tier_settings(tier, town, config)
-        self.engine = SessionEngine(place, storyboard, config=settings, max_cycles=max_cycles)
+        usual = tier_settings(tier)
+        self.engine = SessionEngine(
+            usual.town if town is None else town,
+            storyboard,
+            config=usual.config if config is None else config,
+            max_cycles=max_cycles,
+        )
         rate = self.engine.config.decision_frequency
         self.metadata = {**_METADATA, **metadata_at(rate)}
         self.render_mode = render_mode

@@ -110,7 +110,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         Raises:
             ValueError: an argument is out of its range.
         """
-        place, settings, _ = tier_settings(tier, town, config)
+        usual = tier_settings(tier)
+        place, settings = usual.town if town is None else town, usual.config if config is None else config
         if settings is not None and settings.perception is PerceptionModel.CAMERA:
             raise ValueError('config.perception is "camera"; batches do not perceive by it: make single environments')
         if settings is not None and settings.channel is ChannelKind.SPEECH:

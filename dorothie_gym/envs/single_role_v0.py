@@ -91,8 +91,13 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         if role not in AGENT_ROLES:
             raise ValueError(f"role is {str(role)!r}; it must be one of {', '.join(AGENT_ROLES)}")
         self.role = Role(role)
-        place, settings, usual = tier_settings(tier, town, config, self.role)
-        self.engine = SessionEngine(place, storyboard, config=settings, max_cycles=max_cycles)
+        usual = tier_settings(tier, self.role)
+        self.engine = SessionEngine(
+            usual.town if town is None else town,
+            storyboard,
+            config=usual.config if config is None else config,
+            max_cycles=max_cycles,
+        )
         rate = self.engine.config.decision_frequency
         self.metadata = metadata_at(rate)
         self.render_mode = render_mode
@@ -100,7 +105,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         limits = self.engine.limits
         self.observation_space = deepcopy(self.engine.observation_space(self.role))
         self.action_space = deepcopy(action_space(self.role, limits))
-        self.partners = partners_of(self.role, {**usual, **(partners or {})}, limits)
+        self.partners = partners_of(self.role, {**usual.partners, **(partners or {})}, limits)
         self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))
         self._states: dict[Role, object] = {}
 

@@ -65,7 +65,7 @@ class Tier:
 
 _SHIPPED: Final = (*SEEN_TOWNS, *DEVELOPMENT_TOWNS)
 
-_CROWDED: Final = WorldConfig(vehicles=60, pedestrians=40, braking=AutomaticBraking.PERCEIVED)
+_CROWDED: Final = WorldConfig(vehicles=60, pedestrians=40, density=12.0, braking=AutomaticBraking.PERCEIVED)
 
 _HARD_AD_WIZARD: Final = "scripted:rate=4,spacing=12,roadblock_time=240,bad_weather_time=140..240"
 

@@ -36,6 +36,8 @@ class WorldConfig:
     Attributes:
         vehicles: background vehicles, about one in eight a cyclist, as many as fit.
         pedestrians: pedestrians, as many as fit.
+        density: upper bound of vehicles, and of pedestrians, per km of lanes outside junctions; None for no bound. It
+            keeps the same numbers from blocking small towns.
         cruise_speed: cruise speed of the ego at the start [km/h], a multiple of 5 in 5..90. In a town without a cruise
             speed of its own (`Town.cruise`), the ego follows the speed limits instead of the default until another
             speed is set.
@@ -46,6 +48,7 @@ class WorldConfig:
 
     vehicles: int = 10
     pedestrians: int = 4
+    density: float | None = None
     cruise_speed: float = 40.0
     collisions_stop: float = 3.0
     braking: AutomaticBraking = AutomaticBraking.COMPLETE
@@ -56,6 +59,10 @@ class WorldConfig:
             raise ValueError(f"WorldConfig.vehicles is {self.vehicles}; it must be in 0..200")
         if not 0 <= self.pedestrians <= 200:
             raise ValueError(f"WorldConfig.pedestrians is {self.pedestrians}; it must be in 0..200")
+        if self.density is not None and not 0.0 < self.density <= 200.0:
+            raise ValueError(
+                f"WorldConfig.density is {self.density}; it must be above 0 and at most 200 per km, or None"
+            )
         if not 5.0 <= self.cruise_speed <= 90.0 or self.cruise_speed % 5:
             raise ValueError(
                 f"WorldConfig.cruise_speed is {self.cruise_speed}; it must be a multiple of 5 in 5..90 km/h"
@@ -68,9 +75,16 @@ class WorldConfig:
         if not 0.0 <= self.braking_delay <= 5.0:
             raise ValueError(f"WorldConfig.braking_delay is {self.braking_delay}; it must be in 0..5 s")
 
+    def crowd(self, km: float) -> tuple[int, int]:
+        """Returns the numbers of vehicles and of pedestrians in a town with a length of lanes [km]."""
+        most = 200 if self.density is None else round(self.density * km)
+        return min(self.vehicles, most), min(self.pedestrians, most)
+
     def record(self) -> dict[str, object]:
-        """Returns the settings in JSON types, for records; without those of the braking if it is complete."""
+        """Returns the settings in JSON types, for records; without the usual density and braking."""
         settings = asdict(self)
+        if self.density is None:
+            del settings["density"]
         braking = settings.pop("braking")
         if braking is AutomaticBraking.COMPLETE:
             del settings["braking_delay"]

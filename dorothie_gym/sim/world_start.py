@@ -39,6 +39,11 @@ class WorldSeeds(NamedTuple):
         return generator, int(generator.integers(POPULATION_SEEDS))
 
 
+def lane_km(network: TownNetwork) -> float:
+    """Returns the length of the lanes of a town outside junctions [km]."""
+    return sum(lane.length for lane in network.town.lanes if not lane.in_junction) / 1000.0
+
+
 class OwnArrays:
     """Holder of the arrays of a world that starts.
 
@@ -48,8 +53,9 @@ class OwnArrays:
 
     def __init__(self, network: TownNetwork, config: WorldConfig) -> None:
         """Makes the arrays of an empty world."""
+        vehicles, pedestrians = config.crowd(lane_km(network))
         self.arrays = empty_world(
-            town_arrays(network), vehicles=1 + config.vehicles, pedestrians=config.pedestrians, props=0, driven=True
+            town_arrays(network), vehicles=1 + vehicles, pedestrians=pedestrians, props=0, driven=True
         )
 
 
@@ -77,7 +83,6 @@ def start_world(
     follows = network.town.cruise is None and config.cruise_speed == WorldConfig.cruise_speed
     plan["cruise"] = cruise_by_limit(network.town.lanes[lane].speed_limit) if follows else config.cruise_speed
     plan["follows"] = follows
-    populate(
-        network, town, holder.arrays, seed=seeds.places()[1], vehicles=config.vehicles, pedestrians=config.pedestrians
-    )
+    vehicles, pedestrians = config.crowd(lane_km(network))
+    populate(network, town, holder.arrays, seed=seeds.places()[1], vehicles=vehicles, pedestrians=pedestrians)
     switch_on(holder.arrays, np.random.default_rng(seeds.localizer))

@@ -5,10 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord
+
+
+TIMEOUT: Final = "timeout"
+"""Name of the infraction of a session whose time ran out."""
 
 
 @dataclass(frozen=True, kw_only=True)

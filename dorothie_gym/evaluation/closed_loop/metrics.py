@@ -12,14 +12,13 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, Final, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.analysis.intervals import bootstrap_weights, percentile_interval, wilson_interval
-from dorothie_gym.evaluation.closed_loop.metric import ClosedLoopMetric
-from dorothie_gym.evaluation.closed_loop.session_record import TIMEOUT, SessionRecord
+from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT, ClosedLoopMetric
 from dorothie_gym.evaluation.closed_loop.sub_scores import (
     Discomfort,
     ExchangesAgainstReference,
@@ -28,6 +27,9 @@ from dorothie_gym.evaluation.closed_loop.sub_scores import (
     UnansweredQuestions,
 )
 from dorothie_gym.support import portable_arrays as pn
+
+if TYPE_CHECKING:
+    from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord
 
 PENALTIES: Final[Mapping[str, float]] = MappingProxyType(
     {"pedestrian": 0.50, "vehicle": 0.60, "static": 0.65, "red_light": 0.70, "stop_sign": 0.80, TIMEOUT: 0.70}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Final, NotRequired, TypeAlias, TypedDict
 
 import numpy as np
@@ -15,6 +15,7 @@ from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTANCE, kind_of, time_met
 from dorothie_gym.evaluation.analysis.units import Units
+from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT
 from dorothie_gym.evaluation.closed_loop.sub_scores import ConductPage, ConductRecord, conduct_of
 from dorothie_gym.evaluation.closed_loop.task_progress import (
     TaskRecord,
@@ -245,7 +246,6 @@ def _on_road(session: Session, events: int) -> tuple[Place, ...]:
 
 # --- Record of a driven session ---------------------------------------------------------------------------------------
 
-TIMEOUT: Final = "timeout"
 HIT_BY_OTHERS: Final = "hit_by_others"
 """Name of the collisions that others caused; they are counted and have no penalty."""
 
@@ -337,7 +337,12 @@ class SessionRecord:
         if self.conduct is not None:
             page["conduct"] = self.conduct.to_json()
         if self.reference is not None:
-            page["reference"] = ReferencePage(**asdict(self.reference))
+            reference = self.reference
+            page["reference"] = {
+                "seconds": reference.seconds,
+                "exchanges": reference.exchanges,
+                "subgoals": reference.subgoals,
+            }
         return page
 
     @classmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, TypedDict
 
 import numpy as np
@@ -85,7 +85,15 @@ class ConductRecord:
 
     def to_json(self) -> ConductPage:
         """Returns the fields in JSON types."""
-        return ConductPage(**asdict(self))
+        return {
+            "questions": self.questions,
+            "unanswered": self.unanswered,
+            "statements": self.statements,
+            "true_statements": self.true_statements,
+            "moving": self.moving,
+            "uncomfortable": self.uncomfortable,
+            "hard_brakings": self.hard_brakings,
+        }
 
     @classmethod
     def from_json(cls, row: ConductPage) -> ConductRecord:

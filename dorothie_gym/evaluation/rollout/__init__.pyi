@@ -13,6 +13,9 @@ from .frame_export import export_frames as export_frames
 from .hugging_face_export import export_hugging_face as export_hugging_face
 from .minari_export import export_minari as export_minari
 from .play import play_session as play_session
+from .reference_drives import measure_drives as measure_drives
+from .reference_drives import read_drives as read_drives
+from .reference_drives import write_drives as write_drives
 from .replay import ReplayCheck as ReplayCheck
 from .replay import ReplaySources as ReplaySources
 from .replay import begin_replay as begin_replay

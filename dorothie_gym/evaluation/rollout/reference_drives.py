@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import functools
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypedDict
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Final, TypedDict
 from dorothie_gym._version import __version__
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.evaluation.rollout.play import play_session
+from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.maps.catalogue import town_at
 from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
@@ -98,19 +100,34 @@ def measure_drive(town: Town, scenario: Scenario) -> ReferenceDrive:
     )
 
 
-class DriveTask:
-    """Measures references in one process.
+def measure_drives(
+    scenarios: Iterable[tuple[str, int]],
+    stops: tuple[int, int] | None,
+    known: Mapping[str, ReferenceDrive],
+    *,
+    workers: int = 1,
+) -> Iterator[tuple[str, ReferenceDrive]]:
+    """Yields key and reference of scenarios, in any order.
 
     Args:
+        scenarios: town and seed of each scenario.
         stops: range of the number of stops of the storyboards, see `EnvConfig.stops`.
         known: references that need not be measured again, by `drive_key`.
+        workers: number of processes; more than one needs an importable main module of the caller.
+
+    Raises:
+        ProcessError: a process died.
     """
+    yield from run_tasks(partial(_DriveTask, stops, dict(known)), scenarios, workers=workers)
+
+
+class _DriveTask:
+    """Measures references in one process."""
 
     def __init__(self, stops: tuple[int, int] | None, known: Mapping[str, ReferenceDrive]) -> None:
         self._stops, self._known = stops, known
 
     def __call__(self, task: tuple[str, int]) -> tuple[str, ReferenceDrive]:
-        """Returns key and reference of the scenario of a town and a seed."""
         name, seed = task
         town = town_at(parse_series(name) or name, seed)
         scenario = draw_scenario(town, None, seed, self._stops)

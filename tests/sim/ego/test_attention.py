@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,10 +144,21 @@ def test_slow_enough_for_the_sight_the_car_stops_before_the_roadblock() -> None:
     assert world.collisions == 0 and math.isclose(world.car.speed, 0.0, abs_tol=0.1)
 
 
-@pytest.mark.parametrize(("field", "value"), [("braking", "none"), ("braking_delay", 6.0), ("braking_delay", -1.0)])
+@pytest.mark.parametrize(
+    ("field", "value"), [("braking", "none"), ("braking_delay", 6.0), ("braking_delay", -1.0), ("density", 0.0)]
+)
 def test_wrong_settings_are_refused_by_name(field: str, value: object) -> None:
     with pytest.raises(ValueError, match=f"WorldConfig.{field}"):
         WorldConfig(**{field: value})  # type: ignore[arg-type]
+
+
+def test_density_bounds_the_crowd_of_small_towns() -> None:
+    config = WorldConfig(vehicles=60, pedestrians=40, density=10.0)
+    assert config.crowd(2.1) == (21, 21) and config.crowd(5.0) == (50, 40) and config.crowd(20.0) == (60, 40)
+    assert WorldConfig(vehicles=60, pedestrians=40).crowd(0.1) == (60, 40)
+    roads = straight_street()  # 0.8 km of lanes
+    world = World(roads, replace(config, density=5.0), seed=np.random.SeedSequence(1), departure=(0, 20.0))
+    assert len(world.actors.vehicles) <= 4
 
 
 def test_records_of_the_usual_braking_are_those_of_before() -> None:
