@@ -1,7 +1,7 @@
 """Tasks of Inspect, found by their entry point, with the rule program as the model.
 
-They need an environment of their own: `pip install '.[inspect]' pytest pytest-timeout hypothesis`, then
-`python -m pytest -m integrations tests/agents/test_inspect.py`.
+They need an environment of their own: `pip install -e '.[inspect]' pytest pytest-timeout hypothesis`, then
+`python -m pytest -W default -m integrations tests/agents/test_inspect.py`.
 """
 
 from __future__ import annotations
