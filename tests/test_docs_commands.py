@@ -30,6 +30,9 @@ FOREIGN: Final = frozenset(
         "--check",  # ruff format
         "--no-deps",  # pip
         "--work",  # benchmarks/pretrained.py
+        "--url",  # openenv validate
+        "--model",  # inspect eval
+        "--epochs",  # inspect eval
     ]
 )
 """Options of other programs that the pages name."""
