@@ -130,8 +130,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
 
     def act(self, observation: ObservationMapping, state: LearnedState) -> tuple[CoWizardAction, LearnedState]:
         """Updates the memory, and chooses a command and remarks."""
-        turn = self.play(observation, state)
-        return turn.action, turn.state
+        return self.act_all([observation], [state])[0]
 
     def act_all(
         self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState]
