@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.observations import Observation
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.observations import SessionObserver
 
 _AGENTS = {str(role): role for role in AGENT_ROLES}
 
@@ -15,13 +18,10 @@ class Observable(Protocol):
     """Session whose roles can be observed; `decisions` is the number of decisions played so far."""
 
     decisions: int
+    observer: SessionObserver
 
     def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
         """Builds the observations of the given roles at the current decision, by agent."""
-        ...
-
-    def views(self, roles: Sequence[Role]) -> dict[str, Observation]:
-        """As `observations`, as views that are valid until the next decision, see `RowView`."""
         ...
 
 
@@ -49,7 +49,7 @@ class LazyObservations(Mapping[str, Observation]):
         """Returns the observations of the given roles by agent, as views that the next step changes, see `RowView`."""
         if self._session.decisions != self._decision:
             raise RuntimeError("the session has taken a step since; its views show another decision")
-        return self._session.views(roles)
+        return self._session.observer.views(roles, self._decision)
 
     def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Returns the observations of the given roles by agent; missing ones are built together."""

@@ -167,10 +167,6 @@ class LiveSession:
         """Builds the observations of the given roles, by agent; shared values are computed once."""
         return self.observer.observations(roles, self.decisions)
 
-    def views(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """As `observations`, as views that are valid until the next decision, see `RowView`."""
-        return self.observer.views(roles, self.decisions)
-
     @property
     def picture(self) -> CameraFrame | None:
         """Picture of the camera on the car at the current decision, boxes included; None without a camera."""

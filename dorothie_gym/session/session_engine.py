@@ -145,8 +145,7 @@ class SessionEngine(Restorable):
         """Runs one decision: the actions of all roles, then the physics until the next decision.
 
         Args:
-            actions: an action for each agent, see `dorothie_gym.session.spaces.action_space`; or a typed one, such as
-                `CoWizardAction`, with the same effect.
+            actions: an action for each agent, see `session.spaces.action_space`, or a typed one, as `CoWizardAction`.
 
         Raises:
             ValueError: an action is missing or malformed; the message names the agent and the field.
@@ -175,8 +174,7 @@ class SessionEngine(Restorable):
     def end_step(self, begun: StepBegun, events: Sequence[WorldEvent]) -> StepOutcome:
         """Ends a decision after the step of the world, with the events of the step."""
         session = self.session
-        terms = session.end_step(begun, events)
-        terminated = session.task.done
+        terms, terminated = session.end_step(begun, events), session.task.done
         truncated = not terminated and self._out_of_time(session)
         if terminated or truncated:
             session.end(EndReason.ARRIVED.value if terminated else EndReason.OUT_OF_TIME.value)
