@@ -115,13 +115,7 @@ class LiveSession:
         self.beliefs = BeliefTracker(town, scenario)
         self._exceptions = ExceptionExecutor(self.world, self.task, limits.props)
         self.dialogue = DialogueChannel(
-            scenario,
-            config,
-            limits.spans,
-            words=word_seed,
-            ears=ear_seed,
-            styles=style_seed,
-            voices=voice_seed,
+            scenario, config, limits.spans, words=word_seed, ears=ear_seed, styles=style_seed, voices=voice_seed
         )
         self.log = EventLog(self.world)
         self._subgoals = SubgoalTracker(scenario, self.task, self.dialogue, self.log)
