@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
-from dorothie_gym.support.files import JsonValue
-
 
 @dataclass(frozen=True, kw_only=True)
 class Turn:
@@ -27,7 +25,7 @@ class Turn:
     page: str
     system: str
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    schema: Mapping[str, JsonValue] = field(default_factory=dict)
+    schema: Mapping[str, object] = field(default_factory=dict)
     reward: float = 0.0
     time: float = 0.0
     done: bool = False

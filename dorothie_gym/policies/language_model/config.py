@@ -13,7 +13,6 @@ from urllib.parse import urlsplit
 
 from dorothie_gym.policies.language_model.request_parameters import USUAL_TOKENS, check_parameters
 from dorothie_gym.support.copying import shared
-from dorothie_gym.support.files import JsonValue
 
 URL_VARIABLE: Final = "OPENAI_BASE_URL"
 """Environment variable with the address of the endpoint if none is given, as in OpenAI's client."""
@@ -65,7 +64,7 @@ class LanguageModelConfig:
     cassette: Path | None = None
     offline: bool = False
     prices: tuple[float, float] | None = None
-    parameters: Mapping[str, JsonValue] = field(default_factory=dict)
+    parameters: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.model or not self.model.isprintable():

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from dorothie_gym.errors import InputFileError, did_you_mean, short_repr
-from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import parse_json
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
+    from dorothie_gym.support.files import JsonValue
 
 LIMITS: Final = ("max_tokens", "max_completion_tokens")
 """Names of the limit of tokens of an answer; a request has one of them."""
@@ -54,7 +54,7 @@ class ParameterProfile:
         tokens: usual limit of tokens.
     """
 
-    values: Mapping[str, JsonValue] = field(default_factory=dict)
+    values: Mapping[str, object] = field(default_factory=dict)
     limit: str = LIMITS[0]
     tokens: int = USUAL_TOKENS
 
@@ -70,7 +70,7 @@ PROFILES: Final[Mapping[str, ParameterProfile]] = {
 """Profiles by their names: `usual` sends `max_tokens`, `temperature`, `seed` and `response_format`."""
 
 
-def parse_parameters(text: str, tokens: int | None = None) -> tuple[dict[str, JsonValue], int]:
+def parse_parameters(text: str, tokens: int | None = None) -> tuple[dict[str, object], int]:
     """Returns parameters of requests from a text, and the limit of tokens.
 
     The text is a JSON object (null leaves a parameter out), or a list with commas: the name of a profile,
@@ -88,7 +88,7 @@ def parse_parameters(text: str, tokens: int | None = None) -> tuple[dict[str, Js
             page = parse_json(text, "the parameters")
         except InputFileError as error:
             raise ValueError(f"parameters are no JSON object ({error.reason})") from None
-        found = dict(page) if isinstance(page, Mapping) else {}
+        found: dict[str, object] = dict(page) if isinstance(page, Mapping) else {}
         return found, USUAL_TOKENS if tokens is None else tokens
     found, limit, usual = {}, LIMITS[0], USUAL_TOKENS
     for item in filter(None, map(str.strip, text.split(","))):
@@ -118,7 +118,7 @@ def _value(text: str) -> JsonValue:
         return text
 
 
-def check_parameters(parameters: Mapping[str, JsonValue]) -> None:
+def check_parameters(parameters: Mapping[str, object]) -> None:
     """Raises `ValueError` for a parameter that no request can have."""
     for name in parameters:
         if name in _FIXED or not _NAME.fullmatch(name):
@@ -132,7 +132,7 @@ def check_parameters(parameters: Mapping[str, JsonValue]) -> None:
         raise ValueError(f"parameters are not JSON: {error}") from None
 
 
-def with_parameters(request: Mapping[str, Any], parameters: Mapping[str, JsonValue]) -> dict[str, Any]:
+def with_parameters(request: Mapping[str, Any], parameters: Mapping[str, object]) -> dict[str, Any]:
     """Returns a request with other parameters; None leaves one out."""
     changed = {**request, **parameters}
     return {name: value for name, value in changed.items() if name in _FIXED or value is not None}

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import OutputFolderError, SessionError
+from dorothie_gym.maps.town import LightColour
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.session.recording.action_log import Decision, encode_decision
 from dorothie_gym.session.recording.events import Event, encode_event
 from dorothie_gym.session.recording.files import (
@@ -35,16 +37,14 @@ from dorothie_gym.session.recording.trajectory import check_rising, checked_rows
 from dorothie_gym.support.files import PART, make_folder, sync, write_atomically
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.town import LightColour
     from dorothie_gym.ontology.roles import Role
-    from dorothie_gym.ontology.world_exceptions import WeatherParameter
     from dorothie_gym.session.recording.header import SessionHeader
 
 
-LightColours: TypeAlias = Mapping[int, "LightColour | str"]
+LightColours: TypeAlias = Mapping[int, LightColour | str]
 """State of each light, by id of its signal."""
 
-WeatherValues: TypeAlias = "Mapping[WeatherParameter, float] | Mapping[str, float]"
+WeatherValues: TypeAlias = Mapping[WeatherParameter, float] | Mapping[str, float]
 """The ten weather parameters, in the ontology's units."""
 
 
