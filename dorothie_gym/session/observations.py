@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,9 @@ from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology.dialogue_acts import encode_slots
 from dorothie_gym.ontology.labelled_enums import complete
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
+from dorothie_gym.session.observed_tables import write_landmarks, write_subgoals
 from dorothie_gym.session.providers import VisiblePerception, see_by_camera
 from dorothie_gym.session.sensor_readings import SensorReadings
 from dorothie_gym.session.spaces.actions import NO_MOVE
@@ -24,9 +24,7 @@ from dorothie_gym.session.spaces.fields import MESSAGE_LENGTH, STORY_LENGTH, Spa
 from dorothie_gym.session.spaces.observations import (
     MAX_UTTERANCE,
     MESSAGE_KINDS,
-    LandmarkColumn,
     Observation,
-    SubgoalColumn,
 )
 from dorothie_gym.session.view_arrays import Mask, RoleArrays
 from dorothie_gym.session.view_steps import EVERYTHING, SessionViews
@@ -41,7 +39,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.scenario import Scenario
     from dorothie_gym.sim.traffic_rules import WorldEvent
     from dorothie_gym.sim.world import World
-    from dorothie_gym.tasks.storyboard import Landmark, TaskState
+    from dorothie_gym.tasks.storyboard import TaskState
 
 
 # --- Action masks -----------------------------------------------------------------------------------------------------
@@ -333,41 +331,6 @@ class ObservationBuilder(CachedViews):
 _NAMES = {role: str(role) for role in AGENT_ROLES}
 
 
-def write_landmarks(table: Table, landmarks: Sequence[Landmark]) -> None:
-    """Writes landmarks as rows of `LandmarkColumn`."""
-    for row, landmark in zip(table, landmarks, strict=False):
-        row[LandmarkColumn.NAME] = landmark.name.value
-        row[LandmarkColumn.X], row[LandmarkColumn.Y] = landmark.position
-        row[LandmarkColumn.LANE], row[LandmarkColumn.STATION] = landmark.lane, landmark.station
-        row[LandmarkColumn.STREET] = landmark.street
-
-
-def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
-    """Writes the subgoals as rows of `SubgoalColumn`.
-
-    Args:
-        table: table, all rows of which are written.
-        task: current state of the task.
-        permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
-    """
-    table[:] = 0.0
-    triggers, deletions, changes = task.possible_triggers(), task.possible_deletions(), task.possible_changes()
-    for i, (row, subgoal) in enumerate(zip(table, task.storyboard.subgoals, strict=False)):
-        live = i in task.live
-        if not (live or permissions or task.status(i) is GoalStatus.ABANDONED):
-            continue  # not yet triggered: unknown to the participant
-        row[SubgoalColumn.LIVE] = live
-        row[SubgoalColumn.LANDMARK] = task.landmark_of(i)
-        row[SubgoalColumn.STATUS] = task.status(i).value
-        row[SubgoalColumn.REACHED] = task.reached(i)
-        row[SubgoalColumn.ALLOWED] = task.allowed(i)
-        row[SubgoalColumn.AFTER] = sum(1 << k for k in subgoal.after)
-        if permissions:
-            row[SubgoalColumn.CAN_TRIGGER] = i in triggers
-            row[SubgoalColumn.CAN_DELETE] = i in deletions
-            row[SubgoalColumn.CAN_CHANGE] = i in changes
-
-
 # --- observations of a session in progress ----------------------------------------------------------------------------
 
 
@@ -459,3 +422,57 @@ class SessionObserver:
     def picture(self, decision: int, name: str = "") -> CameraFrame | None:
         """Returns the picture of a camera on the car, boxes included; None without such a camera."""
         return None if self.sensors is None else self.sensors.picture(decision, name)
+
+
+# --- observations on demand -------------------------------------------------------------------------------------------
+
+_AGENTS = {str(role): role for role in AGENT_ROLES}
+
+
+class Observable(Protocol):
+    """Session whose roles can be observed; `decisions` is the number of decisions played so far."""
+
+    decisions: int
+    observer: SessionObserver
+
+    def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Builds the observations of the given roles at the current decision, by agent."""
+        ...
+
+
+class LazyObservations(Mapping[str, Observation]):
+    """Observations of the roles at one decision, each built when it is first read.
+
+    A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
+    read in time is requested afterwards.
+    """
+
+    def __init__(self, session: Observable) -> None:
+        self._session, self._decision = session, session.decisions
+        self._built: dict[str, Observation] = {}
+
+    def __getitem__(self, agent: str) -> Observation:
+        return self.of((_AGENTS[agent],))[agent]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_AGENTS)
+
+    def __len__(self) -> int:
+        return len(_AGENTS)
+
+    def views(self, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Returns the observations of the given roles by agent, as views that the next step changes, see `RowView`."""
+        if self._session.decisions != self._decision:
+            raise RuntimeError("the session has taken a step since; its views show another decision")
+        return self._session.observer.views(roles, self._decision)
+
+    def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
+        """Returns the observations of the given roles by agent; missing ones are built together."""
+        missing = [role for role in roles if role not in self._built] if self._built else roles
+        if not missing:
+            return {str(role): self._built[role] for role in roles}
+        if self._session.decisions != self._decision:
+            raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
+        found = self._session.observations(missing)
+        self._built.update(found)
+        return found if missing is roles else {str(role): self._built[role] for role in roles}

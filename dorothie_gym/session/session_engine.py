@@ -21,8 +21,8 @@ from dorothie_gym import maps  # lazy: a town that is given needs no reader
 from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.config import EnvConfig, PerceptionModel
-from dorothie_gym.session.lazy_observations import LazyObservations
 from dorothie_gym.session.live_session import LiveSession, StepBegun
+from dorothie_gym.session.observations import LazyObservations
 from dorothie_gym.session.providers import OBSERVERS, sensor_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
 from dorothie_gym.session.rewards import RewardTerms, term_names

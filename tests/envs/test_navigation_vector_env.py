@@ -18,7 +18,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import AdWizardState, ScriptedAdWizard
 from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUENCY
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.session.lazy_observations import LazyObservations
+from dorothie_gym.session.observations import LazyObservations
 from dorothie_gym.session.spaces import AdWizardAction, Observation, SpaceLimits
 from dorothie_gym.sim.state.codes import Walk
 from tests.envs.navigation_drivers import drive, obey

@@ -19,7 +19,7 @@ from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.session.beliefs import goals_on_map
-from dorothie_gym.session.lazy_observations import LazyObservations
+from dorothie_gym.session.observations import LazyObservations
 from dorothie_gym.session.scenario import Scenario, draw_scenario, world_seed_of
 from dorothie_gym.session.spaces.actions import LanePosition, Mental
 from dorothie_gym.sim.batch.threads import ThreadPool

@@ -26,8 +26,8 @@ from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import exit_arrays
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction
 from dorothie_gym.policies.route_tables import route_tables
-from dorothie_gym.session.lazy_observations import LazyObservations
 from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.observations import LazyObservations
 from dorothie_gym.session.scenario import Scenario, fitting_templates
 from dorothie_gym.session.spaces.actions import Mental
 from dorothie_gym.session.spaces.fields import SpaceLimits

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.evaluation.rollout.play import with_personas
 from dorothie_gym.lab.console.seating import Occupancy, SeatPlan
-from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, TypedPolicy, policy_inputs, policy_seed
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
@@ -66,7 +66,11 @@ class Players:
         actions: dict[str, ActionMapping] = {}
         inputs = policy_inputs(self._engine, self._policies)
         for role, policy in self._policies.items():
-            actions[role.value], self._states[role] = policy.step(inputs[role], self._states[role])
+            if isinstance(policy, TypedPolicy) and policy.is_direct:
+                action, self._states[role] = policy.act(inputs[role], self._states[role])
+                actions[role.value] = action.encode(self._engine.limits)
+            else:
+                actions[role.value], self._states[role] = policy.step(inputs[role], self._states[role])
         return actions
 
     def sign(self, header: SessionHeader) -> SessionHeader:

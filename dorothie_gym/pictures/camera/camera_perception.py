@@ -17,7 +17,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
 from dorothie_gym.pictures.camera.session_pictures import camera_of
 from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA, is_body_seen, is_landmark_recognised
-from dorothie_gym.session.observations import write_landmarks
+from dorothie_gym.session.observed_tables import write_landmarks
 from dorothie_gym.session.providers import OBSERVERS
 from dorothie_gym.sim.sensing.perception import BODY, look_around
 from dorothie_gym.sim.state.records import EyeRecord, SeenRecord

@@ -148,7 +148,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
         if line > asking:
             break
         wait = request(town, world, 0, r - int(car.run))
-        if wait == Wait.NOT or (line <= car.sent and passes_line(world, wait)):
+        if wait == Wait.NOT or (0.0 < car.sent >= line and passes_line(world, wait)):
             break
         return offer(car, best, _holder(town, wait, lane), line, 0.0, -2, False, True)
     return best

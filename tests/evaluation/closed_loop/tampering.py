@@ -106,13 +106,13 @@ def hidden_personas(folder: Path, patch: pytest.MonkeyPatch) -> None:
 
 def one_storyboard(folder: Path, patch: pytest.MonkeyPatch) -> None:
     template = load_template(template_names()[0])
-    patch.setattr(session_engine, "draw_scenario", lambda town, _, seed: draw_scenario(town, template, seed))
+    patch.setattr(session_engine, "draw_scenario", lambda town, _, *rest: draw_scenario(town, template, *rest))
     play_as(folder, patch, named={})
 
 
 def other_seeds_for_partners(folder: Path, patch: pytest.MonkeyPatch) -> None:
     seed = play.policy_seed
-    patch.setattr(play, "policy_seed", lambda number, role: seed(number + 1, role))
+    patch.setattr(play, "policy_seed", lambda number, *rest: seed(number + 1, *rest))
     play_as(folder, patch, named={})
 
 
