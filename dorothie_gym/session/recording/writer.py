@@ -77,6 +77,7 @@ class SessionWriter:
 
     Raises:
         SessionError: the folder holds a session and `overwrite` is False.
+        OutputFolderError: the folder was deleted after the header was written.
         OSError: the folder cannot be written.
     """
 
@@ -87,8 +88,13 @@ class SessionWriter:
         self.header = header
         self._prepare(overwrite, create)
         SessionFile(header=header).write(self.folder)
-        self._events = (self.folder / EVENTS_FILE).open("xb")
-        self._journal = (self.folder / JOURNAL_FILE).open("xb")
+        with contextlib.ExitStack() as opened:
+            try:
+                self._events = opened.enter_context((self.folder / EVENTS_FILE).open("xb"))
+                self._journal = opened.enter_context((self.folder / JOURNAL_FILE).open("xb"))
+            except FileNotFoundError as error:
+                raise OutputFolderError(self._deleted) from error
+            opened.pop_all()
         self._decisions: IO[bytes] | None = None
         self._event_count = 0
         self._last_frame = -1
@@ -217,12 +223,16 @@ class SessionWriter:
             if (self.folder / name).is_file():
                 sync(self.folder / name)
         if not (self.folder / JOURNAL_FILE).is_file():
-            raise OutputFolderError(f"{self.folder}: the folder was deleted or emptied while it was being written")
+            raise OutputFolderError(self._deleted)
         trajectory, scene = read_journal(self.folder / JOURNAL_FILE)
         write_frames(self.folder / FRAMES_FILE, trajectory, scene)
         (self.folder / JOURNAL_FILE).unlink()
         file = SessionFile(header=self.header, outcome=outcome, events=self._event_count, frames=len(trajectory))
         file.write(self.folder)
+
+    @property
+    def _deleted(self) -> str:
+        return f"{self.folder}: the folder was deleted or emptied while it was being written"
 
     def close(self) -> None:
         """Closes the files; an unfinished session stays incomplete. May be called again."""

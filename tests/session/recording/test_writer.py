@@ -1,14 +1,15 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import OutputFolderError, SessionError
 from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.session.recording import Event, EventType, Session, SessionWriter
+from dorothie_gym.session.recording import Event, EventType, Session, SessionWriter, writer
 from tests.session.recording.builders import header, physical, rows, write
 from tests.session.recording.dialogues import talk
 
@@ -98,3 +99,17 @@ def test_closed_session_rejects_further_data(tmp_path: Path) -> None:
         writer.append(talk())
     with pytest.raises(SessionError, match="closed"):
         writer.finish({})
+
+
+def test_folder_that_is_deleted_right_after_the_header_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = writer.SessionFile.write
+
+    def write_and_delete(file: writer.SessionFile, folder: Path) -> None:
+        written(file, folder)
+        shutil.rmtree(folder)
+
+    monkeypatch.setattr(writer.SessionFile, "write", write_and_delete)
+    with pytest.raises(OutputFolderError, match="out: the folder was deleted or emptied"):
+        SessionWriter(tmp_path / "out", header())
