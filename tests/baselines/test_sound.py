@@ -117,6 +117,7 @@ def test_points_of_the_participant_have_the_sound_of_their_utterance(corpus: Pat
         assert (same == same[0]).all(), "spans of an utterance share its sound, as its words"
 
 
+@pytest.mark.long
 def test_models_of_sound_train_and_others_need_what_they_name(corpus: Path, hubert: Path, tmp_path: Path) -> None:
     material = Dataset.load(corpus, "hashing")
     job = Experiment(corpus=corpus, encoder="hashing", model="sound", size="small", seed=0, out=tmp_path)

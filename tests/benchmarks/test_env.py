@@ -33,6 +33,7 @@ def test_figures_are_consistent(monkeypatch: pytest.MonkeyPatch) -> None:
     assert figures["two_processes_scaling"] is None
 
 
+@pytest.mark.long
 def test_two_processes_are_compared_with_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "available_processors", lambda: 2)
     scaling = bench._two_processes("brookside", 0, 0, 0, 20, 1, lambda part, share: None)

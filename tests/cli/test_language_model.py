@@ -103,6 +103,7 @@ def test_endpoint_that_rejects_all_calls_ends_the_command(command: tuple[object,
     assert asked == 3
 
 
+@pytest.mark.long
 def test_endpoint_that_rejects_calls_of_another_process_ends_the_rollout() -> None:
     with serving() as server:
         server.fault = "wrong key"

@@ -37,15 +37,15 @@ def is_town(path: Path, content: bytes) -> bool:
     return True
 
 
-@pytest.mark.parametrize("part", range(8))
+@pytest.mark.parametrize("part", range(4))
 def test_mutated_maps_are_read_or_refused_in_one_line(tmp_path: Path, part: int) -> None:
     make_ends(tmp_path)
     original = (tmp_path / "town.xodr").read_bytes()
     towns = sum(
         is_town(tmp_path / "mutated.xodr", mutate_map(original, Random(number)))
-        for number in range(25 * part, 25 * part + 25)
+        for number in range(15 * part, 15 * part + 15)
     )
-    assert towns > 10
+    assert towns > 5
 
 
 def test_pieces_of_a_map_are_towns(tmp_path: Path, written: bytes) -> None:

@@ -282,6 +282,7 @@ for _ in range(60):
 """
 
 
+@pytest.mark.long
 def test_processes_that_write_the_same_entry_at_the_same_time_see_whole_towns(path: Path, folder: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(path)]
     writers = [subprocess.Popen(command, stderr=subprocess.PIPE) for _ in range(3)]

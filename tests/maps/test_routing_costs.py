@@ -69,6 +69,7 @@ def test_routes_and_distances_are_those_of_scipy(name: str) -> None:
             np.testing.assert_allclose(distances, reference.distances_to(goal, blocked), rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 def test_routes_are_the_same_without_compilation() -> None:
     program = """
 from dorothie_gym.maps import load_town

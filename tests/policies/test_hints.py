@@ -30,6 +30,7 @@ def stated(world):
     return [(move, said) for move in moves for said in move.meaning if said.predicate in ABOUT_PLACES]
 
 
+@pytest.mark.long
 def test_what_is_said_of_places_is_true(worlds):
     said = [(world, move, said) for world in worlds for move, said in stated(world) if not said.asks]
     assert len(said) >= 5

@@ -46,6 +46,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     return played(tmp_path_factory.mktemp("spoken") / "session")
 
 
+@pytest.mark.long
 def test_session_is_spoken_without_a_socket(tmp_path: Path) -> None:
     events: list[str] = []
     watching = True

@@ -105,6 +105,7 @@ def test_ten_seconds_are_the_same_bytes_compiled_and_in_plain_python(digests, wh
     assert digests["one"][what] == digests["plain"][what]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["traffic", "session"])
 def test_ten_seconds_are_the_same_bytes_in_another_process(digests, what):
     assert digests["one"][what] == digests["other"][what]

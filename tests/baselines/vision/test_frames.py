@@ -84,6 +84,7 @@ def test_labels_belong_to_the_pictures(corpus, tmp_path):
             assert (inside == box["kind"]).sum() >= box["pixels"] // 2
 
 
+@pytest.mark.long
 def test_boxes_in_space_contain_the_pixels_and_project_around_the_boxes(corpus, tmp_path):
     sampling = replace(SMALL, spacing=2.0, wait=0.5, pixels=12)
     drawn = load_frames(Corpus.load(corpus), sampling, folder=tmp_path)["train"]

@@ -30,6 +30,7 @@ def test_death_of_a_worker_is_reported_at_once() -> None:
         list(run_tasks(workshop.dying, range(5), workers=2))
 
 
+@pytest.mark.long
 def test_failure_names_the_session() -> None:
     plans = plan_corpus(2, 7)
     named = r"session [01] \(\w+, seed \d+\): ValueError: the town is closed \(workshop\.py, line \d+\)"

@@ -50,6 +50,7 @@ def strike_at_each_write(folder: Path, strikes: Callable[[int, int], bool]) -> i
         assert remains(copy, name) == [], at
 
 
+@pytest.mark.long
 def test_an_erasure_goes_on_after_any_write_that_fails(tmp_path: Path) -> None:
     assert strike_at_each_write(tmp_path, lambda at, number: number == at) > 25
 

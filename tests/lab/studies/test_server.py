@@ -60,6 +60,7 @@ def test_two_people_go_from_the_link_to_the_code(tmp_path: Path) -> None:
     assert remains(tmp_path / "data", "left out") == []
 
 
+@pytest.mark.long
 def test_withdrawal_leaves_nothing_of_a_person(tmp_path: Path) -> None:
     data = tmp_path / "data"
     with ServedStudy(write_study(tmp_path, STUDY), data) as served:
@@ -113,6 +114,7 @@ def test_withdrawal_in_a_session_ends_it_for_both(tmp_path: Path) -> None:
     assert len(outcomes) == 3 and outcomes[two.view["id"]] == "interrupted"
 
 
+@pytest.mark.long
 def test_people_go_on_where_they_were_after_a_restart(tmp_path: Path) -> None:
     file, data = write_study(tmp_path, STUDY), tmp_path / "data"
     with ServedStudy(file, data) as served:
@@ -161,6 +163,7 @@ def test_a_person_who_leaves_ends_the_session_and_is_noted(tmp_path: Path) -> No
     assert outcomes == {one.view["id"]: "interrupted", two.view["id"]: "left"}
 
 
+@pytest.mark.long
 def test_people_who_wait_in_vain_finish_with_another_code(tmp_path: Path) -> None:
     study = {**STUDY, "waiting_room": {"seconds": 1.0}}
     with ServedStudy(write_study(tmp_path, study), tmp_path / "data") as served:
@@ -244,6 +247,7 @@ def test_a_person_who_reads_the_instructions_or_practises_gets_the_role_of_a_par
         seat(one, four)
 
 
+@pytest.mark.long
 def test_a_script_takes_over_for_a_person_who_leaves(tmp_path: Path) -> None:
     data = tmp_path / "data"
     with ServedStudy(write_study(tmp_path, {**STUDY, "absence": {"seconds": 0.5, "then": "script"}}), data) as served:

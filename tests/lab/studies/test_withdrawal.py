@@ -20,6 +20,7 @@ from tests.lab.studies.serving import Client, ServedStudy, at_once, seat
 from tests.lab.studies.test_server import remains
 
 
+@pytest.mark.long
 def test_a_backup_beside_the_records_goes_with_them(tmp_path: Path) -> None:
     data = tmp_path / "data"
     with ServedStudy(write_study(tmp_path, STUDY), data) as served:

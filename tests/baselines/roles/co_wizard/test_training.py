@@ -59,6 +59,7 @@ def test_examples_have_the_lengths_that_the_network_takes(trained):
     )
 
 
+@pytest.mark.long
 def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_path):
     class InterruptedTrainingError(Exception):
         pass

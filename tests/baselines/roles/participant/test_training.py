@@ -44,6 +44,7 @@ def weights(folder):
     return {name: value.numpy().tobytes() for name, value in load_file(folder / "model.safetensors").items()}
 
 
+@pytest.mark.long
 def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_path):
     class InterruptedTrainingError(Exception):
         pass
@@ -77,6 +78,7 @@ def test_remarks_that_are_not_in_the_vocabulary_are_not_learnt(trained):
     assert lessons["remarks"].shape[1] == 4 and lessons["remarks"].min() >= -1
 
 
+@pytest.mark.long
 def test_player_talks_in_the_same_session_twice(trained, tmp_path):
     engine = SessionEngine("midtown", config=EnvConfig(max_seconds=60.0))
     logs = []

@@ -21,7 +21,7 @@ from dorothie_gym.pictures.maps.levels import LevelLookup, stretches
 from dorothie_gym.pictures.maps.shapes import TownSamples
 from tests.maps.opendrive_text import shared_map
 
-TOWNS = ["brookside", "midtown", "Town05"]
+TOWNS = ["brookside", *(pytest.param(name, marks=pytest.mark.long) for name in ("midtown", "Town05"))]
 
 
 def town_of(name: str) -> Town:
@@ -191,6 +191,7 @@ def test_ground_is_the_same_when_built_again() -> None:
         assert getattr(first.arrays, name).tobytes() == getattr(second.arrays, name).tobytes(), name
 
 
+@pytest.mark.long
 def test_people_on_bridges_walk_on_the_deck() -> None:
     ground, town = ground_of("Town05"), town_of("Town05")
     points = np.concatenate([walk.points for walk in town.sidewalks])
