@@ -36,7 +36,7 @@ def console(
         typer.Option(
             metavar="ROLE=PLAYER,...",
             help="Who plays each role: human (the session waits for a person), open (a script plays until a person "
-            "sits down), or a policy by name or file. Roles that are not named are open.",
+            "sits down), or a policy by name, file or class (module:Class). Roles that are not named are open.",
         ),
     ] = "",
     out: Annotated[

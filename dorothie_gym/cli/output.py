@@ -41,7 +41,7 @@ WIDTH = 130
 
 def stdout() -> Console:
     """Returns a console on the present standard output; brackets in texts are printed as they are."""
-    return Console(highlight=False, markup=False)
+    return Console(highlight=False, markup=False, emoji=False)
 
 
 def wide_stdout() -> Console:
@@ -54,7 +54,7 @@ def wide_stdout() -> Console:
 
 def stderr() -> Console:
     """Returns a console on the present standard error."""
-    return Console(stderr=True, highlight=False, markup=False)
+    return Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
