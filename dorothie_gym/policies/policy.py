@@ -105,7 +105,7 @@ class Policy(ABC, Generic[State]):
 
         Returns:
             An action of the role's action space, and the state for the next decision. Fields that the action leaves out
-            have no effect: `{"physical": 4}` stops the car and says nothing.
+            have no effect: `{"physical": PhysicalAction.STOP}` stops the car.
         """
 
 

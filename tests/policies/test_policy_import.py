@@ -36,12 +36,12 @@ class Stops(Policy):
         return 0
 
     def step(self, observation, state):
-        return {"physical": 4}, state + 1
+        return {"physical": 5}, state + 1
 
 
 class WithoutState(Stops):
     def step(self, observation, state):
-        return {"physical": 4}
+        return {"physical": 5}
 
 
 class Misspelt(Stops):
@@ -75,7 +75,7 @@ class Stops(Policy[int]):
         return 0
 
     def step(self, observation: Mapping[str, Any], state: int) -> tuple[dict[str, Any], int]:
-        return {"physical": 4}, state + 1
+        return {"physical": 5}, state + 1
 
 
 class Numbers(Stops):
