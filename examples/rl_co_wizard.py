@@ -66,9 +66,8 @@ def main() -> None:
     returns = env.get_episode_rewards()
     draw_curve(returns, options.out.with_suffix(".png"))
     tenth = max(1, len(returns) // 10)
-    print(
-        f"{len(returns)} episodes; mean return {np.mean(returns[:tenth]):.2f} at first, {np.mean(returns[-tenth:]):.2f} at last"
-    )
+    first, last = np.mean(returns[:tenth]), np.mean(returns[-tenth:])
+    print(f"{len(returns)} episodes; mean return {first:.2f} in the first tenth, {last:.2f} in the last")
 
 
 if __name__ == "__main__":

@@ -120,6 +120,17 @@ def test_the_policy_of_its_page_rides_in_a_rollout(tmp_path: Path, monkeypatch: 
     assert names["result"].table().figures["route_completion"]["mean"] > 0.0
 
 
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")  # of the libraries
+@pytest.mark.parametrize("number", range(2))
+def test_learning_of_its_page_runs_as_written(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("sb3_contrib")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "learning-roles.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    exec(compile(blocks[number], "learning-roles.md", "exec"), {})
+    assert number == 1 or (tmp_path / "co_wizard.png").stat().st_size > 10_000
+
+
 def test_speech_of_its_page_is_recognised() -> None:
     text = example("speech.md", "python")
     names: dict[str, Any] = {}
