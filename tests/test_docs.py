@@ -126,7 +126,9 @@ def test_the_policy_of_its_page_rides_in_a_rollout(tmp_path: Path, monkeypatch: 
 def test_learning_of_its_page_runs_as_written(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sb3_contrib")
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "learning-roles.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    blocks = re.findall(
+        r"```python\n(.*?)```", (DOCS / "learning-roles.md").read_text(encoding="utf-8"), flags=re.DOTALL
+    )
     exec(compile(blocks[number], "learning-roles.md", "exec"), {})
     assert number == 1 or (tmp_path / "co_wizard.png").stat().st_size > 10_000
 

@@ -16,6 +16,7 @@ import typer
 from rich.console import Console
 
 from dorothie_gym.errors import DorothieGymError, OutputFolderError, SpeechError, one_line
+from dorothie_gym.support.installation import pip_install
 from dorothie_gym.support.interruption import exit_code
 
 if TYPE_CHECKING:
@@ -145,7 +146,7 @@ def check_video(path: Path) -> None:
         fail(f"{path}: not a video format; give a name that ends in {', '.join(_SUFFIXES)}")
     check_file(path)
     if find_spec("imageio") is None or find_spec("imageio_ffmpeg") is None:
-        fail("--video needs imageio, which is not installed; run: pip install 'dorothie-gym[video]'")
+        fail(f"--video needs imageio, which is not installed; run: {pip_install('video')}")
 
 
 class VideoWriter(Protocol):

@@ -35,6 +35,7 @@ from dorothie_gym.policies.policy_import import (
 from dorothie_gym.policies.pretrained import PREFIX, check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
+from dorothie_gym.support.installation import pip_install
 
 POLICY_NAMES = ("scripted", "silent", "random")
 """Names that `make_policy` accepts for every role."""
@@ -327,8 +328,8 @@ def _reporting_missing_library(name: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         library = (error.name or str(error)).partition(".")[0]
-        package = "'dorothie-gym[baselines]'" if library in _BASELINES else library
-        raise PolicyLoadError(f"{name} needs {library}, which is not installed; run: pip install {package}") from None
+        command = pip_install("baselines") if library in _BASELINES else f"pip install {library}"
+        raise PolicyLoadError(f"{name} needs {library}, which is not installed; run: {command}") from None
 
 
 def _cost(value: object) -> float | None:

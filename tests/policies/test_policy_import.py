@@ -171,9 +171,7 @@ def test_wrong_results_of_step_are_named(module: str, policy: str, message: str)
 def test_wrong_type_of_action_names_role_and_value() -> None:
     engine = SessionEngine("brookside", config=SHORT)
     policies = {role: make_policy("silent", role, engine.limits) for role in AGENT_ROLES}
-    with pytest.raises(
-        ActionError, match="expected a dict of fields or a CoWizardAction, got list"
-    ):
+    with pytest.raises(ActionError, match="expected a dict of fields or a CoWizardAction, got list"):
         play_session(engine, {**policies, Role.CO_WIZARD: Numbers(Role.CO_WIZARD, engine.limits)}, seed=1)
 
 
