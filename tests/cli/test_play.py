@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def test_every_action_has_a_key() -> None:
         (("co-wizzard",), "there is no role 'co-wizzard'; did you mean 'co-wizard'? the roles are participant"),
         (
             ("participant", "--terminal"),
-            "--terminal plays co-wizard and navigation; participant is played in the browser",
+            "--terminal plays co-wizard and navigation; participant is",
         ),
         (("--terminal", "--out", "sessions"), "--out and --storyboard are for the browser"),
     ],
@@ -67,9 +68,14 @@ def test_mistakes_are_one_line(arguments: tuple[str, ...], message: str) -> None
 def test_one_seat_is_opened_and_scripts_play_the_others(role: str, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     served: list[Starlette] = []
+
+    def serve(application: Starlette, listener: socket.socket, host: str) -> None:
+        served.append(application)
+        listener.close()
+
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr(module.webbrowser, "open", lambda link: bool(opened.append(link)) or True)
-    monkeypatch.setattr(module, "serve", lambda application, listener, host: served.append(application))
+    monkeypatch.setattr(module, "serve", serve)
     done = play(role, "--town", "brookside")
     assert done.exit_code == 0, done.output
     assert len(opened) == len(served) == 1 and "/seat#" in opened[0]
@@ -79,7 +85,7 @@ def test_one_seat_is_opened_and_scripts_play_the_others(role: str, monkeypatch: 
 def test_without_a_browser_the_link_and_the_keys_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(module, "serve", lambda application, listener, host: None)
+    monkeypatch.setattr(module, "serve", lambda application, listener, host: listener.close())
     done = play("--town", "brookside")
     assert "No browser can be opened here" in done.stdout and "--terminal" in done.stdout and "/seat#" in done.stdout
 
