@@ -37,9 +37,11 @@ from .session.spaces import noop as noop
 from .sim.config import WorldConfig as WorldConfig
 from .tasks import load_template as load_template
 from .tasks import template_names as template_names
+from .wrappers.flatten import BoxObservation as BoxObservation
 from .wrappers.flatten import FlattenAction as FlattenAction
 from .wrappers.flatten import FlattenObservation as FlattenObservation
 from .wrappers.flatten import flatten as flatten
 from .wrappers.identical_spaces import IdenticalSpaces as IdenticalSpaces
+from .wrappers.macro_actions import MacroActions as MacroActions
 from .wrappers.record_session import RecordSession as RecordSession
 from .wrappers.teacher_forcing import TeacherForcing as TeacherForcing

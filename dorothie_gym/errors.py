@@ -14,6 +14,7 @@ DorothieGymError
 ├── SessionError         a recorded session or corpus cannot be read or written
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
+├── ActionError          an action is malformed, or a policy returns none
 ├── EndpointError        the endpoint of a language model rejects all calls
 ├── AgentSessionError    a session for an agent is used before it has begun
 ├── PolicyStateError     the state of a policy lacks what a part of the policy needs
@@ -138,6 +139,10 @@ class OutputFolderError(DorothieGymError, RuntimeError):
 
 class PolicyLoadError(DorothieGymError, ValueError):
     """A policy name or file cannot be resolved; the message gives the reason and the accepted values."""
+
+
+class ActionError(DorothieGymError, ValueError):
+    """An action is malformed, or a policy returns none; the message names the role and the field."""
 
 
 class EndpointError(DorothieGymError, RuntimeError):

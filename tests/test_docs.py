@@ -109,6 +109,30 @@ def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
     assert names["understood"]
 
 
+def test_the_policy_of_its_page_rides_in_a_rollout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    policy, rollout = re.findall(r"```python\n(.*?)```", (DOCS / "own.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    (tmp_path / "mine.py").write_text(policy, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    names: dict[str, Any] = {}
+    exec(compile(rollout, "own.md", "exec"), names)
+    assert not names["result"].errored
+    assert names["result"].table().figures["route_completion"]["mean"] > 0.0
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")  # of the libraries
+@pytest.mark.parametrize("number", range(2))
+def test_learning_of_its_page_runs_as_written(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("sb3_contrib")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(
+        r"```python\n(.*?)```", (DOCS / "learning-roles.md").read_text(encoding="utf-8"), flags=re.DOTALL
+    )
+    exec(compile(blocks[number], "learning-roles.md", "exec"), {})
+    assert number == 1 or (tmp_path / "co_wizard.png").stat().st_size > 10_000
+
+
 def test_speech_of_its_page_is_recognised() -> None:
     text = example("speech.md", "python")
     names: dict[str, Any] = {}

@@ -13,6 +13,7 @@ from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_errors, stdout, wide_stdout
 from dorothie_gym.evaluation import analysis
 from dorothie_gym.lab import annotation as marking
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from dorothie_gym.lab.annotation.corpus_agreement import CorpusAgreement
@@ -176,7 +177,7 @@ def _show(found: CorpusAgreement) -> None:
     console = wide_stdout()
     console.print(table)
     if found.alpha is None:
-        console.print("Krippendorff's alpha needs krippendorff: pip install 'dorothie-gym[agreement]'", style="yellow")
+        console.print(f"Krippendorff's alpha needs krippendorff: {pip_install('agreement')}", style="yellow")
     else:
         console.print(
             f"Krippendorff's alpha of {len(found.annotators)} annotators: moves {coefficient(found.alpha.moves)}, "

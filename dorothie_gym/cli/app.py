@@ -22,6 +22,7 @@ from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import envs, policies, storyboards, towns
 from dorothie_gym.cli.options import CommandGroup, PictureCommand
+from dorothie_gym.cli.play import play
 from dorothie_gym.cli.reference_times import reference_times
 from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
@@ -48,6 +49,7 @@ app = typer.Typer(
     pretty_exceptions_show_locals=False,
 )
 app.command()(run)
+app.command()(play)
 app.command()(console)
 app.add_typer(study, name="study")
 app.command()(annotate)

@@ -36,7 +36,7 @@ def console(
         typer.Option(
             metavar="ROLE=PLAYER,...",
             help="Who plays each role: human (the session waits for a person), open (a script plays until a person "
-            "sits down), or a policy by name or file. Roles that are not named are open.",
+            "sits down), or a policy by name, file or class (module:Class). Roles that are not named are open.",
         ),
     ] = "",
     out: Annotated[
@@ -83,12 +83,12 @@ def console(
             _config(max_seconds, word_errors, absence, after_absence, while_away, pictures), speech=speech, tier=tier
         )
         if resume is None:
-            room = _room(town or (found.town if found else DEFAULT_TOWN), storyboard, seed, roles, out, config)
+            room = console_room(town or (found.town if found else DEFAULT_TOWN), storyboard, seed, roles, out, config)
         else:
             out = out or resume.resolve().parent
             room = _resumed_room(resume, town, storyboard, roles, out, config)
     listener = listen(host, port)
-    links = _links(room, host, listener.getsockname()[1])
+    links = seat_links(room, host, listener.getsockname()[1])
     if as_json:
         print_json({"links": links, "recorded": None if out is None else str(out)})
     else:
@@ -116,9 +116,10 @@ def _config(
     )
 
 
-def _room(
+def console_room(
     town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: seats.ConsoleConfig
 ) -> seats.Room:
+    """Returns the room of a session; its town is read at once, so that the first browser is served quickly."""
     from dorothie_gym.lab.town_page import town_page
     from dorothie_gym.session.session_engine import SessionEngine
 
@@ -151,7 +152,7 @@ def _resumed_room(
     return room
 
 
-def _links(room: seats.Room, host: str, port: int) -> dict[str, str]:
+def seat_links(room: seats.Room, host: str, port: int) -> dict[str, str]:
     """Returns the link of each seat; its secret is behind the #, which browsers do not send and servers do not log."""
     return {name: f"{address(host, port)}/seat#{seat.token}" for name, seat in room.seats.items()}
 

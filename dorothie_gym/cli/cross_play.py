@@ -55,7 +55,7 @@ def cross_play(
     co_wizard: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME|FILE",
+            metavar="NAME|FILE|MODULE:CLASS",
             help="A Co-Wizard, as in `rollout`; repeat it. Default: scripted and silent.",
             autocompletion=complete_policy("co_wizard"),
         ),
@@ -63,7 +63,7 @@ def cross_play(
     participant: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME|FILE",
+            metavar="NAME|FILE|MODULE:CLASS",
             help="A participant, as in `rollout`; repeat it. Default: scripted and silent.",
             autocompletion=complete_policy("participant"),
         ),

@@ -57,7 +57,7 @@ def leaderboard(
         list[str] | None,
         typer.Option(
             "--row",
-            metavar="NAME|FILE",
+            metavar="NAME|FILE|MODULE:CLASS",
             rich_help_panel=_PANEL,
             autocompletion=complete_policy("co_wizard"),
             help="A Co-Wizard, as in `rollout`; repeat it. Default: scripted, lane-follow, random, all shipped models.",
@@ -185,7 +185,7 @@ def _plan(
 def _check_weights(plan: closed_loop.LeaderboardPlan, folder: Path) -> None:
     """Exits if the folder has a row of a planned model with other weights: the page could not have both."""
     for name, settings in plan.rollouts().items():
-        player = settings.cast[Role.CO_WIZARD]
+        player = settings.players[Role.CO_WIZARD]
         if player.sha256 is None:
             continue
         stem = name.removesuffix(player.sha256[:8])

@@ -59,7 +59,7 @@ Players = Annotated[int | None, typer.Option(min=1, help="Number of worker proce
 Participant = Annotated[
     str,
     typer.Option(
-        metavar="scripted[:TRAITS]|silent|random|llm:MODEL|FILE",
+        metavar="scripted[:TRAITS]|silent|random|llm:MODEL|FILE|MODULE:CLASS",
         help="Policy of the participant; a file holds a learned policy. Traits fix the persona: "
         "scripted:patience=0..0.2,directions=vague.",
         autocompletion=complete_policy("participant"),
@@ -69,9 +69,9 @@ Participant = Annotated[
 CoWizard = Annotated[
     str,
     typer.Option(
-        metavar="NAME|FILE",
+        metavar="NAME|FILE|MODULE:CLASS",
         help="Policy of the Co-Wizard: scripted (also with traits), silent, random, lane-follow, "
-        "pretrained:maskable-ppo (see `policies`), llm:MODEL, or the folder of a learned policy.",
+        "pretrained:maskable-ppo (see `policies`), llm:MODEL, the folder of a learned policy, or a class of yours.",
         autocompletion=complete_policy("co_wizard"),
     ),
 ]
@@ -79,7 +79,7 @@ CoWizard = Annotated[
 AdWizard = Annotated[
     str,
     typer.Option(
-        metavar="scripted[:OPTIONS]|silent|random|llm:MODEL|FILE",
+        metavar="scripted[:OPTIONS]|silent|random|llm:MODEL|FILE|MODULE:CLASS",
         help="Policy of the Ad-Wizard; a file holds a learned policy. Options fix what it does: "
         "scripted:rate=4,spacing=12.",
         autocompletion=complete_policy("ad_wizard"),
@@ -89,7 +89,7 @@ AdWizard = Annotated[
 TierParticipant = Annotated[
     str | None,
     typer.Option(
-        metavar="scripted[:TRAITS]|silent|random|llm:MODEL|FILE[+...]",
+        metavar="scripted[:TRAITS]|silent|random|llm:MODEL|FILE|MODULE:CLASS[+...]",
         help="Policy of the participant, by default scripted or those of the tier; several, joined by +, take turns.",
         autocompletion=complete_policy("participant"),
     ),
@@ -98,7 +98,7 @@ TierParticipant = Annotated[
 TierAdWizard = Annotated[
     str | None,
     typer.Option(
-        metavar="scripted[:OPTIONS]|silent|random|llm:MODEL|FILE",
+        metavar="scripted[:OPTIONS]|silent|random|llm:MODEL|FILE|MODULE:CLASS",
         help="Policy of the Ad-Wizard, by default scripted or that of the tier. Options fix what it does: "
         "scripted:rate=4,spacing=12.",
         autocompletion=complete_policy("ad_wizard"),

@@ -16,6 +16,7 @@ import typer
 from rich.console import Console
 
 from dorothie_gym.errors import DorothieGymError, OutputFolderError, SpeechError, one_line
+from dorothie_gym.support.installation import pip_install
 from dorothie_gym.support.interruption import exit_code
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ WIDTH = 130
 
 def stdout() -> Console:
     """Returns a console on the present standard output; brackets in texts are printed as they are."""
-    return Console(highlight=False, markup=False)
+    return Console(highlight=False, markup=False, emoji=False)
 
 
 def wide_stdout() -> Console:
@@ -54,7 +55,7 @@ def wide_stdout() -> Console:
 
 def stderr() -> Console:
     """Returns a console on the present standard error."""
-    return Console(stderr=True, highlight=False, markup=False)
+    return Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
@@ -145,7 +146,7 @@ def check_video(path: Path) -> None:
         fail(f"{path}: not a video format; give a name that ends in {', '.join(_SUFFIXES)}")
     check_file(path)
     if find_spec("imageio") is None or find_spec("imageio_ffmpeg") is None:
-        fail("--video needs imageio, which is not installed; run: pip install 'dorothie-gym[video]'")
+        fail(f"--video needs imageio, which is not installed; run: {pip_install('video')}")
 
 
 class VideoWriter(Protocol):

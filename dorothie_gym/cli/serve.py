@@ -10,6 +10,7 @@ import typer
 
 from dorothie_gym.cli.options import needs
 from dorothie_gym.cli.output import fail
+from dorothie_gym.support.installation import pip_install
 
 
 class Framework(enum.StrEnum):
@@ -33,6 +34,6 @@ def serve(
     try:
         server = import_module(f"dorothie_gym.agents.{framework}.server")
     except ModuleNotFoundError as error:
-        fail(f"serve {framework} needs {error.name}, which is not installed; run: pip install 'dorothie-gym[openenv]'")
+        fail(f"serve {framework} needs {error.name}, which is not installed; run: {pip_install('openenv')}")
     typer.echo(f"http://{host}:{port}", err=True)
     server.serve(host, port, sessions)

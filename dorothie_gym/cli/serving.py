@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import needs
 from dorothie_gym.cli.output import fail
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -38,7 +38,7 @@ def check_libraries(command: str) -> None:
     """Fails if a library of the extra `console` is missing."""
     for library in _LIBRARIES:
         if find_spec(library) is None:
-            fail(f"{command} {needs('console')}: {library} is not installed; run: pip install 'dorothie-gym[console]'")
+            fail(f"{command} needs {library}, which is not installed; run: {pip_install('console')}")
 
 
 def listen(host: str, port: int) -> socket.socket:

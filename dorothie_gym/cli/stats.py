@@ -24,6 +24,7 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.speech_table import show_speech
 from dorothie_gym.evaluation import analysis
 from dorothie_gym.evaluation.analysis import truth_checks
+from dorothie_gym.support.installation import pip_install
 
 PICTURE = Path("statistics.png")
 """Default file of `--picture`."""
@@ -214,7 +215,7 @@ def _diversity(diversity: Facts) -> Table:
     note = "" if commonest is None else f'"{commonest}"'
     shown.add_row("commonest utterance", _percent(diversity["commonest_utterance_share"]), note)
     perplexity = diversity["perplexity"]
-    lacking = "" if analysis.has_language_models() else "needs nltk: pip install 'dorothie-gym[statistics]'"
+    lacking = "" if analysis.has_language_models() else f"needs nltk: {pip_install('statistics')}"
     note = lacking or ("needs utterances in train and test" if perplexity is None else "")
     shown.add_row("trigram perplexity, train on test", "-" if perplexity is None else f"{perplexity:.1f}", note)
     return shown

@@ -28,6 +28,7 @@ from dorothie_gym.cli.train_vision import train_vision
 from dorothie_gym.errors import CacheError, CheckpointError, EncoderError, PredictionError, ProcessError
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.evaluation import teacher_forced
+from dorothie_gym.support.installation import pip_install
 from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
@@ -332,7 +333,7 @@ def _reporting_errors() -> Iterator[None]:
     try:
         import torch  # noqa: F401
     except ImportError:
-        fail("training needs torch; run: pip install 'dorothie-gym[baselines]'")
+        fail(f"training needs torch; run: {pip_install('baselines')}")
     with reporting_errors():
         try:
             yield

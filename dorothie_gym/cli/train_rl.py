@@ -18,6 +18,7 @@ from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ModelFileError, ProcessError, SettingsError
+from dorothie_gym.support.installation import pip_install
 from dorothie_gym.support.processors import available_processors
 
 DEFAULT_ENV = "dorothie_gym/Navigation-v0"
@@ -127,7 +128,7 @@ def _reporting_errors() -> Iterator[None]:
         import sb3_contrib  # noqa: F401
         import torch  # noqa: F401
     except ImportError:
-        fail("train-rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'")
+        fail(f"train-rl needs torch and stable-baselines3; run: {pip_install('baselines')}")
     with reporting_errors():
         try:
             yield

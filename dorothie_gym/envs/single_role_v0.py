@@ -15,7 +15,7 @@ from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.casting import partners_of
-from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, checked_decision, policy_inputs, policy_seed
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
@@ -62,7 +62,8 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     - `role`: role of the agent, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
     - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`, `render_view`: as in `DuoWizardEnv`.
     - `view`: picture of `render()`: `"role"` (what the role observes) or `"session"` (the whole session).
-    - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
+    - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, a class as
+      `"module:Class"`, or a `Policy`.
     - `tier`: name of a `Tier`, which gives town, settings and partners that are not given themselves.
 
     `reset(seed=...)` plays the session that `DuoWizardEnv` has for this seed; the seeds of the partners follow from it.
@@ -152,7 +153,8 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
             raise ResetNeeded("no session is being played: call reset() first")
         inputs, actions = policy_inputs(self.engine, self.partners), {str(self.role): action}
         for role, policy in self.partners.items():
-            actions[role], self._states[role] = policy.step(inputs[role], self._states[role])
+            decision = policy.step(inputs[role], self._states[role])
+            actions[role], self._states[role] = checked_decision(role, decision)
         outcome = self.engine.step(actions)
         terms = outcome.reward_terms[self.role]
         info = self.engine.info(self.role, terms)

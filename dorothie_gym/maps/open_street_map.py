@@ -13,6 +13,7 @@ from dorothie_gym.errors import InputFileError, TownError
 from dorothie_gym.maps import opendrive  # lazy: its parser is slow to import
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
+from dorothie_gym.support.installation import pip_install
 
 SUFFIXES: Final = (".osm", ".osm.gz", ".osm.xml")
 """Ends of the names of OpenStreetMap files, in lower case."""
@@ -89,7 +90,7 @@ def _netconvert(source: str) -> str:
             return program
     program = shutil.which("netconvert")
     if program is None:
-        reason = "is converted by netconvert, which is not installed: pip install 'dorothie-gym[sumo]'"
+        reason = f"is converted by netconvert, which is not installed: {pip_install('sumo')}"
         raise TownError(source, "file", reason)
     return program
 

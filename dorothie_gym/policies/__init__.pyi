@@ -9,11 +9,13 @@ from .policy import Policy as Policy
 from .policy_loader import ALL_SCRIPTED as ALL_SCRIPTED
 from .policy_loader import LANGUAGE_MODEL as LANGUAGE_MODEL
 from .policy_loader import POLICY_NAMES as POLICY_NAMES
+from .policy_loader import AnyPlayer as AnyPlayer
 from .policy_loader import Loader as Loader
 from .policy_loader import Player as Player
 from .policy_loader import find_player as find_player
 from .policy_loader import loadable_kinds as loadable_kinds
 from .policy_loader import make_policy as make_policy
+from .policy_loader import player_of as player_of
 from .policy_loader import policy_names as policy_names
 from .policy_loader import register_loader as register_loader
 from .pretrained import PretrainedCard as PretrainedCard

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeA
 
 import numpy as np
 
+from dorothie_gym.errors import ActionError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.fields import SpaceLimits
 
@@ -103,7 +104,8 @@ class Policy(ABC, Generic[State]):
             state: state that `initial_state` or the previous step returned; it is not changed.
 
         Returns:
-            An action of the role's action space, and the state for the next decision.
+            An action of the role's action space, and the state for the next decision. Fields that the action leaves out
+            have no effect: `{"physical": PhysicalAction.STOP}` stops the car.
         """
 
 
@@ -136,6 +138,16 @@ class TypedPolicy(Policy[State]):
 
 AnyPolicy: TypeAlias = Policy[Any]
 """Policy whose state type is not known statically."""
+
+
+def checked_decision(role: Role, decision: object) -> tuple[Any, Any]:
+    """Returns what `step` of a policy has returned; raises `ActionError` if it is not the pair (action, state)."""
+    if isinstance(decision, tuple) and len(decision) == 2:
+        return decision
+    count = f" of {len(decision)} values" if isinstance(decision, tuple) else ""
+    raise ActionError(
+        f"the policy of {role} returned a {type(decision).__name__}{count}; step must return the pair (action, state)"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,5 +269,5 @@ class Players:
             inputs |= policy_inputs(session, self._others)
         actions: dict[str, AnyAction] = {}
         for role, agent, choose in self._steps:
-            actions[agent], states[role] = choose(inputs[role], states[role])
+            actions[agent], states[role] = checked_decision(role, choose(inputs[role], states[role]))
         return actions

@@ -22,10 +22,20 @@ from dorothie_gym.policies import language_model as model_policies
 from dorothie_gym.policies.ad_wizard_options import parse_ad_wizard
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.persona import parse_traits
-from dorothie_gym.policies.policy import DESCRIPTION, AnyPolicy
-from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
+from dorothie_gym.policies.policy import DESCRIPTION, AnyPolicy, Policy
+from dorothie_gym.policies.policy_import import (
+    check_fits_role,
+    check_policy_class,
+    create_policy,
+    import_policy,
+    is_reference,
+    name_of,
+    source_hash,
+)
+from dorothie_gym.policies.pretrained import PREFIX, check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
+from dorothie_gym.support.installation import pip_install
 
 POLICY_NAMES = ("scripted", "silent", "random")
 """Names that `make_policy` accepts for every role."""
@@ -55,7 +65,7 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
             `dorothie_gym.policies.persona`), for the Ad-Wizard with its options ("scripted:rate=4,spacing=12", see
             `dorothie_gym.policies.ad_wizard_options`); for the Co-Wizard also "lane-follow" (follows its lane, never
             talks), or a shipped model such as "pretrained:maskable-ppo"; "llm:" with the name of a language model at
-            the endpoint `OPENAI_BASE_URL`.
+            the endpoint `OPENAI_BASE_URL`; "module:Class" for a class of the user (`policy_import`).
         role: role of the policy.
         limits: sizes of the spaces.
 
@@ -66,14 +76,7 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if role not in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
         raise ValueError(f"role is {role}; policies act for participant, co_wizard and ad_wizard")
     if _gives_traits(name, role):
-        given = name.removeprefix(WITH_TRAITS)
-        if role is Role.AD_WIZARD:
-            options = parse_ad_wizard(given)
-            return policies.ScriptedAdWizard(limits, rate=options.rate, kinds=options.kinds, config=options.config)
-        traits = parse_traits(given)
-        if role is Role.PARTICIPANT:
-            return policies.ScriptedParticipant(limits, traits=traits)
-        return policies.ScriptedCoWizard(limits, traits=traits)
+        return _with_traits(name.removeprefix(WITH_TRAITS), role, limits)
     if name.startswith(LANGUAGE_MODEL):
         return model_policies.LanguageModelPolicy(
             role, LanguageModelConfig.usual(name.removeprefix(LANGUAGE_MODEL)), limits
@@ -82,6 +85,8 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
         return policies.SilentPolicy(role, limits)
     if name == "random":
         return policies.RandomPolicy(role, limits)
+    if _is_own(name):
+        return create_policy(import_policy(name), role, limits or SpaceLimits())
     if name not in policy_names(role):
         hint = did_you_mean(name, policy_names(role))
         raise ValueError(f"there is no policy {name!r}; {hint}the policies are {', '.join(policy_names(role))}")
@@ -93,6 +98,22 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if role is Role.PARTICIPANT:
         return policies.ScriptedParticipant(limits)
     return policies.ScriptedCoWizard(limits) if role is Role.CO_WIZARD else policies.ScriptedAdWizard(limits)
+
+
+def _with_traits(given: str, role: Role, limits: SpaceLimits | None) -> AnyPolicy:
+    """Returns the scripted policy of a role with given traits, or with the options of an Ad-Wizard."""
+    if role is Role.AD_WIZARD:
+        options = parse_ad_wizard(given)
+        return policies.ScriptedAdWizard(limits, rate=options.rate, kinds=options.kinds, config=options.config)
+    traits = parse_traits(given)
+    if role is Role.PARTICIPANT:
+        return policies.ScriptedParticipant(limits, traits=traits)
+    return policies.ScriptedCoWizard(limits, traits=traits)
+
+
+def _is_own(name: str) -> bool:
+    """Returns whether a name refers to a class of the user."""
+    return is_reference(name) and not name.startswith((WITH_TRAITS, LANGUAGE_MODEL, PREFIX))
 
 
 def _gives_traits(name: str, role: Role) -> bool:
@@ -153,13 +174,15 @@ class Player:
     """Source of a role's policy, by name or from a file; can be sent to other processes.
 
     Attributes:
-        name: name of the policy, with traits if any are given, or the path that was given.
+        name: name of the policy, with traits if any are given, or the path or "module:Class" that was given.
         path: file or folder of a trained policy; None for a policy by name, also for that of a shipped model, whose
             place differs between machines.
         loader: function that reads it.
         sha256: hash of the file, or of the model files ("model.*") of the folder; identifies the policy of a rollout.
+            That of a class of the user is the hash of its source file.
         training: cost of the training in `steps` and `seconds`, where the JSON of the file has them.
         language_model: settings of a language model; None for other policies.
+        policy: policy of the user, as an object or a class; None for a policy by name or file.
     """
 
     name: str
@@ -168,10 +191,11 @@ class Player:
     sha256: str | None = None
     training: Mapping[str, float] = field(default_factory=dict)
     language_model: LanguageModelConfig | None = None
+    policy: AnyPolicy | type[AnyPolicy] | None = None
 
     @property
     def trained(self) -> bool:
-        """Whether the policy is read from a file."""
+        """Whether the policy is read from a file, which may be that of a class."""
         return self.sha256 is not None
 
     def make(self, role: Role, limits: SpaceLimits) -> AnyPolicy:
@@ -182,11 +206,18 @@ class Player:
         """
         if self.language_model is not None:
             return model_policies.LanguageModelPolicy(role, self.language_model, limits)
+        if isinstance(self.policy, type):
+            return create_policy(self.policy, role, limits)
+        if self.policy is not None:
+            return _fitting(self.policy, self.name, role, limits)
         if self.path is None or self.loader is None:
             return make_policy(self.name, role, limits)
         with _reporting_missing_library(self.name):
             return self.loader(self.path, role, limits)
 
+
+AnyPlayer: TypeAlias = str | Player | AnyPolicy | type[AnyPolicy]
+"""Policy in any form that `player_of` takes: a name or path, a source, a policy object, a policy class."""
 
 SCRIPTED: Final = Player(name="scripted")
 ALL_SCRIPTED: Final[Mapping[Role, Player]] = MappingProxyType(
@@ -216,15 +247,47 @@ def find_player(given: str, role: Role, language_model: LanguageModelConfig | No
         return Player(name=given)
     if given.startswith(LANGUAGE_MODEL):
         return _language_model(given, role, language_model)
+    if _is_own(given) and not Path(given).exists():
+        return Player(name=given, sha256=source_hash(import_policy(given)))
     if given in policy_names(role):
         return _shipped_player(given, role) if is_pretrained(given) else Player(name=given)
     path = Path(given)
     if not path.exists():
         raise PolicyLoadError(
-            f"{role}: there is no policy {given!r}, nor a file of that name; "
+            f"{role}: there is no policy {given!r}, nor a file of that name (a class is module:Class); "
             f"{did_you_mean(given, policy_names(role))}the policies are {', '.join(policy_names(role))}"
         )
     return _trained_player(given, path, role)
+
+
+def player_of(given: AnyPlayer, role: Role) -> Player:
+    """Returns the source of a policy in any form: a name or path, a policy object, a class, or a source.
+
+    Args:
+        given: the policy. A class is given `role` and `limits` if its constructor takes them. Where sessions are played
+            in several processes, objects and classes must be picklable.
+        role: role of the policy.
+
+    Raises:
+        PolicyLoadError: there is no such policy, or it is not for the role.
+    """
+    if isinstance(given, Player):
+        return given
+    if isinstance(given, str):
+        return find_player(given, role)
+    if isinstance(given, Policy):
+        name = name_of(type(given))
+        return Player(name=name, sha256=source_hash(type(given)), policy=check_fits_role(given, role, name))
+    name = name_of(given) if isinstance(given, type) else type(given).__name__
+    found = check_policy_class(given, name)
+    return Player(name=name, sha256=source_hash(found), policy=found)
+
+
+def _fitting(policy: AnyPolicy, name: str, role: Role, limits: SpaceLimits) -> AnyPolicy:
+    """Returns a policy object if it has a role and the sizes of a town; raises `PolicyLoadError` otherwise."""
+    if policy.limits != limits:
+        raise PolicyLoadError(f"{name} has other SpaceLimits than the town; pass its class, or make it with {limits}")
+    return check_fits_role(policy, role, name)
 
 
 def _language_model(given: str, role: Role, settings: LanguageModelConfig | None) -> Player:
@@ -265,8 +328,8 @@ def _reporting_missing_library(name: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         library = (error.name or str(error)).partition(".")[0]
-        package = "'dorothie-gym[baselines]'" if library in _BASELINES else library
-        raise PolicyLoadError(f"{name} needs {library}, which is not installed; run: pip install {package}") from None
+        command = pip_install("baselines") if library in _BASELINES else f"pip install {library}"
+        raise PolicyLoadError(f"{name} needs {library}, which is not installed; run: {command}") from None
 
 
 def _cost(value: object) -> float | None:

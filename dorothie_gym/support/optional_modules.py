@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Final
 
 from dorothie_gym.errors import SpeechError
+from dorothie_gym.support.installation import pip_install
 
 PACKAGES: Final = ("hibari", "pocketsphinx", "soundfile")
 """Modules of the extra that the default synthesiser, the default recogniser and recordings need."""
@@ -17,7 +18,7 @@ def check_installed() -> None:
     """Raises `SpeechError` if a package that spoken sessions need is not installed; imports none."""
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
-        raise SpeechError(f"speech needs {', '.join(missing)}: pip install 'dorothie-gym[speech]'")
+        raise SpeechError(f"speech needs {', '.join(missing)}: {pip_install('speech')}")
 
 
 def speech_module(name: str, *, extra: str = "speech") -> ModuleType:
@@ -33,5 +34,5 @@ def speech_module(name: str, *, extra: str = "speech") -> ModuleType:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        remedy = f"pip install 'dorothie-gym[{extra}]'" if extra else f"pip install {name.replace('_', '-')}"
+        remedy = f"{pip_install(extra)}" if extra else f"pip install {name.replace('_', '-')}"
         raise SpeechError(f"the package {name} is needed and cannot be imported ({error}): {remedy}") from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, SupportsFloat, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, TypeAlias, overload
 
 import gymnasium as gym
 import numpy as np
@@ -12,7 +12,7 @@ from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from dorothie_gym.session.spaces.flat import Flat, FlatActions, FlatMask, FlatObservations, Unflattened
+from dorothie_gym.session.spaces.flat import BoxObservations, Flat, FlatActions, FlatMask, FlatObservations, Unflattened
 from dorothie_gym.support.action_values import whole_numbers
 
 if TYPE_CHECKING:
@@ -112,11 +112,56 @@ class FlattenObservation(gym.Wrapper[FlatObservation, ActType, Unflattened, ActT
         return flat
 
 
-def flatten(env: AnyEnv, fields: Sequence[str] | None = None) -> FlattenObservation[NDArray[np.generic]]:
-    """Flattens both spaces: `FlattenAction` with `fields`, then `FlattenObservation`.
+class BoxObservation(gym.Wrapper[NDArray[np.float32], ActType, Unflattened, ActType], RecordConstructorArgs):
+    """Wrapper that converts an observation space to one `Box` in [-1, 1], see `BoxObservations`.
 
-    Continuous action spaces are flat already and are kept.
+    A library that masks actions finds the mask in `action_masks()` of `FlattenAction` or `MacroActions`.
     """
-    if isinstance(env.action_space, spaces.Box):
-        return FlattenObservation(env)
-    return FlattenObservation(FlattenAction(env, fields))
+
+    def __init__(self, env: AnyEnv) -> None:
+        RecordConstructorArgs.__init__(self)
+        gym.Wrapper.__init__(self, env)
+        self._flat = BoxObservations(env.observation_space)
+        self.observation_space: AnySpace = spaces.Box(-1.0, 1.0, (self._flat.size,), dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: StepInfo | None = None
+    ) -> tuple[NDArray[np.float32], StepInfo]:
+        """Resets the environment."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._flat.vector(observation), info
+
+    def step(self, action: ActType) -> tuple[NDArray[np.float32], SupportsFloat, bool, bool, StepInfo]:
+        """Steps the environment."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return self._flat.vector(observation), reward, terminated, truncated, info
+
+    def action_masks(self) -> FlatMask:
+        """Returns the permitted values of the action, the interface of sb3-contrib."""
+        mask: FlatMask = self.env.get_wrapper_attr("action_masks")()
+        return mask
+
+
+@overload
+def flatten(
+    env: AnyEnv, fields: Sequence[str] | None = None, *, box: Literal[False] = False
+) -> FlattenObservation[NDArray[np.generic]]: ...
+@overload
+def flatten(
+    env: AnyEnv, fields: Sequence[str] | None = None, *, box: Literal[True]
+) -> BoxObservation[NDArray[np.generic]]: ...
+def flatten(
+    env: AnyEnv, fields: Sequence[str] | None = None, *, box: bool = False
+) -> FlattenObservation[NDArray[np.generic]] | BoxObservation[NDArray[np.generic]]:
+    """Flattens both spaces: `FlattenAction` with `fields`, then `FlattenObservation`, or `BoxObservation` with `box`.
+
+    Action spaces that are flat already (`Box`, the `Discrete` of `MacroActions`) are kept.
+
+    Args:
+        env: the environment.
+        fields: names of the action fields to keep; None keeps all except texts.
+        box: whether observations become one normalised `Box`; the mask is then in `action_masks()` only.
+    """
+    masked = isinstance(env.action_space, spaces.Discrete) and env.has_wrapper_attr("action_masks")
+    flat = env if masked or isinstance(env.action_space, spaces.Box) else FlattenAction(env, fields)
+    return BoxObservation(flat) if box else FlattenObservation(flat)

@@ -15,6 +15,7 @@ import dorothie_gym
 from dorothie_gym.cli import app
 from dorothie_gym.maps import describe, load_town
 from dorothie_gym.session.recording import Session
+from dorothie_gym.support.installation import pip_install
 
 ROOT = Path(__file__).parents[2]
 RUN_KEYS = [
@@ -121,7 +122,7 @@ class TestRun:
         monkeypatch.setattr(optional_modules, "PACKAGES", ("no_such_voice",))
         result = call("run", "--speech")
         assert result.exit_code == 2
-        assert "speech needs no_such_voice: pip install 'dorothie-gym[speech]'" in result.stderr
+        assert f"speech needs no_such_voice: {pip_install('speech')}" in result.stderr
 
     def test_perception_by_the_camera_survives_replay(self) -> None:
         loaded("run", "--seed", 3, "--max-seconds", 30, "--perception", "camera", "--out", "s", "--json")
@@ -152,7 +153,7 @@ class TestRun:
     def test_video_without_its_extra_names_the_package_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("dorothie_gym.cli.output.find_spec", lambda name: None)
         result = call("run", "--video", "v.mp4")
-        assert result.exit_code == 2 and "pip install 'dorothie-gym[video]'" in result.stderr
+        assert result.exit_code == 2 and pip_install("video") in result.stderr
 
     def test_ctrl_c_keeps_the_session_and_exits_with_130(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from dorothie_gym.session.session_engine import SessionEngine

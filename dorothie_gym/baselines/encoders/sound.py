@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from dorothie_gym.errors import EncoderError
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.encoders.encoder import Vectors
@@ -131,7 +132,7 @@ class SpeechEmbeddingEncoder:
             import pyopen_wakeword
         except ImportError:
             raise EncoderError(
-                "encoder speech-embedding: its weights are not installed; run: pip install 'dorothie-gym[sound]'"
+                f"encoder speech-embedding: its weights are not installed; run: {pip_install('sound')}"
             ) from None
         self._kind: Any = pyopen_wakeword.OpenWakeWordFeatures
         models = Path(str(pyopen_wakeword.__file__)).parent / "models"

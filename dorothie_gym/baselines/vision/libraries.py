@@ -6,6 +6,7 @@ import importlib
 from typing import Any
 
 from dorothie_gym.errors import EncoderError
+from dorothie_gym.support.installation import pip_install
 
 
 def transformers() -> Any:
@@ -17,9 +18,7 @@ def transformers() -> Any:
     try:
         return importlib.import_module("transformers")
     except ImportError as error:
-        raise EncoderError(
-            f"vision models need transformers ({error}); run: pip install 'dorothie-gym[vision]'"
-        ) from None
+        raise EncoderError(f"vision models need transformers ({error}); run: {pip_install('vision')}") from None
 
 
 def matcher_of(settings: Any) -> Any:

@@ -19,6 +19,7 @@ from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps.catalogue import town_at
 from dorothie_gym.maps.generated.specification import parse_series
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.navigation.instructor import words_of
 from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option, template_option
 from dorothie_gym.support.copying import Restorable, taken
@@ -96,6 +97,13 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
     def decision_limit(self) -> int:
         """Decisions until truncation."""
         return decisions_in(self.config.max_seconds, self.config.decision_frequency)
+
+    @property
+    def instruction(self) -> str:
+        """Words of the instruction that is in force; empty before the first one."""
+        self._check_begun()
+        said = self.batch.heard(0).instruction
+        return "" if said is None else words_of(said)
 
     @property
     def session(self) -> LiveSession:

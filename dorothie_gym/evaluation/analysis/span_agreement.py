@@ -19,6 +19,7 @@ import numpy as np
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import Slot
+from dorothie_gym.support.installation import pip_install
 
 _SLOTS: Final = (Slot.ACTION, Slot.STREET, Slot.STATUS, Slot.LANDMARK, Slot.OBJECT)
 
@@ -174,7 +175,7 @@ def alpha_of(annotators: Sequence[Sequence[LabelledUtterance | None]]) -> Alpha:
         ValueError: the numbers of utterances or of words differ.
     """
     if not has_alpha():
-        raise SessionError("Krippendorff's alpha needs krippendorff; run: pip install 'dorothie-gym[agreement]'")
+        raise SessionError(f"Krippendorff's alpha needs krippendorff; run: {pip_install('agreement')}")
     judged: list[tuple[DialogueAct | None, ...]] = []
     for spans in zip(*annotators, strict=True):
         present = [None if each is None or not is_finished(each) else each for each in spans]

@@ -18,7 +18,7 @@ from dorothie_gym.evaluation.closed_loop.many_rollouts import folder_name, roll_
 from dorothie_gym.evaluation.closed_loop.results import ALL_METRICS, RolloutResult, figure_text
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, command_of, towns_text
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.policy_loader import SCRIPTED, Player
+from dorothie_gym.policies.policy_loader import SCRIPTED, AnyPlayer, Player, player_of
 from dorothie_gym.session.config import EnvConfig
 
 RESULT_NAME: Final = "cross_play.json"
@@ -35,6 +35,8 @@ PRINTED_METRICS: Final = ("success", "goal_condition_success")
 class CrossPlaySettings:
     """Settings of a cross-play, which determine its result.
 
+    Policies are given in any form that `player_of` takes, such as a class, and kept as players.
+
     Attributes:
         co_wizards: players of the Co-Wizard, at least one; the rows of the matrix.
         participants: players of the participant, at least one; the columns.
@@ -45,9 +47,9 @@ class CrossPlaySettings:
         config: settings of the engine.
     """
 
-    co_wizards: Sequence[Player]
-    participants: Sequence[Player]
-    ad_wizard: Player = SCRIPTED
+    co_wizards: Sequence[AnyPlayer]
+    participants: Sequence[AnyPlayer]
+    ad_wizard: AnyPlayer = SCRIPTED
     towns: tuple[str, ...]
     sessions: int = 20
     seed: int = 0
@@ -55,18 +57,28 @@ class CrossPlaySettings:
 
     def __post_init__(self) -> None:
         """Checks the fields."""
-        for name, players in (("co_wizards", self.co_wizards), ("participants", self.participants)):
+        for name, players in (("co_wizards", self.rows), ("participants", self.columns)):
             given = [player.name for player in players]
             if not given:
                 raise ValueError(f"{name} is empty; give at least one")
             if len(set(given)) < len(given):
                 raise ValueError(f"{name} has {', '.join(given)}; give each once")
 
+    @property
+    def rows(self) -> tuple[Player, ...]:
+        """Players of the Co-Wizard."""
+        return tuple(player_of(given, Role.CO_WIZARD) for given in self.co_wizards)
+
+    @property
+    def columns(self) -> tuple[Player, ...]:
+        """Players of the participant."""
+        return tuple(player_of(given, Role.PARTICIPANT) for given in self.participants)
+
     def plans(self) -> dict[str, RolloutSettings]:
         """Returns the rollout of each pair by the name of its folder, row by row."""
         found: dict[str, RolloutSettings] = {}
-        for driver in self.co_wizards:
-            for guide in self.participants:
+        for driver in self.rows:
+            for guide in self.columns:
                 name = f"{folder_name(driver, Role.CO_WIZARD)}--{folder_name(guide, Role.PARTICIPANT)}"
                 cast = {Role.CO_WIZARD: driver, Role.PARTICIPANT: guide, Role.AD_WIZARD: self.ad_wizard}
                 found[name] = RolloutSettings(
@@ -182,11 +194,11 @@ def cross_play(
     plans = settings.plans()
     results = roll_out_all(plans, folder, workers=workers, ray=ray, on_session=on_session)
     cells = {
-        (plan.cast[Role.CO_WIZARD].name, plan.cast[Role.PARTICIPANT].name): results[name]
+        (plan.players[Role.CO_WIZARD].name, plan.players[Role.PARTICIPANT].name): results[name]
         for name, plan in plans.items()
     }
     return CrossPlayResult(
-        co_wizards=tuple(player.name for player in settings.co_wizards),
-        participants=tuple(player.name for player in settings.participants),
+        co_wizards=tuple(player.name for player in settings.rows),
+        participants=tuple(player.name for player in settings.columns),
         cells=cells,
     )

@@ -12,7 +12,7 @@ from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
 from dorothie_gym.maps.default_lights import split_lights
 from dorothie_gym.maps.folds import FOLD_TOWNS, TownFold
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, LANE_FOLLOW, Player
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, LANE_FOLLOW, AnyPlayer, Player, player_of
 from dorothie_gym.policies.pretrained import names_for
 from dorothie_gym.session.config import EnvConfig
 
@@ -33,7 +33,7 @@ class LeaderboardPlan:
     """Rollouts of a leaderboard.
 
     Attributes:
-        co_wizards: players, at least one; participant and Ad-Wizard are scripted.
+        co_wizards: players in any form that `player_of` takes, at least one; participant and Ad-Wizard are scripted.
         parts: parts to be played, of `CHOICES`.
         imported: OpenDRIVE files; if there are any, the part "imported" is played in them.
         sessions: number of sessions of each row.
@@ -41,7 +41,7 @@ class LeaderboardPlan:
         config: settings of the engine.
     """
 
-    co_wizards: Sequence[Player]
+    co_wizards: Sequence[AnyPlayer]
     parts: tuple[str, ...] = PARTS
     imported: tuple[str, ...] = ()
     sessions: int = ENOUGH
@@ -56,9 +56,14 @@ class LeaderboardPlan:
         wrong = [name for name in self.imported if not split_lights(name)[0].lower().endswith(".xodr")]
         if wrong:
             raise ValueError(f"imported has {wrong[0]}; give OpenDRIVE files (.xodr)")
-        names = [player.name for player in self.co_wizards]
+        names = [player.name for player in self.players]
         if not names or len(set(names)) < len(names):
             raise ValueError(f"co_wizards has {', '.join(names) or 'nobody'}; give each once")
+
+    @property
+    def players(self) -> tuple[Player, ...]:
+        """Players of the Co-Wizard."""
+        return tuple(player_of(given, Role.CO_WIZARD) for given in self.co_wizards)
 
     def rollouts(self) -> dict[str, RolloutSettings]:
         """Returns the rollouts by the name of their folder, part by part."""
@@ -73,5 +78,5 @@ class LeaderboardPlan:
                 config=self.config,
             )
             for part in parts
-            for player in self.co_wizards
+            for player in self.players
         }

@@ -21,7 +21,7 @@ from dorothie_gym.maps.folds import FOLD_TOWNS, VALIDATION_TOWNS, TownFold
 from dorothie_gym.maps.generated.specification import parse_series, split_names
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
-from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, AnyPlayer, Player, player_of
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recording.files import safe_name, to_page
 from dorothie_gym.support.files import write_atomically
@@ -75,7 +75,7 @@ class RolloutSettings:
     """Settings of a rollout, which determine its result.
 
     Attributes:
-        cast: player of each of the three roles.
+        cast: policy of each of the three roles: a `Player`, a name, an object or a class (`player_of`).
         towns: names or files of towns, which take turns.
         sessions: number of sessions in all towns.
         seed: seed of the rollout; with the number of a session it gives the seed of the session, for any players.
@@ -87,7 +87,7 @@ class RolloutSettings:
         references: whether sessions get the reference of their scenario, see `ReferenceDrive`.
     """
 
-    cast: Mapping[Role, Player] = field(default_factory=lambda: ALL_SCRIPTED)
+    cast: Mapping[Role, AnyPlayer] = field(default_factory=lambda: ALL_SCRIPTED)
     towns: tuple[str, ...] = VALIDATION_TOWNS
     sessions: int = 20
     seed: int = 0
@@ -113,6 +113,12 @@ class RolloutSettings:
         missing = [str(role) for role in AGENT_ROLES if role not in self.cast]
         if missing:
             raise ValueError(f"cast has no player for {', '.join(missing)}; each of the three roles needs a player")
+        object.__setattr__(self, "cast", {role: player_of(given, role) for role, given in self.cast.items()})
+
+    @property
+    def players(self) -> dict[Role, Player]:
+        """Player of each role."""
+        return {role: player_of(given, role) for role, given in self.cast.items()}
 
     def plans(self) -> tuple[RolloutPlan, ...]:
         """Returns the plans of the sessions, in order: all trials of a scenario, then those of the next one."""
@@ -137,12 +143,13 @@ class RolloutSettings:
 
         Fields of tiers are left out where they have their defaults.
         """
+        cast = self.players
         models = {
             str(role): player.language_model.record()
-            for role, player in self.cast.items()
+            for role, player in cast.items()
             if player.language_model is not None
         }
-        names = {str(role): self.cast[role].name for role in AGENT_ROLES}
+        names = {str(role): cast[role].name for role in AGENT_ROLES}
         if self.pool:
             names[str(Role.PARTICIPANT)] = POOL_SEPARATOR.join(player.name for player in self.pool)
         tier: dict[str, object] = {
@@ -154,8 +161,8 @@ class RolloutSettings:
         }
         return {
             **names,
-            "sha256": {str(role): self.cast[role].sha256 for role in AGENT_ROLES if self.cast[role].sha256},
-            "training": {str(role): dict(self.cast[role].training) for role in AGENT_ROLES if self.cast[role].training},
+            "sha256": {str(role): cast[role].sha256 for role in AGENT_ROLES if cast[role].sha256},
+            "training": {str(role): dict(cast[role].training) for role in AGENT_ROLES if cast[role].training},
             **({"language_models": models} if models else {}),
             **{name: value for name, value in tier.items() if value},
             "towns": list(self.towns),
@@ -291,7 +298,7 @@ def roll_out(
         settings_file=SETTINGS_FILE,
         settings=settings.to_json(),
         config=settings.config,
-        cast=settings.cast,
+        cast=settings.players,
         evaluate=_measure,
         keep_errors=True,
         writes_cost=True,

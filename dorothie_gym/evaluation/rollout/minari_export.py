@@ -30,6 +30,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces.actions import noop
 from dorothie_gym.session.spaces.flat import FlatActions, FlatObservations
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from minari.data_collector import EpisodeBuffer
@@ -124,7 +125,7 @@ def _check_libraries(storage: str) -> None:
         raise SessionError(f"storage is {storage!r}; it must be {' or '.join(STORAGES)}")
     if find_spec("minari") is None or (storage == "hdf5" and find_spec("h5py") is None):
         missing = "Minari" if find_spec("minari") is None else "h5py, which writes HDF5,"
-        raise SessionError(f"{missing} is not installed; run: pip install 'dorothie-gym[minari]'")
+        raise SessionError(f"{missing} is not installed; run: {pip_install('minari')}")
 
 
 def _check_equal(found: Sequence[RoleEpisode]) -> None:

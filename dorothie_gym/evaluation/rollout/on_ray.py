@@ -12,6 +12,7 @@ from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession
 from dorothie_gym.session.recording.files import SessionState
 from dorothie_gym.session.recording.session import session_state
+from dorothie_gym.support.installation import pip_install
 
 Plan = TypeVar("Plan", bound=PlannedSession)
 Result = TypeVar("Result")
@@ -78,7 +79,7 @@ def connect(address: str) -> Any:  # Ray is optional and has no types for mypy
     try:
         import ray
     except ImportError:
-        raise ProcessError("Ray is not installed; install dorothie-gym[ray]") from None
+        raise ProcessError(f"Ray is not installed; run: {pip_install('ray')}") from None
     try:
         _check_address(address)
         ray.init(address=address, log_to_driver=False, logging_level="error")

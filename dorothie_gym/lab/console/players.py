@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.evaluation.rollout.play import with_personas
 from dorothie_gym.lab.console.seating import Occupancy, SeatPlan
-from dorothie_gym.policies.policy import AnyPolicy, TypedPolicy, policy_inputs, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, TypedPolicy, checked_decision, policy_inputs, policy_seed
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
@@ -66,10 +66,9 @@ class Players:
         actions: dict[str, AnyAction] = {}
         inputs = policy_inputs(self._engine, self._policies)
         for role, policy in self._policies.items():
-            if isinstance(policy, TypedPolicy) and policy.is_direct:
-                actions[role.value], self._states[role] = policy.act(inputs[role], self._states[role])
-            else:
-                actions[role.value], self._states[role] = policy.step(inputs[role], self._states[role])
+            choose = policy.act if isinstance(policy, TypedPolicy) and policy.is_direct else policy.step
+            decision = choose(inputs[role], self._states[role])
+            actions[role.value], self._states[role] = checked_decision(role, decision)
         return actions
 
     def sign(self, header: SessionHeader) -> SessionHeader:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from dorothie_gym.errors import PolicyLoadError, SettingsError, did_you_mean
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, SCRIPTED, Player, find_player
+from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, SCRIPTED, WITH_TRAITS, Player, find_player
 
 
 class Occupancy(enum.StrEnum):
@@ -47,8 +47,8 @@ def parse_roles(text: str) -> dict[Role, SeatPlan]:
     """Returns the plan of each seat; roles that are not named are open.
 
     Args:
-        text: "co_wizard=human,participant=scripted": for each role "human", "open", or a policy by name or file; traits
-            of a scripted persona may contain commas.
+        text: "co_wizard=human,participant=scripted": for each role "human", "open", or a policy by name, file or class;
+            traits of a scripted persona may contain commas.
 
     Raises:
         SettingsError: a role is unknown or named twice, or has no value.
@@ -59,7 +59,7 @@ def parse_roles(text: str) -> dict[Role, SeatPlan]:
     for part in text.split(",") if text.strip() else ():
         name, equals, value = part.partition("=")
         role = _ROLES.get(name.strip().lower().replace("-", "_"))
-        if role is None and last is not None and ":" in given[last]:
+        if role is None and last is not None and given[last].startswith(WITH_TRAITS):
             given[last] += f",{part}"  # traits of a persona
             continue
         if role is None or not equals or not value.strip():
@@ -75,7 +75,7 @@ def plan_seat(given: str, role: Role) -> SeatPlan:
     """Returns the plan of a seat.
 
     Args:
-        given: "human", "open", or a policy by name or file.
+        given: "human", "open", or a policy by name, file or class ("module:Class").
         role: role of the seat.
 
     Raises:

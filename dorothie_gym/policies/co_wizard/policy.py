@@ -111,7 +111,7 @@ def attend(observation: ObservationMapping, state: CoWizardState) -> PendingDeci
     updated, rng = state.next_decision()
     view = CoWizardView.read(observation, updated.town)
     updated.clock = updated.clock.ticked(view.time)
-    _update_route(updated, view)
+    update_route(updated, view)
     listen(updated, view, rng)
     watch_road(updated, view, rng)
     search_on(updated, view)
@@ -141,7 +141,7 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
     return CoWizardAction(speech=speech, physical=physical, mental=_next_update(state))
 
 
-def _update_route(state: CoWizardState, view: CoWizardView) -> None:
+def update_route(state: CoWizardState, view: CoWizardView) -> None:
     """Updates standstill, directive and route with the position of the car."""
     state.standstill = state.standstill.observed(view.time, standing=view.standing)
     if view.manoeuvring and not view.standing:

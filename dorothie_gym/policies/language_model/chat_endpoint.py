@@ -17,6 +17,7 @@ from dorothie_gym.policies.language_model.event_stream import is_event_stream, j
 from dorothie_gym.policies.language_model.faults import CallError, Fault
 from dorothie_gym.policies.language_model.request_parameters import refused_parameter
 from dorothie_gym.support.input_files import parse_json
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from dorothie_gym.support.files import JsonValue
@@ -97,7 +98,7 @@ def httpx_module() -> ModuleType:
         return import_module("httpx")
     except ModuleNotFoundError:
         raise PolicyLoadError(
-            "language models need httpx, which is not installed; run: pip install 'dorothie-gym[llm]'"
+            f"language models need httpx, which is not installed; run: {pip_install('llm')}"
         ) from None
 
 

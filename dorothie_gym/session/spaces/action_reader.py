@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from gymnasium import spaces
 
-from dorothie_gym.errors import short_repr
+from dorothie_gym.errors import did_you_mean, short_repr
 from dorothie_gym.support.action_values import as_array, whole_number
 
 _ONE_BYTE = "bB?"
@@ -34,11 +34,19 @@ class ActionFieldTable:
         shapes: shape of each array field.
         tops: greatest value of each array entry, flattened.
         texts: greatest length and permitted characters of each text field.
+        idle: values of fields that a dict may leave out.
     """
 
-    def __init__(self, space: spaces.Dict) -> None:
+    def __init__(self, space: spaces.Dict, idle: Mapping[str, object] | None = None) -> None:
+        """Looks up the bounds of a space.
+
+        Args:
+            space: the action space.
+            idle: values of fields that a dict may leave out; None to require all but `OPTIONAL_FIELDS`.
+        """
         self.names = tuple(space)
         self.known = frozenset(space)
+        self.idle = {} if idle is None else idle
         self.ranges: dict[str, tuple[int, int]] = {}
         self.shapes: dict[str, tuple[int, ...]] = {}
         self.tops: dict[str, list[int]] = {}
@@ -64,12 +72,14 @@ class ActionReader:
         self._action, self._table = action, table
         if action.keys() != table.known:
             fields = ", ".join(table.names)
-            missing = [name for name in table.names if name not in action and name not in OPTIONAL_FIELDS]
-            if missing:
-                raise ValueError(f"field {missing[0]!r} is missing; the fields are {fields}")
             unknown = [name for name in action if name not in table.known]
             if unknown:
-                raise ValueError(f"field {short_repr(unknown[0])} is unknown; the fields are {fields}")
+                hint = did_you_mean(str(unknown[0]), table.names)
+                raise ValueError(f"field {short_repr(unknown[0])} is unknown; {hint}the fields are {fields}")
+            self._action = {**table.idle, **action}
+            missing = [name for name in table.names if name not in self._action and name not in OPTIONAL_FIELDS]
+            if missing:
+                raise ValueError(f"field {missing[0]!r} is missing; the fields are {fields}")
 
     def integer(self, name: str) -> int:
         """Returns an integer field; raises `ValueError` if it is not an integer or is out of range."""

@@ -1,7 +1,8 @@
 """Typed actions of the roles, their action spaces, and the conversion from and to action dicts.
 
-Environments take dicts of numbers and texts; these classes encode and decode them. A malformed dict raises `ValueError`
-with the name of the field. The environment decides whether a well-formed action is feasible.
+Environments take dicts of numbers and texts; these classes encode and decode them. A field that a dict leaves out has
+its value in `noop`. A malformed dict raises `ValueError` with the name of the field. The environment decides whether a
+well-formed action is feasible.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from gymnasium import spaces
 
 from dorothie_gym.dialogue.propositions import Proposition, encode_meaning, find_meaning
+from dorothie_gym.errors import ActionError, short_repr
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueAct, DialogueMove, decode_slots, encode_slots
 from dorothie_gym.ontology.roles import Role
@@ -321,7 +323,7 @@ class ActionDecoder:
         self._fields, self._read = _fields(role, limits), _CLASSES[role].read
 
     def __call__(self, action: AnyAction) -> RoleAction:
-        """Decodes an action dict; raises `ValueError` with the role and the name of an invalid field.
+        """Decodes an action dict; raises `ActionError` with the role and the name of an invalid field.
 
         A typed action gives what its action dict would give: values in the steps and bounds of the action space.
         """
@@ -330,11 +332,14 @@ class ActionDecoder:
                 return self._idle
             action = action.encode(self._limits)
         if type(action) is not dict and not isinstance(action, Mapping):
-            raise ValueError(f"action of {self.role}: expected a dict, got {type(action).__name__}")
+            raise ActionError(
+                f"action of {self.role}: expected a dict of fields or a {self._class.__name__}, "
+                f"got {type(action).__name__} {short_repr(action)}"
+            )
         try:
             return self._read(ActionReader(action, self._fields))
         except ValueError as error:
-            raise ValueError(f"action of {self.role}: {error}") from None
+            raise ActionError(f"action of {self.role}: {error}") from None
 
 
 def encoded(action: AnyAction, limits: SpaceLimits) -> ActionMapping:
@@ -354,7 +359,7 @@ def is_idle(action: AnyAction) -> bool:
 
 
 def decode_action(role: Role, action: ActionMapping, limits: SpaceLimits) -> RoleAction:
-    """Decodes the action dict of a role; raises `ValueError` with the role and the name of an invalid field."""
+    """Decodes the action dict of a role; raises `ActionError` with the role and the name of an invalid field."""
     return ActionDecoder(role, limits)(action)
 
 
@@ -460,7 +465,7 @@ def _encode_place(place: LanePosition) -> ActionDict:
 
 @lru_cache(maxsize=64)
 def _fields(role: Role, limits: SpaceLimits) -> ActionFieldTable:
-    return ActionFieldTable(action_space(role, limits))
+    return ActionFieldTable(action_space(role, limits), noop(role, limits))
 
 
 def _read_speech(reader: ActionReader) -> Speech | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -118,6 +118,55 @@ class FlatObservations:
         rows = np.concatenate(parts, axis=1, dtype=np.float32, casting="unsafe")
         clipped: NDArray[np.float32] = np.clip(rows, self.low, self.high)
         return clipped
+
+
+ONE_HOT: Final = 64
+"""Most values of a `Discrete` field that `BoxObservations` encodes with one number per value."""
+
+SOFT: Final = 30.0
+"""Value of an unbounded field that `BoxObservations` maps to 0.5, in the unit of the field."""
+
+
+class BoxObservations:
+    """Conversion of observations to one vector in [-1, 1], fields in the order of the space; texts are omitted.
+
+    A field with bounds is scaled by them. An unbounded one becomes x / (abs(x) + 30). A `Discrete` of up to 64 values
+    is one-hot, and larger ids are scaled.
+
+    Attributes:
+        size: length of the vector.
+    """
+
+    def __init__(self, space: AnySpace) -> None:
+        """Analyses a space; raises `ValueError` if a field holds neither numbers nor text."""
+        self._parts = {name: part for name, part in _parts(space).items() if not isinstance(part, spaces.Text)}
+        self._bounds = {name: _bounds(name, part) for name, part in self._parts.items()}
+        self.size = sum(
+            int(part.n) if _is_one_hot(part) else len(self._bounds[name][0]) for name, part in self._parts.items()
+        )
+
+    def vector(self, observation: Unflattened) -> NDArray[np.float32]:
+        """Returns the vector of an observation (n,) float32 in [-1, 1]."""
+        fields = observation if isinstance(observation, dict) else {_WHOLE: observation}
+        parts = [self._scaled(name, part, fields[name]) for name, part in self._parts.items()]
+        return np.concatenate(parts, dtype=np.float32, casting="unsafe")
+
+    def _scaled(self, name: str, part: AnySpace, value: object) -> NDArray[np.float64]:
+        values = np.ravel(np.asarray(value, dtype=np.float64))
+        if _is_one_hot(part):
+            hot = np.zeros(int(part.n))
+            hot[int(values[0]) - int(part.start)] = 1.0
+            return hot
+        low, high = (bound.astype(np.float64) for bound in self._bounds[name])
+        bounded = (low > -UNBOUNDED) & (high < UNBOUNDED)
+        span = np.where(bounded & (high > low), high - low, 1.0)
+        inside = 2.0 * (np.clip(values, low, high) - np.where(bounded, low, 0.0)) / span - 1.0
+        scaled: NDArray[np.float64] = np.where(bounded, inside, values / (np.abs(values) + SOFT))
+        return scaled
+
+
+def _is_one_hot(part: AnySpace) -> bool:
+    return isinstance(part, spaces.Discrete) and int(part.n) <= ONE_HOT
 
 
 def _parts(space: AnySpace) -> dict[str, AnySpace]:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dorothie_gym.errors import ActionError
 from dorothie_gym.ontology import (
     AGENT_ROLES,
     DialogueAct,
@@ -115,12 +116,21 @@ def test_flags_may_be_of_any_integer_type() -> None:
         assert len(action.speech.act.slots) == 1
 
 
-def test_error_names_missing_or_unknown_field() -> None:
-    action = noop(Role.PARTICIPANT, LIMITS)
-    del action["slots"]
-    with pytest.raises(ValueError, match="field 'slots' is missing"):
-        decode_action(Role.PARTICIPANT, action, LIMITS)
+@pytest.mark.parametrize("role", AGENT_ROLES)
+def test_fields_that_an_action_leaves_out_have_no_effect(role: Role) -> None:
+    assert decode_action(role, {}, LIMITS) == decode_action(role, noop(role, LIMITS), LIMITS)
+
+
+def test_partial_action_stops_the_car_in_silence() -> None:
+    action = decode_action(Role.CO_WIZARD, {"physical": PhysicalAction.STOP}, LIMITS)
+    assert isinstance(action, CoWizardAction)
+    assert action == CoWizardAction(physical=Physical(action=PhysicalAction.STOP, up=False))
+
+
+def test_error_names_unknown_field_and_the_type_of_an_action() -> None:
+    with pytest.raises(ActionError, match="field 'physicl' is unknown; did you mean 'physical'"):
+        decode_action(Role.CO_WIZARD, {"physicl": 4}, LIMITS)
     with pytest.raises(ValueError, match="field 'wish' is unknown"):
         decode_action(Role.PARTICIPANT, {**noop(Role.PARTICIPANT, LIMITS), "wish": 1}, LIMITS)
-    with pytest.raises(ValueError, match="expected a dict, got list"):
+    with pytest.raises(ValueError, match=r"expected a dict of fields or a ParticipantAction, got list \[\]"):
         decode_action(Role.PARTICIPANT, [], LIMITS)  # type: ignore[arg-type]  # a wrong type on purpose

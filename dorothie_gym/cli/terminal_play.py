@@ -1,0 +1,232 @@
+"""Play by keys in a terminal: the Co-Wizard by macro-actions, and `Navigation-v0`."""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+import gymnasium as gym
+import numpy as np
+from rich.text import Text
+
+from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.policies.navigation.actions import NavigationAction
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.wrappers.macro_actions import MACRO_ACTIONS, MacroActions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from rich.console import Console
+
+    from dorothie_gym.session.config import EnvConfig
+
+QUIT: Final = "q"
+PICTURE: Final = "v"
+HELP: Final = "?"
+NOTHING: Final = " "
+
+COMMANDS: Final[Mapping[str, str]] = {
+    " ": "continue", "g": "start", "x": "stop", "u": "turn_round", "+": "faster", "-": "slower",
+    "a": "left", "w": "straight", "d": "right",
+    "o": "say_okay", "k": "say_will_do", "y": "say_yes", "n": "say_no", "h": "say_not_understood", "m": "say_goal",
+    "f": "ask_where_to", "t": "ask_which_street", "j": "ask_which_way", "e": "ask_whether_done", "c": "ask_goal",
+}  # fmt: skip
+"""Key of each macro-action; goals have the digits."""
+
+DRIVING: Final[Mapping[str, str]] = {
+    " ": "NOTHING", "l": "LANE_FOLLOW", "<": "SWITCH_LEFT", ">": "SWITCH_RIGHT", "u": "U_TURN", "x": "STOP",
+    "g": "START", "+": "FASTER", "-": "SLOWER", "i": "LIGHTS", "a": "TURN_LEFT", "w": "TURN_STRAIGHT",
+    "d": "TURN_RIGHT", "z": "TURN_HALF_LEFT", "c": "TURN_HALF_RIGHT", "y": "TURN_SHARP_LEFT", "n": "TURN_SHARP_RIGHT",
+    "b": "TURN_BACK",
+}  # fmt: skip
+"""Key of each action of `Navigation-v0`."""
+
+
+class KeyGame(ABC):
+    """Environment that is played by keys."""
+
+    keys: Mapping[str, int]
+    names: Mapping[str, str]
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        self.env = env
+
+    @abstractmethod
+    def heard(self) -> str:
+        """Returns the words that the participant has just said; empty if there are none."""
+
+    @abstractmethod
+    def status(self) -> str:
+        """Returns the state of the car in one line."""
+
+    def begin(self, seed: int) -> None:
+        """Begins a session."""
+        self.observation, self.info = self.env.reset(seed=seed)
+        self.over = False
+
+    def press(self, key: str) -> None:
+        """Carries out the action of a key."""
+        self.observation, _, terminated, truncated, self.info = self.env.step(self.keys[key])
+        self.over = terminated or truncated
+
+    def possible(self) -> list[str]:
+        """Returns the keys whose actions are possible now."""
+        mask = self.env.get_wrapper_attr("action_masks")()
+        return [key for key, number in self.keys.items() if mask[number]]
+
+
+class CoWizardGame(KeyGame):
+    """Session in which a person plays the Co-Wizard by macro-actions.
+
+    Args:
+        town: name or file of the town.
+        config: settings of the session.
+    """
+
+    def __init__(self, town: str, config: EnvConfig) -> None:
+        env = gym.make("dorothie_gym/CoWizard-v0", town=town, config=config, render_mode="rgb_array")
+        super().__init__(MacroActions(env))
+        actions = MACRO_ACTIONS
+        numbers = {one.name: number for number, one in enumerate(actions)}
+        goals = [number for number, one in enumerate(actions) if one.place is not None]
+        self.keys = {key: numbers[name] for key, name in COMMANDS.items()} | {
+            str(digit): number for digit, number in enumerate(goals)
+        }
+        self.names = {key: actions[number].name.replace("_", " ") for key, number in self.keys.items()}
+
+    def heard(self) -> str:
+        """Returns what has ended since the last action."""
+        return str(self.observation["participant_text"])
+
+    def status(self) -> str:
+        """Returns time, speed, motion and goal."""
+        motion = Motion(int(self.observation["motion"])).name.lower()
+        goal = LandmarkName(int(self.observation["goal"]))
+        towards = "" if goal is LandmarkName.UNKNOWN else f", goal {goal.label}"
+        arrived = ", arrived" if self.observation["arrived"] else ""
+        speed = float(self.observation["speed"][0]) * 3.6
+        return f"{self.observation['time'][0]:5.1f} s  {speed:3.0f} km/h  {motion}{towards}{arrived}"
+
+
+class NavigationGame(KeyGame):
+    """Episode of `Navigation-v0`, in which a person drives by the instructions of the participant.
+
+    Args:
+        town: name or file of the town.
+        seconds: longest simulated time [s].
+    """
+
+    def __init__(self, town: str, seconds: float) -> None:
+        super().__init__(
+            gym.make("dorothie_gym/Navigation-v0", town=town, max_seconds=seconds, render_mode="rgb_array")
+        )
+        self.keys = {key: int(NavigationAction[name]) for key, name in DRIVING.items()}
+        self.names = {key: name.lower().replace("_", " ") for key, name in DRIVING.items()}
+        self._told = ""
+
+    def begin(self, seed: int) -> None:
+        """Begins an episode."""
+        super().begin(seed)
+        self._told = ""
+
+    def heard(self) -> str:
+        """Returns the words of a new instruction."""
+        words = str(self.env.get_wrapper_attr("instruction"))
+        new, self._told = words != self._told, words
+        return words if new else ""
+
+    def status(self) -> str:
+        """Returns time and speed."""
+        world = self.env.get_wrapper_attr("session").world
+        return f"{world.time:5.1f} s  {world.car.speed * 3.6:3.0f} km/h"
+
+
+def play(game: KeyGame, seed: int, screen: Console) -> bool:
+    """Plays a session by keys; returns whether it has ended.
+
+    Args:
+        game: the game.
+        seed: seed of the session.
+        screen: console on which the session is shown.
+    """
+    game.begin(seed)
+    _show_help(game, screen)
+    with _keys() as read:
+        while not game.over:
+            words = game.heard()
+            if words:
+                screen.print(Text(f"Participant: {words}", style="bold"))
+            screen.print(game.status(), style="dim")
+            key = read()
+            if key in ("", QUIT):
+                return False
+            if key == PICTURE:
+                screen.print(small_picture(game.env.render(), screen.width - 1))
+            elif key == HELP or key not in game.keys:
+                _show_help(game, screen)
+            elif key not in game.possible():
+                screen.print(f"{game.names[key]} is not possible now", style="dim")
+            else:
+                game.press(key)
+                if key != NOTHING:
+                    screen.print(f"You: {game.names[key]}")
+                if reason := str(game.info["refusal_reason"]):
+                    screen.print(f"Refused: {reason}")
+    return True
+
+
+def small_picture(picture: Any, columns: int) -> Text:
+    """Returns a picture (height, width, 3) uint8 as coloured half blocks, at most `columns` characters wide."""
+    height, width = picture.shape[:2]
+    wide = min(columns, 100)
+    rows = max(2, round(wide * height / width) // 2 * 2)
+    down = np.linspace(0, height, rows + 1).astype(int)
+    across = np.linspace(0, width, wide + 1).astype(int)
+    means: NDArray[np.float64] = np.add.reduceat(np.add.reduceat(picture.astype(float), down[:-1], 0), across[:-1], 1)
+    areas = np.diff(down)[:, None, None] * np.diff(across)[None, :, None]
+    small = (means / areas).astype(int)
+    text = Text()
+    for upper, lower in zip(small[::2], small[1::2], strict=True):
+        for one, two in zip(upper, lower, strict=True):
+            text.append("▀", style=f"rgb({one[0]},{one[1]},{one[2]}) on rgb({two[0]},{two[1]},{two[2]})")
+        text.append("\n")
+    return text
+
+
+def _show_help(game: KeyGame, screen: Console) -> None:
+    possible = set(game.possible())
+    shown = [f"{'space' if key == ' ' else key} {name}" for key, name in game.names.items() if key in possible]
+    screen.print("Keys: " + " · ".join([*shown, f"{PICTURE} map", f"{HELP} help", f"{QUIT} quit"]))
+
+
+@contextmanager
+def _keys() -> Iterator[Callable[[], str]]:
+    """Yields a function that reads one key: at once on a terminal, else the next character of the input."""
+    if not sys.stdin.isatty():
+        yield _next_character
+        return
+    try:
+        import termios
+        import tty
+    except ImportError:  # Windows
+        import msvcrt
+
+        yield lambda: str(msvcrt.getwch())  # type: ignore[attr-defined]  # of Windows only
+        return
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+    tty.setcbreak(descriptor)
+    try:
+        yield lambda: sys.stdin.read(1)
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+def _next_character() -> str:
+    """Returns the next character of the input; line breaks are left out, and "" is its end."""
+    while (key := sys.stdin.read(1)) in ("\n", "\r"):
+        pass
+    return key
