@@ -218,7 +218,7 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
 def _is_noun_or_infinitive(words: Sequence[str], place: int) -> bool:
     """Returns whether a verb's form is none: "make a left turn at the corner", "let this one go by"."""
     noun = words[place] == "turn" and words[place - 1] in ("left", "right", "u")
-    return noun or (words[place] in _PASSING and place > 2 and words[place - 3] in _LETTING)
+    return noun or (words[place] in _PASSING and not _LETTING.isdisjoint(words[max(place - 5, 0) : place]))
 
 
 def _has_subject(words: Sequence[str], place: int) -> bool:

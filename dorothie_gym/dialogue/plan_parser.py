@@ -305,6 +305,10 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         if item.kind == "cancel" and self.frame is not None and not self.fresh and self.frame.action is None:
             self.frame.verb = ""  # "let's skip the KFC"
         self.negation, self.ceasing = item.kind, self.ceasing or item.kind == "cease"
+        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
+        told = last is not None and last.action is StepAction.TURN and last.mood is ClauseMood.STATEMENT
+        if item.kind == "cancel" and told and last is not None:
+            self.refused = Refusal(last.direction, last.ordinal)  # "there's a left coming up, skip that"
 
     def _verb(self, item: VerbItem) -> None:
         said = self.frame is not None and not self.fresh and self.frame.action is StepAction.VISIT

@@ -80,7 +80,7 @@ class PlaceReader(PlanState):
             return  # "just past the KFC, that's where you stop"
         if place is None:
             if item.place is not None and item.place.ordinal is not None:
-                self._counted(item.relation, item.place.ordinal)
+                self._counted(item.relation, self._number_of(item.place, item.place.ordinal))
             return
         if self._excludes(place):
             return
@@ -112,6 +112,11 @@ class PlaceReader(PlanState):
         place = item.place.reference
         there = place is not None and place.reference is Anaphor.THERE and self.last_place is not None
         return self.last_place if there else place
+
+    def _number_of(self, opportunity: NounPhrase, ordinal: int) -> int:
+        """Returns the number of an opportunity, which may be counted from a refused one: "left at the one after"."""
+        refused = self.refused if opportunity.follows else None
+        return ordinal if refused is None else (refused.ordinal or 1) + 1
 
     def _counted_alike(self, ordinal: int | None) -> PlaceReference | None:
         """Returns the object named last with another number: "straight at the first lights, left at the second"."""
@@ -440,9 +445,10 @@ class PlaceReader(PlanState):
         if last is None or not self.fresh or self.joint != "," or item.blocks or self.negation is not None:
             return False
         apart = last.action is StepAction.TURN and last.direction is not None and last.ordinal is None
-        if not apart or last.at is not None or last.distance is not None or last.negated or self.repairing:
+        somewhere = last.at is not None and last.at.reference not in (Anaphor.HERE, Anaphor.THERE)
+        if not apart or somewhere or last.distance is not None or last.negated or self.repairing:
             return False
-        last.ordinal = item.ordinal
+        last.ordinal, last.at = item.ordinal, None
         return True
 
     def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
