@@ -249,13 +249,13 @@ class PlanJudge:
         if not stands:
             return "no stop within the time"
         moment, place = stands[0], None if step.condition is None else step.condition.place
-        self.at = moment.time
+        begun, self.at = self.at, moment.time
         said = " ".join(one.text.lower() for one in replies(self.log, self.log.told + REPLY_WITHIN))
         if step.side is not None and str(step.side) == "left" and "left" not in said:
             return "the side was not taken up"
         if place is None or place.reference is not None:
-            late = moment.time - max(self.log.told, 0.0) > PROMPTLY
-            return f"stopped {moment.time - self.log.told:.0f} s later" if late else None
+            since = max(self.log.told, begun, 0.0)
+            return f"stopped {moment.time - since:.0f} s later" if moment.time - since > PROMPTLY else None
         relation = ConditionRelation.AT if step.condition is None else step.condition.relation
         if place.landmark is not None:
             x, y = self.landmarks[place.landmark]

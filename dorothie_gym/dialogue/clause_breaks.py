@@ -63,6 +63,8 @@ _DIRECTING: Final = frozenset(
 _YES_AND_NO: Final = frozenset({"yes", "yeah", "yep", "yup", "aye", "no", "nope", "nah", "naw"})
 _ALSO_PREPOSITIONS: Final = frozenset({"after", "before", "since", "until", "till", "as"})
 _POSSESSIVE: Final = frozenset({"my", "our", "his", "her", "their"})
+_POINTING: Final = frozenset({"this", "that", "these", "those"})
+_BEING: Final = (["is"], ["isn't"], ["are"], ["was"], ["has"])
 _PREDICATES: Final = frozenset(
     {
         "a",
@@ -96,6 +98,12 @@ _BEFORE_ORDERS: Final = {
     "so": ("order", "question"),
 }
 """Words in front of an order that belong to it, with the kinds of starts behind them."""
+
+_BEHIND_TURNS: Final = (["at"], ["on"], ["onto"], ["into"], ["after"], ["past"], ["before"], ["here"], ["there"])
+"""Words behind a direction that orders a turn: "no right at the bridge"."""
+
+_LETTING: Final = frozenset({"let", "letting"})
+_PASSING: Final = frozenset({"go", "pass", "cross"})
 
 _REQUESTING: Final = frozenset({"would", "could", "can", "will", "won't"})
 
@@ -172,7 +180,7 @@ def _behind_answer(words: Sequence[str], begin: int) -> int:
 def _may_begin_clause(word: str) -> bool:
     """Returns whether a clause that follows no answer may begin with a word."""
     starts = _breaks().starts.may_begin(word) or _breaks().tags.may_begin(word)
-    return starts or word in _POSSESSIVE or word in _BEFORE_ORDERS
+    return starts or word in _POSSESSIVE or word in _POINTING or word in _BEFORE_ORDERS
 
 
 def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
@@ -188,7 +196,7 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
         found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
         found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None
-    if found is None and not _ends_in_tag(words, place):
+    if (found is None and not _ends_in_tag(words, place)) or _is_noun_or_infinitive(words, place):
         return False
     before = words[place - 1]
     joined = before in breaks.joining and (found is None or before not in _ENDS.get(found.kind, ()))
@@ -207,8 +215,16 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     return not (words[place] in _PERSONAL and before in breaks.antecedents)
 
 
+def _is_noun_or_infinitive(words: Sequence[str], place: int) -> bool:
+    """Returns whether a verb's form is none: "make a left turn at the corner", "let this one go by"."""
+    noun = words[place] == "turn" and words[place - 1] in ("left", "right", "u")
+    return noun or (words[place] in _PASSING and not _LETTING.isdisjoint(words[max(place - 5, 0) : place]))
+
+
 def _has_subject(words: Sequence[str], place: int) -> bool:
     """Returns whether somebody or something of the speaker's does something: "my mum's waiting"."""
+    if words[place] in _POINTING and words[place + 2 : place + 3] in _BEING:
+        return True  # "this truck is crawling"
     if words[place] not in _POSSESSIVE:
         return False
     noun, verb = words[place + 1 : place + 2], words[place + 2 : place + 3]
@@ -259,5 +275,5 @@ def _answered(words: Sequence[str], begin: int, place: int) -> bool:
     known = breaks.phrases.longest(words, begin)
     if known is not None and known.length > place - begin:
         return False
-    found = breaks.starts.longest(words, place)
-    return found is not None
+    turns = words[place] in ("left", "right") and words[place + 1 : place + 2] in _BEHIND_TURNS
+    return turns or breaks.starts.longest(words, place) is not None

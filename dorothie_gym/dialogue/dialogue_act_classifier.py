@@ -263,10 +263,10 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
     values = set(parsed.values)
     if move is DialogueMove.CONFUSE:
         values -= set(_ASKED_FOR)  # "what was that?" asks for a repetition, not for an object
-    if parsed.denied and move is DialogueMove.INSTRUCT:
-        if parsed.parse is not None and parsed.parse.forbidding:
-            values.discard(ActionValue.LANE_FOLLOW)  # "don't turn" names a turn
-        elif {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
+    if parsed.parse is not None and parsed.parse.forbidding and move is DialogueMove.INSTRUCT:
+        values.discard(ActionValue.LANE_FOLLOW)  # "no lane changing" names a lane change
+    elif parsed.denied and move is DialogueMove.INSTRUCT:
+        if {value for value in values if isinstance(value, ActionValue)} - set(parsed.denied):
             values -= set(parsed.denied)  # "don't turn, keep going"
     implied = parsed.parse is not None and StepAction.STOP in parsed.parse.implied
     if move is DialogueMove.CLARIFY and not parsed.actions and _OTHER_SIDE.search(parsed.masked):

@@ -32,8 +32,12 @@ _ENDS = frozenset(
 _TAKING = frozenset({
     "take", "taking", "make", "want", "need", "grab", "do", "get", "catch", "miss", "hang", "use",
     "whip", "swing", "cut", "bring", "pull", "hook", "chuck", "steer", "turn", "throw", "bang", "spin",
+    "not", "skip", "ignore",
 })  # fmt: skip
-"""Verbs behind which "this right" is a turn."""
+"""Words behind which "this right" is a turn."""
+
+_BESIDE = frozenset({"by", "beside", "opposite", "outside"})
+"""Words in front of which "right" may be "exactly", where a side has been told."""
 
 _SIDED = frozenset({"lane", "hand", "turning", "side", "kerb", "curb"})
 """Words behind "right" that make it a direction wherever it stands: "to that right lane"."""
@@ -108,6 +112,9 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
             taken = (
                 before in ("this", "that", "it", "her") and words[place - 2 : place - 1] and words[place - 2] in _TAKING
             )
+            if before == "," and after in _BESIDE and not _LISTED.isdisjoint(words[:place]):
+                masked[place] = "#ok"  # "stop on the left, right by the KFC"
+                continue
             direct = listed or (taken and after not in lists.right_never_before | lists.right_not_before)
             masked[place] = "right" if direct else _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):

@@ -16,7 +16,7 @@ from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_reading import read_plan
-from dorothie_gym.dialogue.reactions import DENIALS, corrects, insists, short_answer
+from dorothie_gym.dialogue.reactions import corrects, denials, insists, short_answer
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import is_mere_sign
@@ -410,4 +410,4 @@ def _is_unfinished(segment: str, following: str, after: DialogueMove | None) -> 
         return True
     reacts = after in _NEWS or (after is None and split_words(following)[:1] == ["not"])
     denial = reacts and formula_move(words) is DialogueMove.REPLY_N
-    return denial and bool(rest.plan.steps or not DENIALS.isdisjoint(split_words(following)))
+    return denial and bool(rest.plan.steps or not denials().isdisjoint(split_words(following)))

@@ -77,6 +77,12 @@ _ONCE_DONE: Final = re.compile(
 )
 """Condition of the errand that comes next."""
 
+_ALREADY: Final = re.compile(
+    r"\b(?:did|done|been|visited|finished|seen to|stopped at)\b(?: \w+){0,4} already\b"
+    r"|\balready (?:did|done|been|went|visited|stopped|finished)\b"
+)
+"""Words of an errand that is done: "we did the Shell already"."""
+
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
     r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!\ba )\bleft(?= now| to do| then|$)"
@@ -125,6 +131,8 @@ def _with_status(
 ) -> list[SlotValue]:
     """Returns the values with the status of the errands that they name, and without that of others."""
     landmarks = any(isinstance(value, LandmarkName) for value in found)
+    if landmarks and _ALREADY.search(spoken) and not {GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(found):
+        found = [GoalStatus.COMPLETE, *found]
     if parse.cancelled and _TICKED.search(spoken):
         found = [GoalStatus.COMPLETE, *(value for value in found if value is not GoalStatus.ABANDONED)]
     if _REMINDED.search(spoken):

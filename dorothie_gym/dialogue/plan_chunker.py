@@ -15,6 +15,7 @@ from dorothie_gym.dialogue.plan_items import (
     BoundaryItem,
     ConditionItem,
     ContingencyItem,
+    DistanceItem,
     Item,
     NegationItem,
     NounPhrase,
@@ -95,6 +96,10 @@ _LEAVING: Final = frozenset({*_WORDY, "until", "till", "til"})
 """First words of a relation to an object that leaves: "wait until that truck's gone"."""
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
+_INFINITIVES: Final = frozenset(
+    {"take", "make", "get", "go", "drive", "do", "have", "keep", "be", "swing", "pull", "head", "move"}
+)
+_FURTHER: Final = frozenset({"further", "farther", "on", "along", "ahead"})
 _JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
 
 
@@ -202,10 +207,40 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
                 return end
-            if self.word_at(end) == "u" or (is_participle(self.word_at(end)) and self._acts(end)):
+            if self.word_at(end) == "u" or self._does(end):
                 self.items.append(NegationItem("forbid"))  # "no U-turns", "no stopping"
                 return end
+        if self._ceases(match, place):
+            self.items.append(NegationItem("cease"))  # "stop braking"
+            return end
+        if self._is_adverb(match, place):
+            return end
         return place if self._is_part(match, place) else self._item(match, place)
+
+    def _does(self, place: int) -> bool:
+        """Returns whether a doing stands at a place: "stopping", "lane changing"."""
+        match = self.grammar.terminals.longest(self.words, place)
+        if match is None or match.group not in ("actions", "verbs"):
+            return False
+        return any(is_participle(word) for word in self.words[place : place + match.length])
+
+    def _ceases(self, match: Match, place: int) -> bool:
+        """Returns whether "stop" ends a doing, rather than the drive: "stop braking so hard"."""
+        if match.kind != "stop" or self.words[place : place + match.length] != ["stop"]:
+            return False
+        following = self.grammar.terminals.longest(self.words, place + 1)
+        relates = following is not None and following.group == "relations"
+        return is_participle(self.word_at(place + 1)) and not relates
+
+    def _is_adverb(self, match: Match, place: int) -> bool:
+        """Returns whether a phrase adds nothing: the "to" of "to take a left", "further on" behind a distance."""
+        end = place + match.length
+        following = self.grammar.terminals.longest(self.words, end)
+        acting = following is not None and following.group in ("actions", "verbs")
+        if match.kind == "visit" and self.words[place:end] == ["to"]:
+            return following is not None and following.group == "verbs" and self.words[end] in _INFINITIVES
+        last = self.items[-1] if self.items else None
+        return acting and isinstance(last, DistanceItem) and self.words[place] in _FURTHER
 
     def _acts(self, place: int) -> bool:
         """Returns whether an action stands at a place."""

@@ -23,6 +23,9 @@ _TURN_NOUNS: Final = frozenset({"turn", "turning", "one", "street", "road", "exi
 _BEING: Final = frozenset({"is", "are", "be", "over", "up"})
 """Words behind which a side is stated: "the house is on the left"."""
 
+_OVER: Final = frozenset({"over", "across"})
+_ENDS: Final = frozenset({"", ",", "?", "and", "then", "please", "now", "when", "if", "before", "a"})
+"""Words behind "over to the left" of a change of lane."""
 _LANES: Final = frozenset({"lane", "lanes"})
 _OF_LANES: Final = frozenset({"lane", "lanes", "file"})
 _JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
@@ -90,6 +93,8 @@ class DirectionReader(TokenReader):
             return None
         several = self.word_at(place) in ("lefts", "rights")
         place += 1
+        if ordinal is None and self.word_at(place) == "after" and self.word_at(place + 1) in ("next", "this"):
+            ordinal, place = 2, place + 2  # "the left after next"
         place = self._behind_repetition(place)
         hand = self.word_at(place) in ("hand", "handed")
         place += hand
@@ -112,6 +117,10 @@ class DirectionReader(TokenReader):
             return place + 2
         if self.word_at(begin - 1) == "of" and self.word_at(begin - 2) == "out" and self.word_at(place) in _LANES:
             return place + 1  # "out of the right lane"
+        over = self.word_at(begin - 1) == "to" and self.word_at(begin - 2) in _OVER and self.word_at(place) in _ENDS
+        if over and isinstance(self.items[-1] if self.items else None, ActionItem):
+            self.items.append(LaneItem(found.direction))  # "go over to the left"
+            return place
         changed = found.preposition == "to" and self.word_at(begin - 1) in _CHANGING
         if changed or self.word_at(place) in _OF_LANES or self.word_at(begin - 1) in _LANES:
             self.items.append(LaneItem(found.direction))

@@ -65,6 +65,8 @@ def named_actions(actions: Sequence[ActionValue], parse: PlanParse) -> tuple[Act
         found.add(ActionValue.LANE_FOLLOW)  # "take Murfin as far as the bridge"
     if StepAction.LANE in steps and StepAction.TURN not in steps and not parse.denied:
         found.discard(ActionValue.J_TURN)  # "the right, the right lane"
+    if parse.ceasing and StepAction.STOP not in {*steps, *parse.denied}:
+        found.discard(ActionValue.STOP)  # "stop turning left"
     found |= read
     named = [value for value in actions if value in found]
     return (*named, *sorted(found.difference(named), key=_ORDER.__getitem__))

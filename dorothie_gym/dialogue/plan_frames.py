@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood, is_participle
 from dorothie_gym.dialogue.realization_context import Direction
@@ -29,10 +29,16 @@ NEEDING_PLACE: Final = frozenset({StepAction.FOLLOW, StepAction.VISIT, StepActio
 TURNING: Final = frozenset({StepAction.TURN, StepAction.LANE, StepAction.U_TURN})
 """Actions with a direction."""
 
-NEGATING: Final = frozenset({"forbid", "not", "instead"})
+NEGATING: Final = frozenset({"forbid", "cease", "not", "instead"})
 """Kinds of negations of the grammar that negate the next step."""
 
-PASSING: Final = frozenset({"pass", "ignore", "skip"})
+FORBIDDING: Final = frozenset({"forbid", "cease"})
+"""Kinds of negations that forbid it."""
+
+REFUSING: Final = frozenset({*NEGATING, "cancel"})
+"""Kinds of negations behind which an opportunity to turn is one that is not meant."""
+
+PASSING: Final = frozenset({"pass", "ignore", "skip", "let"})
 """Words of actions by which turns are left alone."""
 
 _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP, StepAction.STRAIGHT})
@@ -123,6 +129,13 @@ class Frame:
             return None
 
 
+class Refusal(NamedTuple):
+    """Opportunity that is refused, by its direction and number; None where the words tell none."""
+
+    direction: Direction | None
+    ordinal: int | None
+
+
 class PlanState:
     """State of the parser: finished steps, the step under construction, and what waits for one."""
 
@@ -142,9 +155,11 @@ class PlanState:
         self.cancelled: set[LandmarkName] = set()
         self.denied: set[StepAction] = set()
         self.forbidding = False
+        self.ceasing = False  # whether a "stop" ends a doing: "stop braking"
         self.contingent = False  # whether the rest of the sentence depends on a condition of the world
         self.conditional = False  # whether there has been such a condition
         self.counting = False  # whether the last item is an opportunity to turn
+        self.refused: Refusal | None = None  # opportunity that is not meant: "not this left, the one after"
         self.preceded = False  # whether other errands come before the next one: "before we go to the KFC"
 
     def close(self) -> None:
@@ -190,7 +205,7 @@ class PlanState:
         frame = Frame(action=action, mood=self.mood, negated=self.negation in NEGATING, joint=self.joint)
         self.joint = ""
         waiting, self.pending = self.pending, Frame()
-        frame.forbidden, frame.contingent = self.negation == "forbid", self.contingent
+        frame.forbidden, frame.contingent = self.negation in FORBIDDING, self.contingent
         if action is StepAction.TURN and self.negation == "cancel":  # "skip the next left"
             frame.negated = frame.forbidden = True
         elif self.negation == "cancel" and action in (StepAction.U_TURN, StepAction.LANE, StepAction.STOP):
@@ -234,6 +249,28 @@ class PlanState:
                 self.frame, self.fresh, self.repaired = None, True, True
                 return
 
+    def drop_refused(self) -> None:
+        """Takes back the step that refuses an opportunity, as the one that is meant has been named."""
+        self.refused = None
+        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
+        if last is None:
+            return
+        passed = last.action is StepAction.STRAIGHT and last.word in PASSING
+        if passed or (last.action is StepAction.TURN and last.negated):
+            last.action = None
+            self.close()
+
+    def follow_refused(self) -> bool:
+        """Orders the opportunity behind one that is refused: "not this left, the one after"; returns whether one is."""
+        refused = self.refused
+        if refused is None or self.negation in REFUSING:
+            return False
+        self.drop_refused()
+        current = self.frame if self.frame is not None and self.frame.action is None else None
+        frame = self.open_step(StepAction.TURN) if current is None or self.fresh else current
+        frame.action, frame.direction, frame.ordinal = StepAction.TURN, refused.direction, (refused.ordinal or 1) + 1
+        return True
+
     def defer_last(self) -> None:
         """Puts the errand named last behind the others; without errands, the step named last."""
         acting = [frame for frame in self.frames if frame.action is not None]
@@ -253,12 +290,20 @@ class PlanState:
             frame.deferred = True
         last.mood, last.deferred = errands[0].mood, False
 
+    def drop_denied_name(self) -> None:
+        """Drops a street that is only named to be corrected: "not Hayward, Hubbard"."""
+        for before, frame in itertools.pairwise(self.frames):
+            names = before.action is StepAction.FOLLOW and before.negated and not before.forbidden and not before.word
+            if names and not before.verb and frame.action is StepAction.FOLLOW and frame.bare:
+                before.action = None
+
     def drop_repeated(self) -> None:
         """Drops turns that are only said again, and an errand to the place of another step: "left there, go there"."""
         turns = [frame for frame in self.frames if frame.action is not None and frame.mood is not ClauseMood.STATEMENT]
         for before, frame in itertools.pairwise(turns):
             same = frame.action is StepAction.TURN and before.action is StepAction.TURN and not before.negated
-            if same and frame.joint == "," and _says_again(before, frame):
+            counted = same and frame.joint in ("", ",") and frame.ordinal is not None and _counts_same(before, frame)
+            if counted or (same and frame.joint == "," and _says_again(before, frame)):
                 frame.relation, frame.at = frame.relation or before.relation, frame.at or before.at
                 frame.ordinal, frame.distance = frame.ordinal or before.ordinal, frame.distance or before.distance
                 before.action = None
@@ -362,6 +407,12 @@ def _says_again(before: Frame, frame: Frame) -> bool:
     return all(old is None or new is None or old == new for old, new in pairs) and all(old is None for old, _ in pairs)
 
 
+def _counts_same(before: Frame, frame: Frame) -> bool:
+    """Returns whether two turns are the same counted one: "second right, I think it is, yes, second right"."""
+    same = (before.direction, before.ordinal) == (frame.direction, frame.ordinal)
+    return same and (before.at is None or frame.at is None or before.at == frame.at)
+
+
 def _other_errand(frame: Frame) -> PlanStep | None:
     """Returns the errand that comes before or after another one: "after the KFC we do the Shell"."""
     ordering = frame.relation in (ConditionRelation.AFTER, ConditionRelation.BEFORE)
@@ -391,6 +442,12 @@ def append_step(steps: list[PlanStep], step: PlanStep, *, named: bool = False) -
     if steps and (steps[-1].action, step.action) == (StepAction.WAIT, StepAction.STOP) and steps[-1] == _PLAIN_WAIT:
         steps[-1] = step  # "hold it, stop"
         return
+    if steps and step.action is StepAction.STOP and _ends_at(steps[-1], step):
+        steps[-1] = step  # "go on to the wall and stop there"
+        return
+    if steps and {steps[-1].action, step.action} == {StepAction.LIGHTS} and steps[-1].condition == step.condition:
+        steps[-1] = steps[-1] if not named else step  # "it's dark to be driving without lights"
+        return
     if steps and not named and _is_side_of_lane(steps[-1], step):
         steps[-1] = step if step.action is StepAction.LANE else steps[-1]
         return
@@ -400,6 +457,15 @@ def append_step(steps: list[PlanStep], step: PlanStep, *, named: bool = False) -
             steps[-1] = step if len(new) > len(old) else steps[-1]
             return
     steps.append(step)
+
+
+def _ends_at(stretch: PlanStep, stop: PlanStep) -> bool:
+    """Returns whether a stretch straight on only leads to the place of a stop."""
+    ends, at = stretch.condition, stop.condition
+    if stretch.action is not StepAction.STRAIGHT or stretch.ordinal is not None or stretch.distance is not None:
+        return False
+    until = ends is not None and ends.relation is ConditionRelation.UNTIL
+    return until and ends is not None and at is not None and at == dataclasses.replace(ends, relation=at.relation)
 
 
 def _fields(step: PlanStep) -> dict[str, object]:

@@ -58,11 +58,17 @@ class ConditionItem(NamedTuple):
 
 
 class NounPhrase(NamedTuple):
-    """Place, or an opportunity to turn ("the second street") if it names nothing else; or a number of blocks."""
+    """Place, or an opportunity to turn ("the second street") if it names nothing else; or a number of blocks.
+
+    `follows` says whether an opportunity is counted from the one spoken of before: "the one after that"; `elliptical`
+    whether a number stands without its noun: "the second".
+    """
 
     reference: PlaceReference | None
     ordinal: int | None
     blocks: bool = False
+    follows: bool = False
+    elliptical: bool = False
 
 
 class DistanceItem(NamedTuple):

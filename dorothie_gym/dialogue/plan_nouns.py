@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 _ONE: Final = frozenset({"a", "one", "another"})
 _POSTPOSITIONS: Final = frozenset({"on", "in", "off", "along", "over", "at"})
+_SPOKEN_OF: Final = frozenset({"it", "that", "this", "next"})
+_NOTHING: Final = frozenset({"", ",", "?", "and", "then", "on", "please"})
+"""What may stand behind "the one after" of an opportunity that has been spoken of."""
+
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
 
@@ -51,7 +55,8 @@ class NounReader(TokenReader):
                 else ("on",)
             )
             if self.word_at(place) in ends:
-                return NounPhrase(None, ordinal), place  # "not the first, the second"
+                follows = self.word_at(place - 1) in ("next", "following")
+                return NounPhrase(None, ordinal, follows=follows, elliptical=True), place  # "not the first, the second"
         return (found, behind) if found is not None else (None, start)
 
     def _counts(self, place: int, behind: int) -> bool:
@@ -87,7 +92,7 @@ class NounReader(TokenReader):
         if self.word_at(place + 1) == "block" and self.word_at(place) in _ONE:
             return NounPhrase(None, 1, blocks=True), place + 2
         match = self.grammar.opportunities.longest(self.words, place) if place < len(self.words) else None
-        if match is None:
+        if match is None or (self.words[place] == "one" and self.word_at(place + 1) in self.grammar.metres):
             return None, place
         end = place + match.length
         if self.word_at(end) == "of" and self.words[place].startswith("corner"):
@@ -96,12 +101,15 @@ class NounReader(TokenReader):
             if isinstance(street, StreetName):
                 return NounPhrase(PlaceReference(street=street), None), end + 1
             return None, place
-        if self.word_at(end) == "after" and self.word_at(end + 1) in ("it", "that", "next"):
-            return NounPhrase(None, 2 if self.word_at(end + 1) == "next" else 1), end + 2
+        if self.word_at(end) == "after" and self.word_at(end + 1) in _SPOKEN_OF:
+            return NounPhrase(None, 2 if self.word_at(end + 1) == "next" else 1, follows=True), end + 2
+        if self.word_at(end) == "after" and self.word_at(end + 1) in _NOTHING:
+            return NounPhrase(None, 1, follows=True), end + 1
+        follows = self.word_at(place - 1) in ("next", "following")
         blocks = self.words[place] in ("block", "blocks")
         if blocks and ordinal is None and self.word_at(place - 1) in _ONE:
             ordinal = 1
-        return NounPhrase(None, ordinal, blocks), end
+        return NounPhrase(None, ordinal, blocks, follows=follows and not blocks), end
 
     def _named(
         self, place: int, value: LandmarkName | StreetName | ObjectClass, ordinal: int | None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, append_step
+from dorothie_gym.dialogue.plan_frames import FORBIDDING, NEEDING_PLACE, NEGATING, PASSING, Frame, Refusal, append_step
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
     BoundaryItem,
@@ -29,6 +29,7 @@ from dorothie_gym.dialogue.plan_items import (
 from dorothie_gym.dialogue.plan_places import FETCHING, PlaceReader
 from dorothie_gym.dialogue.plan_speeds import SpeedReader
 from dorothie_gym.dialogue.plan_turns import TurnReader
+from dorothie_gym.dialogue.plan_waits import WaitReader
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import (
     MAX_STEPS,
@@ -73,6 +74,7 @@ class PlanParse:
         conditional: whether there is a condition of the world.
         bare: whether the steps of the plan are names without a verb.
         turned: whether left and right, if there are any, name turns, rather than lanes and sides only.
+        ceasing: whether a "stop" is no stop of the car, but the end of a doing: "stop braking".
         forbidding: whether the words only forbid something: "don't turn here", whose plan is to go on.
     """
 
@@ -86,6 +88,7 @@ class PlanParse:
     person: bool = False
     implied: frozenset[StepAction] = frozenset()
     forbidding: bool = False
+    ceasing: bool = False
     contingent: tuple[PlanStep, ...] = ()
     conditional: bool = False
     cancelled: bool = False
@@ -137,7 +140,7 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(TurnReader, PlaceReader, SpeedReader):
+class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:
@@ -181,7 +184,9 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         described: list[PlanStep] = []
         ordered: list[PlanStep] = []
         contingent: list[PlanStep] = []
-        self._drop_interjection()
+        self.drop_interjection()
+        self.start_ahead()
+        self.drop_denied_name()
         self.drop_repeated()
         self.inherit_directions()
         for frame in sorted(self.frames, key=lambda frame: frame.deferred):
@@ -204,27 +209,11 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
             waiting=waiting,
             person=self.person,
             forbidding=self.forbidding,
+            ceasing=self.ceasing,
             turned=self.turned or not self.sided,
             bare=all(frame.bare for frame in self.frames if frame.action is not None and frame.mood in ORDERED),
             implied=frozenset(frame.action for frame in self.frames if frame.implied and frame.action is not None),
         )
-
-    def _drop_interjection(self) -> None:
-        """Takes back a "wait" that only opens what is asked or ordered: "hang on, can you see the bridge?"."""
-        acting = [frame for frame in self.frames if frame.action is not None]
-        waits = [frame for frame in acting if frame.action is StepAction.WAIT and frame.ends and frame.at is None]
-        if self.repaired and len(acting) > len(waits):
-            for frame in waits:
-                frame.action = None  # "to the KFC, hang on, make that the Ikea"
-        first = self.frames[0] if self.frames else None
-        if first is None or first.action is not StepAction.WAIT or first.at is not None or not first.ends:
-            return
-        if (
-            self.repaired
-            or ClauseMood.QUESTION in self.moods
-            or any(frame.action is not None for frame in self.frames[1:])
-        ):
-            first.action = None
 
     def _leftovers(self) -> None:
         """Makes a step of what waits for one: "the second", "on the right-hand side, please"."""
@@ -300,6 +289,13 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         self._clause(item.place, new=False)
 
     def _repair(self, item: RepairItem) -> None:
+        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
+        said = self.clauses.words[max(item.place - 2, 0) : item.place]
+        if last is not None and last.action is StepAction.TURN and last.mood is ClauseMood.STATEMENT:
+            if said and said[0] in PASSING:  # "there's a right coming up, ignore that"
+                self.refused = Refusal(last.direction, last.ordinal)
+                self._boundary(BoundaryItem("and", item.place))
+                return
         self.correcting = True
         if any(frame.action is not None for frame in self.frames):
             self.repairing = True
@@ -308,7 +304,11 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
     def _negate(self, item: NegationItem) -> None:
         if item.kind == "cancel" and self.frame is not None and not self.fresh and self.frame.action is None:
             self.frame.verb = ""  # "let's skip the KFC"
-        self.negation = item.kind
+        self.negation, self.ceasing = item.kind, self.ceasing or item.kind == "cease"
+        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
+        told = last is not None and last.action is StepAction.TURN and last.mood is ClauseMood.STATEMENT
+        if item.kind == "cancel" and told and last is not None:
+            self.refused = Refusal(last.direction, last.ordinal)  # "there's a left coming up, skip that"
 
     def _verb(self, item: VerbItem) -> None:
         said = self.frame is not None and not self.fresh and self.frame.action is StepAction.VISIT
@@ -367,12 +367,14 @@ class _Builder(TurnReader, PlaceReader, SpeedReader):
         frame.action, frame.word, frame.last = action, self.clauses.words[item.place], self.clauses.words[item.end - 1]
         self.open_action(frame)
         said = self.clauses.words[item.place : item.end]
+        if action is StepAction.STRAIGHT and said[0] in PASSING and len(said) > 1:
+            self.refused = Refusal(None, None)  # "ignore this turn"
         here = not _HERE.isdisjoint(said) or said[0] in ("this", "this'll")
         stays = action is StepAction.STOP or (action is StepAction.WAIT and "here" in said)
         if stays and frame.at is None and here:
             frame.relation, frame.at = ConditionRelation.AT, PlaceReference(reference=Anaphor.HERE)
         if self.negation in NEGATING:
-            frame.negated, frame.forbidden = True, self.negation == "forbid"
+            frame.negated, frame.forbidden = True, self.negation in FORBIDDING
         frame.change = _CHANGES.get(item.kind, frame.change)
         if action is StepAction.SPEED and said[-1] in _IT and frame.speed is None:
             frame.speed = self.last_speed

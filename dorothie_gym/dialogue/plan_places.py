@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, Frame, PlanState, with_details
+from dorothie_gym.dialogue.plan_frames import (
+    NEEDING_PLACE,
+    NEGATING,
+    PASSING,
+    REFUSING,
+    Frame,
+    PlanState,
+    Refusal,
+    with_details,
+)
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 
@@ -64,15 +74,13 @@ class PlaceReader(PlanState):
 
     def read_condition(self, item: ConditionItem) -> None:
         """Reads a condition, for the current step or for the next one."""
-        place = item.place.reference if item.place is not None else self.last_place
-        if place is not None and place.reference is Anaphor.THERE and self.last_place is not None:
-            place = self.last_place
+        place = self._place_of(item)
         known = self.pending.at is not None and item.relation is ConditionRelation.AT
         if item.place is None and (self._is_about(place) or known):
             return  # "just past the KFC, that's where you stop"
         if place is None:
             if item.place is not None and item.place.ordinal is not None:
-                self._counted(item.relation, item.place.ordinal)
+                self._counted(item.relation, self._number_of(item.place, item.place.ordinal))
             return
         if self._excludes(place):
             return
@@ -94,6 +102,27 @@ class PlaceReader(PlanState):
             self.stop_between()
             self._pass_between(item.relation)
             self.pending.relation, self.pending.at = item.relation, place
+
+    def _place_of(self, item: ConditionItem) -> PlaceReference | None:
+        """Returns the place of a condition; that named last for "it", "there" or "the second"."""
+        if item.place is None:
+            return self.last_place
+        if item.place.elliptical:
+            return self._counted_alike(item.place.ordinal)
+        place = item.place.reference
+        there = place is not None and place.reference is Anaphor.THERE and self.last_place is not None
+        return self.last_place if there else place
+
+    def _number_of(self, opportunity: NounPhrase, ordinal: int) -> int:
+        """Returns the number of an opportunity, which may be counted from a refused one: "left at the one after"."""
+        refused = self.refused if opportunity.follows else None
+        return ordinal if refused is None else (refused.ordinal or 1) + 1
+
+    def _counted_alike(self, ordinal: int | None) -> PlaceReference | None:
+        """Returns the object named last with another number: "straight at the first lights, left at the second"."""
+        last = self.last_place
+        alike = last is not None and last.object is not None and last.ordinal is not None
+        return dataclasses.replace(last, ordinal=ordinal) if alike and last is not None else None
 
     def _is_about(self, place: PlaceReference | None) -> bool:
         """Makes the place of the next step of one that has been named for it: "the KFC is where you turn right"."""
@@ -215,11 +244,14 @@ class PlaceReader(PlanState):
         """Reads a place or an opportunity that no relation introduces."""
         place = item.reference
         if place is None:
-            self._opportunity(item.ordinal, blocks=item.blocks)
+            self._refuse_or_follow(item)
             return
         if place.reference is None:
             self.last_place = place
         if self._ends_stretch(place) or self._cancels(place) or (self.repairing and self._corrected(place)):
+            return
+        if place.reference is Anaphor.HERE and self.negation == "not" and self.frame is None:
+            self.refused = Refusal(None, None)  # "not here, the next one"
             return
         place = self._resolved(place)
         frame = self.frame
@@ -382,6 +414,9 @@ class PlaceReader(PlanState):
         for frame in reversed(self.frames):
             for name in ("place", "at"):
                 old = getattr(frame, name)
+                if old is not None and old == place:
+                    self.repairing = self.mood is ClauseMood.STATEMENT  # "no, Fuller is jammed, take Beal"
+                    return self.repairing
                 if old is not None and old.street is not None and _names_only_street(place):
                     place = with_details(old, street=place.street)  # "the house on Beal, no, Fuller"
                 if old is not None and (old.landmark is None) is (place.landmark is None):
@@ -389,6 +424,32 @@ class PlaceReader(PlanState):
                     self.repaired, self.frame, self.fresh = True, frame, False
                     return True
         return False
+
+    def _refuse_or_follow(self, item: NounPhrase) -> None:
+        """Reads an opportunity, which may be refused, or counted from one that has been."""
+        passing = self.frame is not None and not self.fresh and self.frame.word in PASSING
+        if item.follows and self.refused is not None:
+            self.negation = None
+        if item.follows and self.follow_refused():
+            self.counting = self.opportunity = True
+            return
+        if item.ordinal is not None and self._counts_last(item):
+            return
+        if self.negation in REFUSING or passing:
+            self.refused = Refusal(None, item.ordinal)
+        self._opportunity(item.ordinal, blocks=item.blocks)
+
+    def _counts_last(self, item: NounPhrase) -> bool:
+        """Returns whether a number behind a comma counts the turn before it: "the right turn, the first one"."""
+        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
+        if last is None or not self.fresh or self.joint != "," or item.blocks or self.negation is not None:
+            return False
+        apart = last.action is StepAction.TURN and last.direction is not None and last.ordinal is None
+        somewhere = last.at is not None and last.at.reference not in (Anaphor.HERE, Anaphor.THERE)
+        if not apart or somewhere or last.distance is not None or last.negated or self.repairing:
+            return False
+        last.ordinal, last.at = item.ordinal, None
+        return True
 
     def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
         self.counting = True

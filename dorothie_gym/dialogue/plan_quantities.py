@@ -30,7 +30,7 @@ _BEHIND_SPEED: Final = frozenset(
 """Words behind a number that is a speed."""
 _AIMING: Final = frozenset({"to", "at", "down", "of", "under", "below", "above", "over"})
 """Words in front of a speed to drive at."""
-_ROUGH: Final = frozenset({"a", "an", "another", "half", "quarter", "couple", "few", "hundred"})
+_ROUGH: Final = frozenset({"one", "a", "an", "another", "half", "quarter", "couple", "few", "hundred"})
 """First words of numbers beside cardinals."""
 _LEAST_SPEED: Final = 5
 _LENGTHS: Final = frozenset({"length", "lengths"})
@@ -112,7 +112,7 @@ class QuantityReader(TokenReader):
     def _number(self, place: int) -> tuple[float | None, int]:
         """Returns a number, "half a", "a quarter" or "a couple of hundred" among them, and the place behind it."""
         word, number, start = self.word_at(place), None, place
-        if word in ("a", "an", "another"):
+        if word in ("a", "an", "another") or (word == "one" and self.word_at(place + 1) in self.grammar.metres):
             place, word = place + 1, self.word_at(place + 1)
         if word == "three" and self.word_at(place + 1) == "quarters":
             place += 2 + (self.word_at(place + 2) == "of")

@@ -11,6 +11,7 @@ from dorothie_gym.dialogue.clause_moods import ClauseReader
 from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import find_names, known_words
 from dorothie_gym.dialogue.lexicon import split_words
+from dorothie_gym.dialogue.numerals import read_ordinal
 from dorothie_gym.dialogue.plan_chunker import read_items
 from dorothie_gym.dialogue.plan_parser import PlanParse, Sentence, parse_plan
 from dorothie_gym.dialogue.route_grammar import route_grammar
@@ -18,6 +19,7 @@ from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 
 _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
 _CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
+_HESITATIONS = frozenset({"uh", "er", "erm", "um", "hm", "hmm"})
 _PERSON = "#person"
 _SEPARABLE = frozenset({"pick", "picking"})
 _FETCHES = frozenset({"fetch", "fetching", "grab", "grabbing", "collect", "collecting", "meet"})
@@ -97,8 +99,18 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
         match = fillers.longest(words, place)
         if match is None:
             kept.append(words[place])
+        elif words[place] in _HESITATIONS and _counts_again(kept, words[place + match.length :]):
+            kept.append("sorry")
         place += 1 if match is None else match.length
     return without_asides(kept, lists) if kept else words
+
+
+def _counts_again(before: Sequence[str], behind: Sequence[str]) -> bool:
+    """Returns whether a turn is counted differently behind a hesitation: "second right, er, third right"."""
+    before = before[:-1] if before[-1:] == [","] else before
+    behind = [word for word in behind[:4] if word != ","]
+    counted = len(before) > 1 and read_ordinal(before[-2]) is not None and before[-1] in ("left", "right")
+    return counted and bool(behind) and read_ordinal(behind[0]) is not None and before[-1] in behind
 
 
 def _with_particles(words: list[str]) -> list[str]:

@@ -32,8 +32,12 @@ class SpeedReader(PlanState):
     def read_change(self, change: StepChange, item: ActionItem) -> None:
         """Reads an order to drive faster or slower."""
         before = self.clauses.words[item.place - 1] if item.place else ""
-        if self.negation in ("not", "forbid") or before in _DEGREES or self.clauses.words[item.place] == "too":
+        if self.negation in ("not", "forbid", "cease") or before in _DEGREES or self.clauses.words[item.place] == "too":
             change = _OPPOSITE[change]
+        frame = self.replaced(StepAction.SPEED)
+        if frame is not None:
+            frame.change, frame.speed = change, None  # "speed up, no, slow down"
+            return
         frame = self.frame
         if frame is not None and not self.fresh and frame.action is not None:
             if frame.action is StepAction.SPEED:

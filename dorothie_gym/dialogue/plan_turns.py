@@ -5,11 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
-from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, NEGATING, PASSING, Frame, PlanState, with_details
-from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, StepAction
+from dorothie_gym.dialogue.plan_frames import (
+    NEEDING_PLACE,
+    NEGATING,
+    PASSING,
+    REFUSING,
+    Frame,
+    PlanState,
+    Refusal,
+    with_details,
+)
+from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import LaneItem, SideItem, TurnItem
+    from dorothie_gym.dialogue.realization_context import Direction
 
 
 _DOWN: Final = frozenset({"down", "up", "along", "go", "pop", "nip", "duck", "head"})
@@ -30,6 +40,9 @@ class TurnReader(PlanState):
         """Reads a direction to turn."""
         if self._passes(item) or self._denies_side():
             return
+        item = item._replace(ordinal=self.counted_on(item.ordinal, item.direction))
+        if self.negation in REFUSING:
+            self.refused = Refusal(item.direction, item.ordinal)
         frame = self.replaced(StepAction.TURN, StepAction.LANE)
         if frame is not None:
             frame.direction = item.direction
@@ -48,6 +61,16 @@ class TurnReader(PlanState):
             frame.relation, frame.at = ConditionRelation.AT, named
         self._repeat(item)
 
+    def counted_on(self, ordinal: int | None, direction: Direction | None) -> int | None:
+        """Returns the number of "the next right" behind a refused turn: "not this one, the next right"."""
+        refused = self.refused
+        if refused is None or refused.ordinal is not None or ordinal != 1 or self.negation in REFUSING:
+            return ordinal
+        if direction is not None and refused.direction not in (None, direction):
+            return ordinal  # "not this left, the next right"
+        self.drop_refused()
+        return 2
+
     def _directs(self, item: TurnItem) -> bool:
         """Returns whether a direction belongs to a step that has been named: "turn at the KFC, that's a right"."""
         frame = self._undirected()
@@ -56,7 +79,7 @@ class TurnReader(PlanState):
         if frame is not self.frame or (frame.action is StepAction.LANE and frame.direction is None):
             frame.direction = item.direction  # "switch lanes, left"
             return True
-        if self.fresh:
+        if self.fresh and not self._counts_apart(frame, item):
             return False
         if frame.action is StepAction.TURN and frame.direction is None:
             frame.direction = item.direction
@@ -69,6 +92,11 @@ class TurnReader(PlanState):
             return False
         return self._turns(frame, item)
 
+    def _counts_apart(self, frame: Frame, item: TurnItem) -> bool:
+        """Returns whether a direction behind a comma is that of a counted turn: "take the next one, left"."""
+        counted = frame.action is StepAction.TURN and frame.direction is None and frame.ordinal is not None
+        return counted and frame.at is None and item.ordinal is None and self.joint == ","
+
     def _turns(self, frame: Frame, item: TurnItem) -> bool:
         """Returns whether a direction makes a turn, or a change of lane, of the current step."""
         if frame.action is StepAction.STRAIGHT and frame.word in _DOWN and self.counting and frame.at is None:
@@ -80,6 +108,8 @@ class TurnReader(PlanState):
         if frame.action is not None and (frame.action not in NEEDING_PLACE or frame.place is not None):
             return False
         avoided, frame.action = frame.action is StepAction.AVOID, StepAction.TURN
+        if avoided:
+            self.refused = Refusal(item.direction, item.ordinal)
         frame.direction, frame.ordinal = item.direction, item.ordinal or frame.ordinal
         frame.negated, frame.forbidden = avoided or self.negation in NEGATING, avoided or frame.forbidden
         self._repeat(item)
@@ -123,7 +153,8 @@ class TurnReader(PlanState):
         last = self.frames[-1] if self.frames else None
         if not self.correcting or last is None or last.action is not StepAction.TURN or self.repairing:
             return False
-        if last.direction is not item.direction or last.at is not None:
+        here = last.at is not None and last.at.reference is Anaphor.HERE and self.pending.at is None
+        if last.direction is not item.direction or (last.at is not None and not here):
             return False
         last.ordinal = item.ordinal or last.ordinal
         if self.pending.at is not None:

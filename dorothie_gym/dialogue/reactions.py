@@ -1,78 +1,65 @@
-"""Reactions by their words: corrections of what the other speaker has said, and answers of few words."""
+"""Reactions by their words: corrections of what the other speaker has said, short answers, and remarks in passing."""
 
 from __future__ import annotations
 
+import functools
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.dialogue.lexicon import read_data, strings, word_set
+from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.lexicon import YamlMapping
     from dorothie_gym.dialogue.nlu import ParsedText
 
-_OTHER: Final = (
-    "other side",
-    "the other side",
-    "the one after",
-    "the one before",
-    "the other one",
-    "other kerb",
-    "wrong side",
-    "after it",
-    "before it",
-    "it's the other",
-    "that's the wrong",
-    "nobody said",
-    "who said",
-    "who asked",
-    "i never",
-    "i think you mis",
-    "you misunder",
-    "you misheard",
-    "you've got the wrong",
-    "you got the wrong",
-    "you've stopped",
-    "you stopped",
-    "that was you",
-    "this isn't it",
-    "that isn't",
-    "this is not",
-    "other way",
-    "the other way ,",
-    "wrong way",
-    "not that",
-    "not this",
-    "not the",
-)
-_MEANT: Final = (
-    "i said",
-    "i meant",
-    "i mean",
-    "i asked",
-    "i wanted",
-    "i was wanting",
-    "i told you",
-    "that's not",
-    "not what i",
-    "i told",
-    " we're after",
-    " i want$",
-    " we want$",
-    " i wanted$",
-    " we need$",
-    " i'm after",
-    "i never said",
-)
-_NOT_NAMED: Final = re.compile(
-    r"#\w+ (?:, )?(?:\w+ , )?not (?:the |on |at |to )?#\w+"
-    r"|, not (?:at|on|in|before|after|past|that|this|there|here|it|them)\b"
-    r"|\b(?:left|right) (?:, )?not (?:the )?(?:left|right|#left|#ok)\b"
-)
-"""What is meant before what is not: "Bishop, not Beal"."""
-DENIALS: Final = frozenset({"no", "nah", "nope", "not", "never", "wrong"})
-"""Words that deny what has been said."""
+_FILE: Final = "reactions.yaml"
 _LONGEST_ANSWER: Final = 6
-_NEGATIVE: Final = frozenset({"no", "not", "never", "cannot", "nothing", "neither", "nor", "hardly"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Reactions:
+    """Contents of data/reactions.yaml; that file explains each list."""
+
+    corrects_first: re.Pattern[str]
+    corrects: re.Pattern[str]
+    corrects_name: re.Pattern[str]
+    insists: re.Pattern[str]
+    denials: frozenset[str]
+    negative: frozenset[str]
+    praises: re.Pattern[str]
+    in_passing: re.Pattern[str]
+
+
+@functools.cache
+def _reactions() -> _Reactions:
+    data = read_data(_FILE)
+    return _Reactions(
+        corrects_first=_pattern(data, "corrects_first"),
+        corrects=_pattern(data, "corrects"),
+        corrects_name=_pattern(data, "corrects_name"),
+        insists=_pattern(data, "insists"),
+        denials=word_set(_FILE, data, "denials"),
+        negative=word_set(_FILE, data, "negative"),
+        praises=_pattern(data, "praises"),
+        in_passing=_pattern(data, "in_passing"),
+    )
+
+
+def _pattern(data: YamlMapping, name: str) -> re.Pattern[str]:
+    """Returns the pattern that fits if one of a list does."""
+    listed = strings(f"{_FILE}: {name}", data.get(name))
+    try:
+        return re.compile("|".join(f"(?:{text})" for text in listed))
+    except re.error as error:
+        raise PhraseFileError(f"{_FILE}: {name}: {error}") from error
+
+
+def denials() -> frozenset[str]:
+    """Returns the words that deny what has been said."""
+    return _reactions().denials
 
 
 def short_answer(parsed: ParsedText) -> DialogueMove | None:
@@ -80,27 +67,34 @@ def short_answer(parsed: ParsedText) -> DialogueMove | None:
     words = [word for word in parsed.masked.split() if word != ","]
     if parsed.values or parsed.plan.steps or parsed.question or len(words) > _LONGEST_ANSWER:
         return None
-    denied = any(word in _NEGATIVE or word.endswith("n't") for word in words)
+    denied = any(word in _reactions().negative or word.endswith("n't") for word in words)
     return DialogueMove.REPLY_N if denied else DialogueMove.REPLY_Y
 
 
 def insists(parsed: ParsedText) -> bool:
     """Returns whether a span says what has been said before."""
-    return (
-        not parsed.question
-        and bool(parsed.plan.steps or parsed.values)
-        and any(phrase in parsed.masked for phrase in ("i said", "i told you", "i asked", "like i said", "as i said"))
-    )
+    named = bool(parsed.plan.steps or parsed.values)
+    return not parsed.question and named and _reactions().insists.search(parsed.masked) is not None
 
 
 def corrects(parsed: ParsedText) -> bool:
     """Returns whether a span sets right what the other speaker has announced: "no, I meant the second left"."""
     if parsed.question:
         return False
-    if any(phrase in f"{parsed.masked}$" for phrase in _MEANT) or parsed.masked.startswith(_OTHER):
+    reactions = _reactions()
+    if reactions.corrects.search(parsed.masked) or reactions.corrects_first.match(parsed.masked):
         return True
     if not (parsed.plan.steps or parsed.values) or parsed.masked.startswith(("no thanks", "no thank you")):
         return False
-    words = parsed.masked.split()
-    denied = not DENIALS.isdisjoint(words[:3]) or _NOT_NAMED.search(parsed.masked) is not None
-    return denied or any(phrase in f"{parsed.masked}$" for phrase in _MEANT)
+    denied = not reactions.denials.isdisjoint(parsed.masked.split()[:3])
+    return denied or reactions.corrects_name.search(parsed.masked) is not None
+
+
+def is_praise(text: str) -> bool:
+    """Returns whether a remark praises how the trip goes: "so far so good"."""
+    return _reactions().praises.search(text.lower()) is not None
+
+
+def is_in_passing(text: str) -> bool:
+    """Returns whether a remark about the trip needs no answer: "that took a while"."""
+    return _reactions().in_passing.search(text.lower()) is not None

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -45,12 +44,14 @@ from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, is_plain_sign, still_due
 from dorothie_gym.policies.co_wizard.places_ahead import distance_ahead
 from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts, settle_with_order, take_plan
+from dorothie_gym.policies.co_wizard.refusals import answer_in_any_case, refuse_unmet
 from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,
     check_goal,
     expects_stop,
     hear_wrong_way,
     is_garbled,
+    is_here,
     is_murmur,
     is_settled,
     is_unclear,
@@ -71,6 +72,7 @@ from dorothie_gym.policies.view_range import camera_fault
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.dialogue.propositions import Proposition
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
@@ -110,7 +112,8 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         do_stop(state, view, heard.acts[0], heard.words)
     looks = looks_heard(state, heard)
     heard = without_purposes(without_looks(heard, looks))
-    planned = planned_acts(state, heard) - looks.keys()
+    refused = refuse_unmet(state, heard)
+    planned = planned_acts(state, heard) - looks.keys() - refused
     if unclear or (_mishears(state, view, heard, rng) and not planned and not looks):
         ask_back(state, view, heard.words)
         state.say(*before)
@@ -121,6 +124,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     for number, act in enumerate(heard.acts):
         if number in looks:
             take_up_look(state, looks[number], rng)
+        if number in looks or number in refused:
             continue
         asks = act.move in _IDLE and heard.words.question and heard.words.asked is not None
         react = answer_open if asks else _REACTIONS.get(act.move)
@@ -129,6 +133,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
             react(state, view, act, heard.words_of(number) if act.slots else heard.words, rng)
     if planned:
         take_plan(state, view, heard, rng)
+    answer_in_any_case(state, heard, planned)
     remember(state, heard, rng)
     answer = in_one_breath(state.speech.queue)
     before = tuple(itertools.dropwhile(is_plain_sign, before))  # the "okay" to what was said before comes too late
@@ -301,7 +306,7 @@ def _explanation(
         approach_stop(state, view, name, ahead)
         if rng.random() > state.style.silent:
             state.say(sign_of_hearing("near"))
-    elif _is_here(state, view, words):
+    elif is_here(state, view, words):
         do_stop(state, view, act, words)
         stops = act_builders.action(ActionValue.STOP)
         state.say(intend(Function.ACCEPT, stops, wording=Wording(topic="stops_here")))
@@ -337,12 +342,6 @@ def _mentioned_place(
         ask_back(state, view, words)
     else:
         set_goal(state, view, name, act_builders.named_streets(act), rng, sure=False)
-
-
-def _is_here(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
-    """Returns whether a place that the car has not found by itself is said to be right here."""
-    here = words.told is not None and words.told.predicate is Predicate.ARRIVED and not words.told.negated
-    return here and not view.standing and not state.intentions.arrived and state.beliefs.goal is not None
 
 
 def _statement(

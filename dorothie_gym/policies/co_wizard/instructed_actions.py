@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
@@ -42,6 +43,9 @@ LIMIT_TOLERANCE = 3
 
 SPEED_RANGE = (10, 60)
 """Range of cruise speeds that the Co-Wizard accepts in a town with slow traffic [km/h]; elsewhere up to the car's."""
+
+_SETS_RIGHT: Final = re.compile(r"\b(i mean|i meant|no|wrong|instead|not (?:faster|slower))\b", re.I)
+"""Words by which a change of the speed takes the place of the opposite one."""
 
 Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]
 """Reaction to an instruction: changes the state (working copy) by the observation, the act and its words."""
@@ -113,6 +117,10 @@ def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words:
         approach_stop(state, view, None, SLOWER_DISTANCE)
         return
     asked = asked_speed(state, view, words.speed, words.faster)
+    if words.speed is None and _SETS_RIGHT.search(words.text):
+        asked = asked_speed(
+            state, view, 2 * asked - round(view.cruise), words.faster
+        )  # the other change is undone, too
     until = view.time + state.config.slow_time
     state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
     if state.town.cruise is None and asked < state.config.open_road_speed:

@@ -11,7 +11,15 @@ import numpy as np
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, PlanStep, StepAction, StepChange
+from dorothie_gym.dialogue.routes import (
+    Anaphor,
+    ConditionRelation,
+    PlaceReference,
+    PlanStep,
+    StepAction,
+    StepChange,
+    StepCondition,
+)
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, StreetName
@@ -53,6 +61,9 @@ _GO_AHEAD: Final = re.compile(r"^\W*(?:\w+\W+){0,4}?go ahead and\b", re.I)
 
 _REPAIRS: Final = re.compile(r"\b(not|no|nope|wrong|instead|sorry|meant?|rather|belay)\b", re.I)
 """Words of an utterance that corrects the one before."""
+
+_REFUSES: Final = re.compile(r"\b(ignore|skip|leave|let)\b.*\b(one|next) after\b", re.I)
+"""Words of an utterance that counts an opportunity from the one it refuses."""
 
 _DRIVING: Final = STEERING | {StepAction.LANE, StepAction.U_TURN, StepAction.STOP, StepAction.VISIT, StepAction.WAIT}
 """Steps whose order matters."""
@@ -127,7 +138,8 @@ def _is_restated(heard: HeardUtterance) -> bool:
     """Returns whether one part of an utterance takes back what another has asked for: "left. No, the second left"."""
     said = tuple(step for part in heard.parts for step in part.plan)
     steps = heard.words.plan.steps
-    return len(steps) < len(said) or (bool(said) and steps != said and _REPAIRS.search(heard.words.text) is not None)
+    refers = any(words.search(heard.words.text) is not None for words in (_REPAIRS, _REFUSES))
+    return len(steps) < len(said) or (bool(said) and steps != said and refers)
 
 
 def _is_indirect(heard: HeardUtterance, acts: Sequence[DialogueAct]) -> bool:
@@ -252,7 +264,7 @@ def _take_over(
         return
     goes_on = _GOES_ON.match(text) is not None and (bool(state.plan.steps) or state.intentions.directive is not None)
     if goes_on:
-        state.plan = state.plan.continued(steps)
+        state.plan = state.plan.continued((*_ordered_turn(state), *steps))
         _confirm(state, steps)
         return
     possible, refused = _without_lane(state, view, steps)
@@ -275,6 +287,24 @@ def _take_over(
             state.say(*limit_remark(state, view, step.speed))
     if found is not None:
         object_to(state, view, found[1], possible[found[0]], joined=bool(kept))
+
+
+def _ordered_turn(state: CoWizardState) -> tuple[PlanStep, ...]:
+    """Moves a turn that a single order asked for into an empty plan, as its first step: "second left", "then stop"."""
+    ordered = state.intentions.directive
+    if state.plan.steps or ordered is None or ordered.direction not in (Direction.LEFT, Direction.RIGHT):
+        return ()
+    street = None if ordered.street is StreetName.UNKNOWN else PlaceReference(street=ordered.street)
+    at = None if street is None else StepCondition(relation=ConditionRelation.AT, place=street)
+    state.intentions = state.intentions.directed(None)
+    return (
+        PlanStep(
+            action=StepAction.TURN,
+            direction=ordered.direction,
+            ordinal=ordered.skip + 1 if ordered.skip else None,
+            condition=at,
+        ),
+    )
 
 
 def _visit(state: CoWizardState, view: CoWizardView, step: PlanStep, rng: np.random.Generator) -> None:

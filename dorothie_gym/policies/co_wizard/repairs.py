@@ -109,6 +109,12 @@ def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) ->
     return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
 
 
+def is_here(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether a place that the car has not found by itself is said to be right here."""
+    here = words.told is not None and words.told.predicate is Predicate.ARRIVED and not words.told.negated
+    return here and not view.standing and not state.intentions.arrived and state.beliefs.goal is not None
+
+
 def is_settled(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
     """Returns whether what the participant has not understood needs no repetition.
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.dialogue.reactions import is_in_passing, is_praise
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
 
@@ -15,15 +15,6 @@ if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
     from dorothie_gym.policies.co_wizard.state import CoWizardState
 
-_PLEASED: Final = re.compile(
-    r"\b(so far so good|going (well|smoothly|great|fine)|getting on nicely|doing (great|well|fine)"
-    r"|(great|nice|good),? we)\b"
-)
-_IN_PASSING: Final = re.compile(
-    r"\b(took (a while|its time|forever)|off again|(one|stop) more (to go )?after|last (one|stop)|the right way"
-    r"|nearly there|almost there|getting close|all day|losing my patience|taking forever|wasting time"
-    r"|let me (see|check)|my (map|list))\b"
-)
 IN_SIGHT: Final = frozenset(
     {Predicate.WEATHER, Predicate.CROWDED, Predicate.SEES, Predicate.BLOCKED, Predicate.VISIBILITY, Predicate.LIGHTS_ON}
 )
@@ -40,12 +31,12 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
         words: the statement.
         rng: random generator of the decision.
     """
-    text, last = words.text.lower(), state.speech.last
+    last = state.speech.last
     if words.told is not None and last is not None and any(said.contains(words.told) for said in last.meaning):
         return True  # both have said the same
-    if _IN_PASSING.search(text) is not None:
+    if is_in_passing(words.text):
         return True
-    praises = _PLEASED.search(text) is not None
+    praises = is_praise(words.text)
     if praises and rng.random() < _ANSWERED:
         state.say(sign_of_hearing("praise"))
     return praises

@@ -1,0 +1,27 @@
+"""No request to the Co-Wizard is met by silence or a bare "no"."""
+
+import pytest
+
+from dorothie_gym.dialogue import Predicate
+from dorothie_gym.ontology import DialogueMove
+from tests.policies.co_wizard.rides import Ride
+
+
+@pytest.mark.parametrize("words", ["drive on the pavement, please", "can you run the red light?", "turn the radio up"])
+def test_a_request_that_cannot_be_met_is_answered_with_reason_and_offer(words: str) -> None:
+    ride = Ride(4)
+    ride.run(2.0)
+    ride.said.clear()
+    ride.say(words, seconds=4.0)
+    (said, *_) = ride.said
+    assert said.act.move is DialogueMove.EXPLAIN
+    assert said.meaning[0].predicate is Predicate.POSSIBLE and said.meaning[0].negated
+    assert any(word in said.text for word in ("but", "though", "if you like", "shall I", "only"))
+
+
+def test_an_order_that_is_not_understood_is_not_met_by_silence() -> None:
+    ride = Ride(4)
+    ride.say("take me to the Shell", seconds=4.0)
+    ride.said.clear()
+    ride.say("please tidy up the boot", seconds=5.0)
+    assert ride.said
