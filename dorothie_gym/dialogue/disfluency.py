@@ -23,6 +23,9 @@ _AT_FRONT = 0.5
 _LEAST_WORDS = 5
 """Minimum number of words of a sentence that a hesitation may interrupt."""
 
+TITLES = frozenset({"mr.", "mrs.", "ms.", "dr.", "señora", "senora", "aunt", "uncle", "head", "teacher", "grandpa"})
+"""Words in front of a name that no pause parts from it."""
+
 _FILLER = rf"(?:{'|'.join(FILLED_PAUSES)})"
 _RESTART = re.compile(rf"\b((?:[\w'-]+ ){{0,2}}[\w'-]+),? {_FILLER},? (?=\1\b)", re.IGNORECASE)
 _PAUSE = re.compile(rf"(?:^|,? ){_FILLER}\b,?(?= |$)|^{_FILLER},? ", re.IGNORECASE)
@@ -40,6 +43,8 @@ def hesitating(body: str, filler: str, draw: Callable[[], float]) -> str:
     if len(words) < _LEAST_WORDS or draw() < _AT_FRONT:
         return f"{filler}, {body}"
     place = 1 + int(draw() * min(3, len(words) - 3))
+    if words[place - 1].lower() in TITLES:
+        place += 1  # "Mrs. Tamm" is one name
     said, rest = words[:place], words[place:]
     if said[-1].endswith(","):
         return " ".join([*said, f"{filler},", *rest])

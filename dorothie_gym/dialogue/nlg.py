@@ -10,7 +10,7 @@ import functools
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -254,6 +254,13 @@ class _Sentence:
         return start + ("?" if _ASKS.match(text) else ".")
 
 
+_EXCLAIMS: Final = re.compile(
+    r"(okay|all right|alright|great|good|nice|perfect|wonderful|awesome|excellent|lovely|cool|fantastic|well done"
+    r"|good job|brilliant|superb|splendid|terrific|marvelous|sorry|oh|well|we made it)\b"
+)
+"""Beginnings of remarks that need no discourse marker in front: not "so perfect, we're done"."""
+
+
 def _words(text: str) -> list[str]:
     return _PLAIN.sub("", text.lower()).split()
 
@@ -264,7 +271,9 @@ def _repeats(front: str, body: str) -> bool:
     A second "now" is a repetition as well: "now slow down now".
     """
     start, lead = _words(body), _words(front)
-    return not start or start[0] in lead or start[0] == "because" or ("now" in lead and "now" in start)
+    if not start or start[0] in lead or start[0] == "because" or ("now" in lead and "now" in start):
+        return True
+    return _EXCLAIMS.match(body.lower()) is not None
 
 
 @functools.lru_cache(maxsize=8192)

@@ -307,6 +307,8 @@ class SlotRealizer:
             return f"{owner}'s house"
         if passenger and self._wording.topic == "pick_up":
             return str(passenger)
+        if not friend and "'" in str(passenger):
+            return None  # "Ayumi's mother" is my friend from then on
         if not self._naming:
             return str(friend or passenger)  # it is clear by now who that is
         return f"my friend {friend}" if friend else f"our passenger {passenger}"

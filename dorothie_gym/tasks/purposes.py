@@ -86,6 +86,8 @@ def read_purpose(line: str) -> Purpose:
     action, place, owner_name = _without_place(imperative)
     spoken = in_first_person(action) if action is not None else None
     person = _person(imperative if action is None else action) or owner_name
+    if owner_name is None and place is not None and _HER_HOUSE.search(place):
+        owner_name = person  # "visit Mrs. Adeyemi at her house"
     return Purpose(
         text=text,
         action=spoken,
@@ -259,6 +261,9 @@ _HOUSE = re.compile(
     rf"|the {_ADJECTIVE}(?:house|home|flat) of (?P<of>{_PERSON_PHRASE})"
     rf"|(?:the|his|her|their|your|my) {_ADJECTIVE}(?:house|home|flat)))(?![\w-])"
 )
+
+
+_HER_HOUSE = re.compile(rf"\b(?:his|her|their) {_ADJECTIVE}(?:house|home|flat)$")
 
 
 def _owner(found: re.Match[str]) -> str | None:

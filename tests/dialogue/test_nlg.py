@@ -250,11 +250,11 @@ def test_verbs_agree_with_plural_objects(move):
     texts = []
     for seed in range(300):
         rng = np.random.default_rng(seed)
-        act = DialogueAct.of(move, ObjectClass.STATIC)
-        texts.append(word_act(act, Role.CO_WIZARD, rng, Wording(topic="blocked" if seed % 2 else None)))
-    about_cones = [text for text in texts if "cones" in text]
-    assert len(about_cones) > 10
-    assert not any(re.search(r"cones (is|was|has|blocks)\b|\bthere's some\b|\bis some\b", text) for text in about_cones)
+        act = DialogueAct.of(move, ObjectClass.RAIL_TRACK)
+        texts.append(word_act(act, Role.CO_WIZARD, rng))
+    about_tracks = [text for text in texts if "tracks" in text]
+    assert len(about_tracks) > 10
+    assert not any(re.search(r"tracks (is|was|has|blocks)\b|\bthere's some\b|\bis some\b", text) for text in about_tracks)
 
 
 def test_long_spans_keep_what_they_say():

@@ -77,5 +77,5 @@ def test_owner_of_the_house_is_taken_up(text, owner):
     house = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.HOUSE)
     heard = heard_utterance(with_words(dict(view.raw), Role.PARTICIPANT, text, house), Role.PARTICIPANT)
     assert heard is not None
-    note_owner(state, heard)
+    note_owner(state, view, heard)
     assert state.beliefs.owner == owner

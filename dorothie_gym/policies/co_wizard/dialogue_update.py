@@ -119,7 +119,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         state.say(*before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
-    note_owner(state, heard)
+    note_owner(state, view, heard)
     note_friend(state, heard)
     for number, act in enumerate(heard.acts):
         if number in looks:

@@ -14,12 +14,14 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.purposes import read_purpose
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
     from dorothie_gym.policies.heard_utterance import HeardUtterance
 
 _TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.REPLY_W})
@@ -64,7 +66,7 @@ def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generat
         state.say(intend(Function.POSITIVE_FEEDBACK, told, elided=("place",), wording=wording, joined=joined))
 
 
-def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
+def note_owner(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> None:
     """Records the owner of the house that the participant wants to go to: "Mateo" of "go to Mateo's house"."""
     about = [act.slots for act in heard.acts if LandmarkName.HOUSE in act.slots]
     if not any(GoalStatus.PENDING not in slots and not _OVER & slots for slots in about):
@@ -78,8 +80,17 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
         if state.beliefs.owner is not None and owner != state.beliefs.owner:
             state.beliefs = state.beliefs.without_look()
         state.beliefs = state.beliefs.with_owner(owner)
-    elif done or state.beliefs.goal is not LandmarkName.HOUSE:
+    elif done or state.beliefs.goal is not LandmarkName.HOUSE or _names_another_street(state, view, heard):
         state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
+
+
+def _names_another_street(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
+    """Returns whether a house is said to be on another street than the one that the car is on its way to."""
+    place, known = state.beliefs.place, set(state.beliefs.streets)
+    if state.beliefs.exact and place is not None:
+        known = {street_of(view.raw, state.town, place[0])}
+    named = {street for act in heard.acts if LandmarkName.HOUSE in act.slots for street in act.values(Slot.STREET)}
+    return bool(named and known) and named.isdisjoint(known)
 
 
 def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:

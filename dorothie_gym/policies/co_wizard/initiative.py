@@ -57,6 +57,10 @@ _WISHED = {
 """Action of each manoeuvre that the participant may have requested."""
 
 
+_UNMENTIONED = frozenset({ObjectClass.UNLABELED, ObjectClass.TRAFFIC_SIGN})
+"""Reasons to stand that nobody explains: none, and a stop sign."""
+
+
 def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Queues at most one remark, if none is queued or being spoken; drops the reason for an ended standstill."""
     if not view.standing and any(_explains_standing(item) for item in state.speech.queue):
@@ -226,7 +230,7 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     hazard = commands.rest_for if resting else view.hazard
     if not (resting or view.motion is Motion.HAZARD) or state.standstill.since is None:
         return
-    if hazard is ObjectClass.UNLABELED or view.time - state.standstill.since < config.hazard_delay:
+    if hazard in _UNMENTIONED or view.time - state.standstill.since < config.hazard_delay:
         return
     again = state.dialogue.hazard_explained_at >= state.standstill.since
     interval = config.hazard_again if again else config.hazard_interval

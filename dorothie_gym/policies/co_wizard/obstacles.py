@@ -30,7 +30,8 @@ _JUST_TOLD = 8.0
 def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Checks the path for obstacles, announces a new one, and asks about a detour or takes it."""
     asked_at = state.dialogue.detour_asked_at
-    if asked_at is not None and view.time - asked_at > state.config.detour_answer_time:
+    waited = 0.0 if asked_at is None or view.other_speaking else view.time - max(asked_at, state.speech.last_end)
+    if asked_at is not None and waited > state.config.detour_answer_time:
         take_detour(state, view, rng, agreed=False)
     thing = _obstacle_on_path(state, view)
     if thing is None or view.manoeuvring or _is_behind_goal(state, view, thing):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
 _YES = DialogueMove.REPLY_Y
 _ANSWERS = MoveGroup.REPLY.moves
+_NAMING = SIGNS_OF_HEARING | {DialogueMove.CONFIRM}
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 
 
@@ -70,7 +71,8 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     answers = [item for item in answers if item.act.move is not DialogueMove.IRRELEVANT] or answers
     answers = [item for k, item in enumerate(answers) if not any(_says_same(item, other) for other in answers[:k])]
     if any(said.predicate is Predicate.KNOWS for item in answers if item.act.move is _YES for said in item.meaning):
-        answers = [item for item in answers if item.act.move is not DialogueMove.CHECK]
+        answers = [item for item in answers if item.act.move is not DialogueMove.CHECK and not _knows_way(item)]
+    answers = [item for k, item in enumerate(answers) if not _is_named_again(item, answers[k + 1 :])]
     checked = [item.act.values(Slot.LANDMARK) for item in answers if item.act.move is DialogueMove.CHECK]
     answers = [
         item
@@ -85,6 +87,19 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     leads = [following.joined for following in answers[1:]]
     kept = [item for k, item in enumerate(answers) if not plain[k] or (k == 0 and (all(plain) or leads[0]))]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _knows_way(item: Remark) -> bool:
+    """Returns whether a remark states that the way is known, as "I know where it is" has said."""
+    return any(said.predicate is Predicate.HAS_ROUTE for said in item.meaning) and not item.act.slots
+
+
+def _is_named_again(item: Remark, behind: Sequence[Remark]) -> bool:
+    """Returns whether a place that is only acknowledged is named again behind: "the house, the house it is"."""
+    places = item.act.values(Slot.LANDMARK)
+    if item.act.move is not DialogueMove.ACKNOWLEDGE or not places or item.act.values(Slot.STATUS):
+        return False
+    return any(other.act.move in _NAMING and other.act.values(Slot.LANDMARK) == places for other in behind)
 
 
 def _says_same(item: Remark, other: Remark) -> bool:

@@ -79,7 +79,6 @@ class ParticipantConfig(GuidanceConfig):
         weather_notice: time that the car is given to mention the weather first [s].
         long_stop: standstill after which the participant may ask for the reason [s].
         wonder_interval: minimum time between questions about unexpected behaviour [s].
-        asks_unseen: probability that a question about objects names one that may not be in sight.
         excuse_time: time for which an explanation excuses a standstill [s].
     """
 
@@ -136,7 +135,6 @@ class ParticipantConfig(GuidanceConfig):
     weather_notice: float = 3.0
     long_stop: float = 8.0
     wonder_interval: float = 25.0
-    asks_unseen: float = 0.4
     excuse_time: float = 30.0
 
 
@@ -204,7 +202,7 @@ class ParticipantStyle:
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(140.0, 70.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            chat=within(120.0, 55.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.15, 0.5, persona.patience, rng) * (1.0 - 0.5 * landmarks) + 0.4 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.2, 0.55, persona.talkativeness, rng) + 0.15 * landmarks,

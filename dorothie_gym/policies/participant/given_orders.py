@@ -35,6 +35,9 @@ TURNED: Final = 40.0
 ONE_BREATH: Final = 15.0
 """Time within which equal orders that are joined belong to one description of the way [s]."""
 
+LATELY: Final = 60.0
+"""Time for which an order counts that is given again [s]."""
+
 OBEYED: Final = 40.0
 """Time after an order to turn round within which the car obeys it [s]."""
 
@@ -117,9 +120,12 @@ def _orders_alike(said: Remark, other: Remark) -> bool:
 
 
 def times_given(state: ParticipantState, view: ParticipantView, order: Remark) -> int:
-    """Returns how often an order was given before, at the place where the car is."""
+    """Returns how often an order was given lately, at the place where the car is, without being obeyed by a turn."""
     now = _given_now(view, order)
-    return sum(_is_equal(now, former) and _is_here(now, former) for former in state.guidance.given)
+    lately = [former for former in state.guidance.given if view.time - former.time < LATELY]
+    return sum(
+        _is_equal(now, former) and _is_here(now, former) and not has_turned_since(view, former) for former in lately
+    )
 
 
 def last_given(state: ParticipantState) -> GivenOrder | None:

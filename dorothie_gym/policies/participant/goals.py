@@ -16,6 +16,7 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import COMMON
+from dorothie_gym.policies.participant.given_orders import last_given
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
 from dorothie_gym.policies.participant.messages import message_remark, seconds_to_take_in
 from dorothie_gym.policies.participant.stories import (
@@ -108,6 +109,7 @@ def _report_added(
         _go_first(state, view, subgoal, landmark, rng)
         return
     later = act_builders.errand(landmark.name, GoalStatus.PENDING)
+    state.task = state.task.after_mentioning(landmark.name)
     news = intend(Function.REQUEST, later, wording=Wording(topic="added"))
     progress = state.route.progress
     far = progress is not None and progress.left(view.station) > state.config.wait_distance
@@ -206,6 +208,10 @@ def resume_after_wait(state: ParticipantState, view: ParticipantView) -> None:
     """Instructs a waiting car to start when its waiting time has ended."""
     if view.time < state.task.resume_at or not state.speech.idle:
         return
+    given = last_given(state)
+    told = given is not None and ActionValue.STOP in given.act.slots
+    if told and not view.standing and view.time < state.task.resume_at + state.config.thinking_time:
+        return  # it is about to stop
     state.task = state.task.waiting_until(math.inf)
     if view.standing:
         state.say(intend(Function.REQUEST, act_builders.action(ActionValue.START)))
@@ -218,6 +224,7 @@ def _report_dropped(
     if landmark is None:
         return
     said = {value for item in state.speech.said for value in item.act.slots}
+    said = said | state.task.mentioned
     known = subgoal.index == state.task.target or subgoal.index in state.task.put_off or landmark.name in said
     state.task = state.task.closed(subgoal.index)
     if subgoal.index == state.task.target:
@@ -383,6 +390,7 @@ def _say_announcement(
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name not in (goal.name, *COMMON)]
     if named and rng.random() < 0.25:
+        state.task = state.task.after_mentioning(named[0].name)
         state.say(intend(Function.INFORM, act_builders.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:
         state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="understood"), joined=True))

@@ -39,6 +39,7 @@ from dorothie_gym.policies.participant.retrying import (
     why_standing,
 )
 from dorothie_gym.policies.participant.route_steps import route_step
+from dorothie_gym.policies.participant.standstill import cannot_go_on
 from dorothie_gym.policies.participant.telling_way import (
     answer_with_way,
     is_described,
@@ -71,6 +72,9 @@ SENT_ON = 12.0
 
 OBEYING = 3.0
 """Time after an order before which its failure is none of the guidance [s]."""
+
+STOPPING = 8.0
+"""Time after an order to stop within which nothing is said about the speed [s]."""
 
 FAST = 50.0
 """Speed above which the car is asked to slow down long before the place [km/h]."""
@@ -345,7 +349,8 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.ran
     progress, config = state.route.to_goal, state.config
     fast = state.town.cruise is None and 3.6 * view.speed > FAST
     far = progress.left(view.station) > (1 + fast) * reach_at(config.stop_distance, view.speed, state.town)
-    if state.guidance.slowed_early or far or view.speed < config.slow_speed:
+    stops = view.time - state.guidance.stopped_at < STOPPING
+    if state.guidance.slowed_early or far or stops or view.speed < config.slow_speed:
         return False
     if not state.route.misses and not fast and not _is_easily_missed(state, view):
         return False
@@ -390,6 +395,8 @@ def _takes_run_up(state: ParticipantState, view: ParticipantView) -> bool:
     missing = config.run_up + changes * config.run_up_per_lane - rest
     if missing < 0.0 or room < END_ROOM + view.speed or not _turns_better(state, view, min(missing, room - END_ROOM)):
         return False
+    if cannot_go_on(state, view):
+        return False
     if progress.next_manoeuvre(view.station) == (LaneEntry.U_TURN, 0.0):
         state.route = state.route.replanned(state.town, view.place)
     _send_on(state, view)
@@ -414,7 +421,8 @@ def _turns_better(state: ParticipantState, view: ParticipantView, farther: float
 def _send_on(state: ParticipantState, view: ParticipantView) -> None:
     """Instructs a standing car to drive on and turn round later."""
     waited = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end)
-    if view.standing and waited > state.config.ready_time and view.time > state.motion.excused_until:
+    ready = waited > state.config.ready_time and view.time > state.motion.excused_until
+    if view.standing and ready and state.guidance.step != ("on", view.lane, 0):
         note_step(state, view, ("on", view.lane, 0))
         state.say(order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, Wording(topic="run_up")))
 

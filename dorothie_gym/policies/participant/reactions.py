@@ -24,7 +24,8 @@ from dorothie_gym.policies.observation_parser import (
     street_of,
     weather,
 )
-from dorothie_gym.policies.participant.given_orders import turned_round_lately
+from dorothie_gym.policies.participant.given_orders import last_given, turned_round_lately
+from dorothie_gym.policies.participant.goals import announcement
 from dorothie_gym.policies.participant.stories import picks_up, purpose_of_target
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
@@ -61,12 +62,8 @@ LONG_STANDSTILL = 25.0
 WHY_DISTANCE = 45.0
 """Distance to the place within which the participant does not ask about a standstill [m]."""
 
-_ROADSIDE_OBJECTS = (
-    ObjectClass.BRIDGE, ObjectClass.BUILDING, ObjectClass.DYNAMIC, ObjectClass.FENCE, ObjectClass.POLE,
-    ObjectClass.ROAD, ObjectClass.SIDE_WALK, ObjectClass.VEGETATION, ObjectClass.WALL,
-    ObjectClass.TRAFFIC_SIGN, ObjectClass.STATIC,
-)  # fmt: skip
-"""Objects that the participant may ask about."""
+_KNOWS_STREETS = 0.3
+"""Share of places named with their street above which the participant knows the streets, and does not ask."""
 
 
 def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
@@ -89,7 +86,8 @@ def _passenger(purpose: Purpose) -> str | None:
     """Returns the person that is picked up on an errand, by a name that can follow "pick up"."""
     if not picks_up(purpose) or purpose.person is None:
         return None
-    return _last_name_of(purpose.person) if "'" in purpose.person else _with_capital(purpose.person)
+    last = _last_name_of(purpose.person) if "'" in purpose.person else None
+    return last or _with_capital(purpose.person)  # "Nilo" of "Rosa's brother Nilo", but "Ayumi's mother"
 
 
 def _first_name(person: str | None) -> str | None:
@@ -266,7 +264,24 @@ def _ask_why_standing(state: ParticipantState, view: ParticipantView, rng: np.ra
     asked_lately = view.time - state.conversation.asked_at <= WHY_INTERVAL
     if waited > state.style.patience and not near and not asked_lately:
         state.conversation = state.conversation.after_asking_why(view.time)
-        state.say(_why(Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))
+        if not _sends_on(state, view, rng):
+            state.say(_why(Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))
+
+
+def _sends_on(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
+    """Sends a car on that stands because of the participant; returns whether it does.
+
+    A car that was told to stop is told to drive on, and one that has not left the last errand gets the next one again.
+    """
+    last = last_given(state)
+    if last is not None and ActionValue.STOP in last.act.slots:
+        state.say(intend(Function.REQUEST, act_builders.action(ActionValue.START)))
+    elif state.task.finished[1] >= state.motion.moved_at:
+        state.task = state.task.after_reminding(view.time)
+        state.say(announcement(state, view, rng))
+    else:
+        return False
+    return True
 
 
 def _why(effect: Proposition) -> Remark:
@@ -289,6 +304,8 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
     state.conversation = conversation.after_wondering(view.time)
     if view.turning and turned_round_lately(state, view):
         return
+    if stands and _sends_on(state, view, rng):
+        return
     if rng.random() < state.style.curious:
         turning = Proposition.of(Predicate.DOES, action=ActionValue.U_TURN)
         state.say(_why(turning if view.turning else Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))
@@ -308,8 +325,9 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         return
     next_chat = view.time + float(rng.exponential(state.style.chat)) + 20.0
     state.conversation = state.conversation.with_next_chat(next_chat)
-    options = _chat_options(state, view, rng)
-    chosen = options[int(rng.integers(len(options)))]
+    asked = {content for item in state.speech.said for content in item.meaning}
+    options = [each for each in _chat_options(state, view, rng) if asked.isdisjoint(each[-1].meaning)]
+    chosen = options[int(rng.integers(len(options)))]  # a remark that is unrelated to the task is always possible
     note_told(state, chosen)
     state.say(*chosen)
 
@@ -345,8 +363,8 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found.append((intend(Function.CHECK_QUESTION, act_builders.destination(goal.name)),))
         found.append((intend(asks_open, Proposition.of(Predicate.DRIVES_AT, speed=ASKED)),))
         found.append((intend(asks, Proposition.of(Predicate.CROWDED, object=ObjectClass.VEHICLES)),))
-        found += trip_questions(state)
-        if street is not StreetName.UNKNOWN:
+        found += trip_questions(state, view)
+        if street not in (StreetName.UNKNOWN, goal.street) and state.style.names_street < _KNOWS_STREETS:
             found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
@@ -356,9 +374,7 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
             return [(intend(Function.REQUEST, content, wording=Wording(faster=True, speed=speed)),)]
     if view.objects:
         near = view.objects[int(rng.integers(min(len(view.objects), 3)))].kind
-        random_object = rng.random() < state.config.asks_unseen
-        thing = _ROADSIDE_OBJECTS[int(rng.integers(len(_ROADSIDE_OBJECTS)))] if random_object else near
-        found += [(intend(asks, Proposition.of(Predicate.SEES, object=thing)),)] * 2
+        found += [(intend(asks, Proposition.of(Predicate.SEES, object=near)),)] * 2
         found.append((intend(asks_open, Proposition.of(Predicate.SEES, object=ObjectClass.QUERIED)),))
         found.append((intend(Function.INFORM, Proposition.of(Predicate.SEES, object=near)),))
     if street is not StreetName.UNKNOWN:

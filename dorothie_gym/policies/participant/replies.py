@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.conversation import speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING, DialogueAct, DialogueMove
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import (
     ActionValue,
@@ -26,7 +26,8 @@ from dorothie_gym.ontology.slots import (
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
+from dorothie_gym.policies.participant.acknowledging import answers_question, needs_nod, take_note, thank
+from dorothie_gym.policies.participant.arriving import straight_on
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn
 from dorothie_gym.policies.participant.goals import announcement, describe, pick_up_wording
 from dorothie_gym.policies.participant.guidance import next_step, note_step
@@ -34,6 +35,7 @@ from dorothie_gym.policies.participant.proposition_truth import has_just_finishe
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
 from dorothie_gym.policies.participant.route_steps import route_step
+from dorothie_gym.policies.participant.stories import story_remark
 from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
 from dorothie_gym.policies.participant.yes_no_answers import (
     addition,
@@ -56,24 +58,14 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.participant.view import ParticipantView
 
 
+REASON_FIRST = 0.7
+"""Share of the given reasons that come before the destination when the car asks for it."""
+
 _YES_NO = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
 
 
-_TAKEN_UP = 8.0
-"""Time within which the car takes up an order [s]."""
-
-_REPLIES = frozenset(
-    {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
-)
-
 _POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
 """Remarks of a car with a poor view."""
-
-_VISIBLE = _POOR_VIEW | {Predicate.WEATHER, Predicate.CROWDED, Predicate.SEES, Predicate.BLOCKED, Predicate.LIGHTS_ON}
-"""Remarks on something that both can see."""
-
-_AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
-"""Moves that may follow an acknowledgement in the same breath."""
 
 _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
 """Beginning of a question for the destination, the rest of which was not understood."""
@@ -130,12 +122,10 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     again = _to_say_again(state, view, heard) if state.speech is before else None
     if again is not None:
         state.say_first(again)
-    elif state.speech is before and _answers_question(state, heard):
-        _thank(state, view, rng)
-    elif state.speech is before and _needs_nod(state, view, heard):
-        # an utterance that takes up an instruction needs no acknowledgement of its own
-        alone = heard.acts[0].move not in SIGNS_OF_HEARING
-        _nod(state, view, rng, _nod_to(view, heard), heard.words.told, alone=alone)
+    elif state.speech is before and answers_question(state, heard):
+        thank(state, view, rng)
+    elif state.speech is before and needs_nod(state, view, heard):
+        take_note(state, view, heard, rng)
 
 
 # --- open questions -------------------------------------------------------------------------------------------------
@@ -191,7 +181,8 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
     place = act_builders.first_name([announced.get("place")])
     wanted = act_builders.destination(place, street if isinstance(street, StreetName) else None)
     answer = intend(Function.ANSWER, wanted, wording=pick_up_wording(state, view))
-    state.say_only(answer, *more)
+    reason = story_remark(state, view, rng) if rng.random() < REASON_FIRST * state.style.reasons else ()
+    state.say_only(*reason[:1], replace(answer, joined=bool(reason)), *more)
 
 
 def _name_order(state: ParticipantState, landmarks: Collection[SlotValue], rng: np.random.Generator) -> None:
@@ -324,39 +315,6 @@ def _answer_to_why(
         correct_arrival(state, view)
 
 
-def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
-    """Returns an acknowledgement of an explanation: of a reason for a stop, of something visible, or in general."""
-    said = {value for act in heard.acts for value in act.slots}
-    objects, told = any(isinstance(value, ObjectClass) for value in said), heard.words.told
-    visible = told is not None and told.predicate in _VISIBLE
-    reason = objects and not visible and (view.standing or ActionValue.STOP in said)
-    topic = "why" if reason else "seen" if visible or objects else None
-    return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
-
-
-def _needs_nod(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
-    """Returns whether an utterance states something, asks for nothing, and does not only take up an order."""
-    moves = {act.move for act in heard.acts}
-    unasked = not state.speech.has_just_spoken(view.time, _TAKEN_UP)
-    told = unasked or heard.words.told is not None or any(act.slots for act in heard.acts)
-    explains = told and DialogueMove.EXPLAIN in moves and moves.isdisjoint(act_builders.QUESTIONS)
-    return explains and not _takes_up_order(state, view, heard)
-
-
-def _takes_up_order(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> bool:
-    """Returns whether the car only says that it does what it was just told to do."""
-    last = state.speech.last
-    if last is None or last.act.move not in ORDERING_MOVES or not state.speech.has_just_spoken(view.time, _TAKEN_UP):
-        return False
-    return any(set(act.values(Slot.ACTION)) & set(last.act.values(Slot.ACTION)) for act in heard.acts)
-
-
-def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
-    """Returns whether the car has answered the last question."""
-    last = state.speech.last
-    return last is not None and last.act.move in act_builders.QUESTIONS and heard.acts[0].move in _REPLIES
-
-
 def _to_say_again(state: ParticipantState, view: ParticipantView, heard: HeardUtterance) -> Remark | None:
     """Returns the question that the car has misheard, or the destination that it denies; None without either."""
     if not _denies_destination(state, heard):
@@ -382,46 +340,6 @@ def _misheard_question(state: ParticipantState, heard: HeardUtterance) -> Remark
     return None if before and before[0].act == last.act else replace(last, text="", joined=False)
 
 
-def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Acknowledges, with some probability, the answer of the car."""
-    busy = not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view))
-    if not busy and rng.random() < state.style.thanks:
-        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="answered")), *addition(state, view, rng))
-
-
-def _nod(
-    state: ParticipantState,
-    view: ParticipantView,
-    rng: np.random.Generator,
-    nod: Remark,
-    told: Proposition | None,
-    *,
-    alone: bool,
-) -> None:
-    """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
-    waiting = state.speech.first
-    if waiting is not None and not waiting.urgent and not waiting.text:
-        done = GoalStatus.COMPLETE in waiting.act.slots
-        if waiting.act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
-            state.speech = state.speech.led_by(nod)
-    elif (
-        not alone
-        or not state.speech.idle
-        or _has_just_said(state, view, told)
-        or (state.guidance.guiding and about_to_arrive(state, view))
-    ):
-        return
-    elif rng.random() < state.style.nods:
-        state.say(nod, *addition(state, view, rng))
-
-
-def _has_just_said(state: ParticipantState, view: ParticipantView, told: Proposition | None) -> bool:
-    """Returns whether the participant has just made the same statement as the car."""
-    if told is None or not state.speech.has_just_spoken(view.time, state.config.checked_within):
-        return False
-    return any(said.contains(told) for item in state.speech.said[-2:] for said in item.meaning)
-
-
 def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
     """Corrects a misunderstanding of the car; returns whether there was one."""
     again = correction(state, view, act, words)
@@ -439,6 +357,8 @@ def _confusion(
 ) -> None:
     """Explains again what the car has not understood."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
+    if all(item.act.move in SIGNS_OF_HEARING for item in state.speech.queue):
+        state.speech = state.speech.cleared()  # an "okay" to what was said before
     explain_again(state, view, rng)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.policies.participant.standstill import is_blocked_ahead
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress
 from dorothie_gym.policies.turn_lanes import next_turn, turn_lanes
@@ -80,5 +81,5 @@ def _needs_switch(
 ) -> bool:
     """Returns whether a lane change before a junction needs an instruction; "turn left" includes one to a turn lane."""
     if crossing.lane in turn_lanes(state.town):
-        return crossing.direction is Direction.STRAIGHT
+        return crossing.direction is Direction.STRAIGHT or is_blocked_ahead(state, view)
     return progress.needs_switch(state.town, view.lane, view.station, crossing)

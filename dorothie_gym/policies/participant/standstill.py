@@ -1,4 +1,4 @@
-"""Standing car as the participant sees it: at a red light, or turning."""
+"""Standing car as the participant sees it: at a red light, turning, or kept from going on."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ LONG_RED = 10.0
 
 TURN_TIME = 4.0
 """Standstill across the lane after which a car is no longer regarded as turning [s]."""
+
+OBEYED_WITHIN = 12.0
+"""Time after which a standing car that was sent on is known to be kept from it [s]."""
 
 
 def excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
@@ -38,3 +41,16 @@ def excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
     if waited - state.clock.interval < LONG_RED <= waited:
         state.feel(Happening.RED_LIGHT, view.time)
     state.motion = state.motion.at_red_light(view.time, config.start_time)
+
+
+def cannot_go_on(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether a standing car was sent on in vain, or an obstacle is known to be ahead on its lane."""
+    sent_on = state.guidance.step == ("on", view.lane, 0)
+    if sent_on and view.standing and view.time - state.guidance.step_at > OBEYED_WITHIN:
+        return True
+    return is_blocked_ahead(state, view)
+
+
+def is_blocked_ahead(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether an obstacle is known to be ahead on the lane of the car."""
+    return any(lane == view.lane and station > view.station for lane, station in state.route.blocked)

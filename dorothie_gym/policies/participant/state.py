@@ -139,6 +139,7 @@ class TaskProgress:
         put_off: interrupted subgoals, which will be resumed.
         told: statements made about the route to the target, its place, and the speaker's feelings about it.
         finished: landmark of the last completed errand, and the time of its completion [s].
+        mentioned: landmarks of later errands that the car has been told of.
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()
@@ -154,6 +155,7 @@ class TaskProgress:
     put_off: frozenset[int] = frozenset()
     told: frozenset[Proposition] = frozenset()
     finished: tuple[LandmarkName | None, float] = (None, -math.inf)
+    mentioned: frozenset[LandmarkName] = frozenset()
 
     @property
     def destination(self) -> SeenLandmark:
@@ -209,6 +211,10 @@ class TaskProgress:
     def after_finishing(self, landmark: LandmarkName | None, now: float) -> TaskProgress:
         """Records the landmark of an errand that is done, at a time [s]."""
         return replace(self, finished=(landmark, now))
+
+    def after_mentioning(self, landmark: LandmarkName) -> TaskProgress:
+        """Records that the car was told of an errand for later."""
+        return replace(self, mentioned=self.mentioned | {landmark})
 
     def closed(self, index: int) -> TaskProgress:
         """Removes a subgoal from those to be resumed."""

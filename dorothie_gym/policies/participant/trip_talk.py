@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _LONG_WAIT: Final = 20.0  # standstill that is worth a remark when it ends [s]
 _LATELY: Final = 15.0  # time after its end within which it is remarked on [s]
 _STILL_THERE: Final = 60.0  # distance to the last stop up to which it is "here" [m]
+_FORGOTTEN: Final = 45.0  # time after which a passenger asks what is left on the list [s]
 _IN_SIGHT: Final = 40.0  # distance of a former stop that the car passes again [m]
 _CALM: Final = 0.25  # stress up to which the trip goes well
 
@@ -78,14 +79,18 @@ def trip_remarks(state: ParticipantState, view: ParticipantView) -> list[tuple[R
     ]
 
 
-def trip_questions(state: ParticipantState) -> list[tuple[Remark, ...]]:
+def trip_questions(state: ParticipantState, view: ParticipantView) -> list[tuple[Remark, ...]]:
     """Returns the possible questions about the trip."""
     asks, goal = Function.SET_QUESTION, state.task.destination
     found = [intend(asks, Proposition.of(Predicate.DRIVES_AT, speed=ASKED, limit=True), wording=Wording(topic="limit"))]
     distance = Proposition.of(Predicate.DISTANCE, place=goal.name, metres=ASKED)
     found.append(intend(asks, distance, wording=Wording(topic="how_far")))
-    listed = Proposition.of(Predicate.TASK, status=GoalStatus.QUERIED)
-    found.append(intend(asks, listed, wording=Wording(topic="asks_list")))
+    named = state.task.mentioned | {goal.name}
+    later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != state.task.target]
+    known = [mark for mark in later if mark is not None and mark.name in named]
+    if known and view.time - state.task.announced_at > _FORGOTTEN:
+        listed = Proposition.of(Predicate.TASK, status=GoalStatus.QUERIED)
+        found.append(intend(asks, listed, wording=Wording(topic="asks_list")))
     return [(item,) for item in found]
 
 

@@ -16,7 +16,7 @@ from dorothie_gym.evaluation.analysis.truth_checks.truth import is_true
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.slots import ActionValue, LandmarkName, Slot, StreetName
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.session.recording.events import EventType
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.purposes import read_people
@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 PASSING: Final = 30.0
 """Distance from a place within which the car passes it [m]."""
 
+SAME_OBSTACLE: Final = 30.0
+"""Time for which an obstacle that the car names is taken for the one named before [s]."""
+
+_OBSTACLE: Final = re.compile(
+    r"\b(barrier|roadblock|barricade|cones?|dumpster|construction|skip|wreck|bin|trash can)\b", re.IGNORECASE
+)
 _ADDED: Final = "task_trigger"  # another errand is added to the list, the present one goes on
 _AGAIN: Final = frozenset({Predicate.TRIED, Predicate.PASSED})
 _SHARED: Final = frozenset({LandmarkName.HOUSE, LandmarkName.PERSON})
@@ -54,6 +60,18 @@ def stale_remarks(session: Session) -> Iterator[Case]:
             times = said.get("times")
             if said.predicate in _AGAIN and isinstance(times, int):
                 yield Case(_times(session, said, move) >= times, move.start, move.span)
+
+
+def obstacle_names(session: Session) -> Iterator[Case]:
+    """Yields what the car calls an obstacle that it has named just before; wrong is another name than before."""
+    former, named_at = "", -math.inf
+    for move in session.moves(Role.CO_WIZARD):
+        found = _OBSTACLE.search(move.span) if ObjectClass.STATIC in move.act.slots else None
+        if found is None:
+            continue
+        if move.start - named_at < SAME_OBSTACLE:
+            yield Case(found[0].lower() == former, move.start, move.span)
+        former, named_at = found[0].lower(), move.start
 
 
 def _times(session: Session, said: Proposition, move: MoveRecord) -> float:

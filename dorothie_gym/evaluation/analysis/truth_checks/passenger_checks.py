@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dorothie_gym.session.recording.events import MoveRecord, UtteranceRecord
     from dorothie_gym.session.recording.session import Session
 
-STOPPED_WITHIN: Final = 30.0
+STOPPED_WITHIN: Final = 90.0
 """Time after an order to stop within which the standstill is the participant's own doing [s]."""
 
 TOLD_WITHIN: Final = 10.0
