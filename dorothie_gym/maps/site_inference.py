@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -32,6 +33,9 @@ FASTEST_STOP = 20.0
 SITE_CLEARANCE = 0.5
 # Stretch before the end of a lane in which cars leave it, without sites [m].
 MERGING_STRETCH = 130.0
+# Stretch at the beginning of a lane without sites, and its largest share of the lane [m]: who has just turned cannot
+# be told in time to stop there.
+APPROACH, APPROACH_SHARE = 45.0, 0.4
 
 
 def lay_sites(
@@ -40,6 +44,7 @@ def lay_sites(
     count: int = 24,
     avoid: Collection[int] = (),
     traffic: DrivingSide = DrivingSide.RIGHT,
+    approach: float = 0.0,
 ) -> tuple[Site, ...]:
     """Places landmark sites at the kerb, spread over the town by farthest-point sampling.
 
@@ -54,25 +59,46 @@ def lay_sites(
         count: number of sites.
         avoid: lanes without sites.
         traffic: side of the road on which vehicles drive.
+        approach: stretch at the beginning of a lane without sites, at most 40 % of the lane [m].
 
     Returns:
         At most `count` sites; fewer if the map has no room.
     """
     outermost = [lane for lane in _outermost(lanes) if lane.id not in avoid]
-    part, ending = _parts(lanes, links), _ending(links)
+    part, stretches = _parts(lanes, links), _Stretches(_ending(links), approach, traffic)
     closed = _is_closed(outermost, links, part)
-    places = _places(lanes, outermost, count, ending, traffic) if closed else np.empty((0, 6))
+    places = _places(lanes, outermost, count, stretches) if closed else np.empty((0, 6))
     if len(places) < count:  # an open network, or a small one
         around = _Surroundings(lanes, links, traffic)
         for group in (outermost, [lane for lane in lanes if not lane.in_junction and lane.id not in avoid]):
-            places = max(places, _places(lanes, group, count, ending, traffic, around), key=len)
+            places = max(places, _places(lanes, group, count, stretches, around), key=len)
             if len(places) >= count:
                 break
     if not len(places):  # no car can return to any place
         largest = [lane for lane in outermost if part[lane.id] == _largest(part)]
-        places = _places(lanes, largest, count, ending, traffic)
+        places = _places(lanes, largest, count, stretches)
     chosen = _spread(places[:, 2:4], count) if len(places) else []
     return tuple(_site(k, lanes[int(places[row, 0])], places[row]) for k, row in enumerate(sorted(chosen)))
+
+
+@dataclass(frozen=True)
+class _Stretches:
+    """Stretches of lanes that have sites.
+
+    Attributes:
+        ending: lanes that cars must leave before they end.
+        approach: stretch at the beginning of a lane without sites, if it is no larger share than `APPROACH_SHARE` [m].
+        traffic: side of the road on which vehicles drive; sites lie there.
+    """
+
+    ending: frozenset[int]
+    approach: float
+    traffic: DrivingSide
+
+    def of(self, lane: Lane, margin: float) -> tuple[float, float]:
+        """Returns the stations between which a lane has sites, at a distance from both of its ends [m]."""
+        begin = max(margin, min(self.approach, APPROACH_SHARE * lane.length))
+        return begin, lane.length - (MERGING_STRETCH if lane.id in self.ending else 0.0) - margin
 
 
 class _Surroundings:
@@ -105,14 +131,13 @@ def _places(
     lanes: Sequence[Lane],
     kerbs: list[Lane],
     count: int,
-    ending: frozenset[int],
-    traffic: DrivingSide,
+    stretches: _Stretches,
     around: _Surroundings | None = None,
 ) -> Array:
     """Returns candidate sites (n, 6) by the first rule that gives enough of them; see `_candidates`."""
     usable, best = _calm(kerbs), np.empty((0, 6))
     for shortest, margin in SITE_RULES:
-        places = _candidates([lane for lane in usable if lane.length >= shortest], margin, ending, traffic)
+        places = _candidates([lane for lane in usable if lane.length >= shortest], margin, stretches)
         if len(places):
             places = places[_is_clear(lanes, places)]
         best = places if around is None else around.largest(places)
@@ -161,25 +186,25 @@ def _calm(lanes: list[Lane]) -> list[Lane]:
     return calm if 2 * len(calm) >= len(lanes) else lanes
 
 
-def _candidates(lanes: Iterable[Lane], margin: float, ending: Collection[int], traffic: DrivingSide) -> Array:
+def _candidates(lanes: Iterable[Lane], margin: float, stretches: _Stretches) -> Array:
     """Returns candidate sites along lanes: rows of lane, station, landmark x, y, waypoint x, y [m].
 
     There are none where a lane opens or tapers away, and none where cars leave one of those that end.
     """
     tables = [np.empty((0, 6))]
     for lane in lanes:
-        end = lane.length - (MERGING_STRETCH if lane.id in ending else 0.0)
-        room = end - 2.0 * margin
+        begin, end = stretches.of(lane, margin)
+        room = end - begin
         if room <= 0.0:
             continue
-        s = np.linspace(margin, end - margin, int(room / SITE_STEP) + 1) if room > SITE_STEP else [margin]
+        s = np.linspace(begin, end, int(room / SITE_STEP) + 1) if room > SITE_STEP else [begin]
         station = np.asarray(s, dtype=float)
         station = station[np.interp(station, lane.stations, lane.widths) >= NARROW]
         x, y, heading, width = (
             np.interp(station, lane.stations, column)
             for column in (lane.points[:, 0], lane.points[:, 1], lane.headings, lane.widths)
         )
-        aside = traffic.sign * (0.5 * width + SITE_OFFSET)
+        aside = stretches.traffic.sign * (0.5 * width + SITE_OFFSET)
         number = np.full(len(station), float(lane.id))
         place = (x - aside * pn.sin(heading), y + aside * pn.cos(heading))
         tables.append(np.column_stack((number, station, *place, x, y)))

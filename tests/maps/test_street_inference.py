@@ -1,10 +1,12 @@
 import itertools
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import NO_STREET, Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive import read_opendrive
 from dorothie_gym.maps.routing import router
@@ -12,6 +14,7 @@ from dorothie_gym.maps.site_inference import lay_sites
 from dorothie_gym.maps.street_inference import name_streets
 from dorothie_gym.maps.town import Town
 
+from .ending_lanes import ring
 from .opendrive_text import shared_map
 
 TOWNS = ("Town01", "Town02", "Town05")
@@ -189,3 +192,13 @@ def test_of_two_streets_apart_the_one_with_more_room_has_the_sites() -> None:
         *(_lane(2, 2, (0, 300), (250, 300)), _lane(3, 2, (250, 296), (0, 296), lane_id=1)),
     ]
     assert {site.lane for site in lay_sites(lanes, [], 12)} == {2, 3}
+
+
+def test_sites_of_imported_maps_lie_away_from_where_cars_turn_in(tmp_path: Path) -> None:
+    """Whoever has just turned into a street cannot be told in time to stop."""
+    town = load_town(ring(tmp_path / "ring.xodr"))
+    stations = [(site.station, town.lanes[site.lane].length) for site in town.sites]
+    assert stations and all(station >= min(44.0, 0.39 * length) for station, length in stations)
+    lanes = [_lane(0, 1, (0, 0), (100, 0)), _lane(1, 1, (100, -4), (0, -4), lane_id=1)]
+    assert min(site.station for site in lay_sites(lanes, [], 12, approach=45.0)) == pytest.approx(40.0)
+    assert min(site.station for site in lay_sites(lanes, [], 12)) < 25.0

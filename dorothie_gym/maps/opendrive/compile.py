@@ -20,7 +20,7 @@ from dorothie_gym.maps.opendrive.parse import parse_opendrive
 from dorothie_gym.maps.opendrive.street_names import find_streets
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, build_topology, successor_links
 from dorothie_gym.maps.opendrive.traffic_rule import driving_side
-from dorothie_gym.maps.site_inference import lay_sites
+from dorothie_gym.maps.site_inference import APPROACH, lay_sites
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_light_programs import derive_programmes
 from dorothie_gym.maps.trapped_lanes import trapped_lanes
@@ -78,7 +78,7 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
         links=links,
         junctions=junctions,
         streets=streets,
-        sites=lay_sites(lanes, links, traffic=traffic),
+        sites=lay_sites(lanes, links, traffic=traffic, approach=APPROACH),
         signals=signals,
         crosswalks=place_crosswalks(records),
         sidewalks=lay_sidewalks(records, samples, lanes),
