@@ -94,5 +94,5 @@ def compile_with_progress(*, everything: bool = False, batches: bool, pictures: 
         if pictures:
             from dorothie_gym.pictures.camera import warm_up as camera
 
-            camera.warm_up(show)
+            camera.warm_up(show, rare=rare)
     return total + begun

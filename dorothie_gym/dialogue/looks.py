@@ -158,7 +158,7 @@ _PATTERNS: Final = MappingProxyType(
             "storeys": r"\b(one|single|two|three|[123])[- ](?:stor(?:ey|eys|y|ies)|floors?)\b",
             "roof": rf"\b{_COLOUR} roof\b|\broof is {_COLOUR}\b",
             "garden": r"\b(?:a|the) (?:tree|hedge)\b|\b(?:a|the)(?: white)?(?: picket)? fence\b"
-            r"|\bflowers (?:along the|in) front\b",
+            r"|\bflowers (?:along|in)(?: the)? front\b",
             "frames": rf"\b{_COLOUR} (?:window frames|windows|frames)\b",
             "coat": rf"\b{_COLOUR} (?:coat|jacket)\b|\b(?:coat|jacket) is {_COLOUR}\b",
             "trousers": rf"\b{_COLOUR} (?:trousers|pants)\b",

@@ -1,4 +1,4 @@
-"""Compilation of batches of navigation environments ahead of their use, see `engine.warm_up`."""
+"""Compilation of batches of navigation environments ahead of their use, see `session.warm_up`."""
 
 from __future__ import annotations
 

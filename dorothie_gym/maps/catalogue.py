@@ -105,13 +105,10 @@ def _lights_of(name_or_path: str | Path, lights: str | None) -> tuple[str | Path
         name = f"{split_lights(name)[0]},lights={lights}"
     found, source = split_lights(name)
     if source is Lights.DEFAULT and not found.lower().endswith(".xodr"):
-        remedy = "give the file of a map (.xodr)" if _is_shipped(found) else "name its junctions under 'lights'"
+        is_yaml = Path(found).suffix.lower() in _SUFFIXES
+        remedy = "name its junctions under 'lights'" if is_yaml else "give the file of a map (.xodr)"
         raise TownError(found, "lights", f"is for OpenDRIVE maps; {remedy}")
     return (found if found != str(name_or_path) else name_or_path), source
-
-
-def _is_shipped(name: str) -> bool:
-    return is_generated(name) or name in town_names()
 
 
 @contextmanager

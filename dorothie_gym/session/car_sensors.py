@@ -113,7 +113,7 @@ class CarSensors:
         self._world, self._sensors, self._frames, self._lines = world, config.sensors, config.frames, lines
         self._before = Motion.of(world)
         self._readings: dict[str, NDArray[np.generic]] = {}
-        self._read((), self._before)
+        self.update(())
 
     @property
     def readings(self) -> Mapping[str, NDArray[np.generic]]:
@@ -122,10 +122,8 @@ class CarSensors:
 
     def update(self, events: Sequence[WorldEvent]) -> None:
         """Reads the sensors after a step of the world, with its events."""
-        self._read(events, self._before)
-
-    def _read(self, events: Sequence[WorldEvent], before: Motion) -> None:
         world, sensors, readings = self._world, self._sensors, dict[str, NDArray[np.generic]]()
+        before = self._before
         if sensors.imu:
             inertial, self._before = read_inertial_unit(world, before, self._frames)
             readings["accelerometer"], readings["gyroscope"] = inertial.accelerometer, inertial.gyroscope

@@ -9,7 +9,15 @@ from dataclasses import asdict, dataclass, field
 
 from dorothie_gym.dialogue.conversation import USUAL_WORD_ERROR_RATE, WORDS_PER_SECOND
 from dorothie_gym.session.rewards import RewardWeights
-from dorothie_gym.session.sensor_config import SensorConfig, SensorMount, check_bounds, check_outputs, check_whole
+from dorothie_gym.session.sensor_config import (
+    SensorConfig,
+    SensorMount,
+    check_bounds,
+    check_flags,
+    check_type,
+    check_whole,
+    checked_outputs,
+)
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
 
@@ -82,12 +90,9 @@ class CameraConfig:
     def __post_init__(self) -> None:
         check_whole(self, (("width", 8, 4096, "pixels"), ("height", 8, 4096, "pixels")))
         check_bounds(self, (("field_of_view", 10.0, 150.0, "degrees"), ("metres_per_pixel", 0.02, 5.0, "m")))
-        if not isinstance(self.mount, CameraMount):
-            raise ValueError(f"CameraConfig.mount is a {type(self.mount).__name__}; it must be a CameraMount")
-        for name in ("antialiasing", "shadows"):
-            if not isinstance(getattr(self, name), bool):
-                raise ValueError(f"CameraConfig.{name} is {getattr(self, name)!r}; it must be True or False")
-        check_outputs("CameraConfig", self.outputs, CameraOutput)
+        check_type(self, "mount", CameraMount)
+        check_flags(self, ("antialiasing", "shadows"))
+        object.__setattr__(self, "outputs", checked_outputs(self, self.outputs, CameraOutput))
 
     @property
     def samples(self) -> int:
@@ -137,7 +142,7 @@ class EnvConfig:
         camera: first-person camera on the car, observed by the participant and the Co-Wizard; None for no camera.
             It has no other effect on a session.
         cameras: further cameras by name, such as `{"left": CameraConfig(mount=CameraMount(yaw=-90.0))}`: their fields
-            begin with the name ("left_camera"). Names are lower-case words.
+            begin with the name ("left_camera"). Names are lower-case words other than lidar.
         sensors: further sensors of the car, observed by the Co-Wizard.
         perception: perception model of the participant and the Co-Wizard. With `PerceptionModel.CAMERA` they observe
             the objects that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The
@@ -178,8 +183,6 @@ class EnvConfig:
             raise ValueError(f"EnvConfig.words_per_second is {self.words_per_second}; it must be in 0.5..20")
         if not 0.0 <= self.word_error_rate < 1.0:
             raise ValueError(f"EnvConfig.word_error_rate is {self.word_error_rate}; it must be at least 0 and below 1")
-        if self.camera is not None and not isinstance(self.camera, CameraConfig):
-            raise ValueError(f"EnvConfig.camera is a {type(self.camera).__name__}; it must be a CameraConfig or None")
         self._check_sensors()
         if self.perception not in (models := list(map(str, PerceptionModel))):
             raise ValueError(f"EnvConfig.perception is {self.perception!r}; it must be {' or '.join(models)}")
@@ -199,6 +202,8 @@ class EnvConfig:
         object.__setattr__(self, "stops", tuple(self.stops))
 
     def _check_sensors(self) -> None:
+        check_type(self, "camera", CameraConfig, optional=True)
+        check_type(self, "sensors", SensorConfig)
         if not isinstance(self.cameras, Mapping):
             raise ValueError(
                 f"EnvConfig.cameras is a {type(self.cameras).__name__}; it must map names to CameraConfigs"
@@ -208,9 +213,9 @@ class EnvConfig:
                 raise ValueError(f"EnvConfig.cameras has the name {name!r}; it must be a lower-case word, such as left")
             if not isinstance(camera, CameraConfig):
                 raise ValueError(f"EnvConfig.cameras[{name!r}] is a {type(camera).__name__}; it must be a CameraConfig")
+        if "lidar" in self.cameras:
+            raise ValueError("EnvConfig.cameras has the name 'lidar', with which the fields of the lidar begin")
         object.__setattr__(self, "cameras", dict(self.cameras))
-        if not isinstance(self.sensors, SensorConfig):
-            raise ValueError(f"EnvConfig.sensors is a {type(self.sensors).__name__}; it must be a SensorConfig")
 
     @property
     def all_cameras(self) -> dict[str, CameraConfig]:

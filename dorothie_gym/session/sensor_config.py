@@ -9,9 +9,11 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from dorothie_gym.support.copying import shared
+
+Output = TypeVar("Output", bound=enum.StrEnum)
 
 Bound: TypeAlias = tuple[str, float, float, str]
 """Name of a field, its smallest and largest value, and its unit."""
@@ -22,9 +24,7 @@ def check_bounds(settings: object, bounds: Iterable[Bound]) -> None:
     for name, low, high, unit in bounds:
         value = getattr(settings, name)
         if isinstance(value, bool) or not (isinstance(value, float | int) and low <= value <= high):
-            raise ValueError(
-                f"{type(settings).__name__}.{name} is {value}; it must be in {low:g}..{high:g} {unit}".rstrip()
-            )
+            raise ValueError(f"{type(settings).__name__}.{name} is {value!r}; it must be in {low:g}..{high:g} {unit}")
 
 
 def check_whole(settings: object, bounds: Iterable[Bound]) -> None:
@@ -33,8 +33,42 @@ def check_whole(settings: object, bounds: Iterable[Bound]) -> None:
         value = getattr(settings, name)
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(
-                f"{type(settings).__name__}.{name} is {value}; it must be a whole number in {low:g}..{high:g} {unit}"
+                f"{type(settings).__name__}.{name} is {value!r}; it must be a whole number in {low:g}..{high:g} {unit}"
             )
+
+
+def check_type(settings: object, name: str, kind: type, *, optional: bool = False) -> None:
+    """Raises `ValueError` unless a field is of a class, or None where that is allowed; names it."""
+    value = getattr(settings, name)
+    if not (isinstance(value, kind) or (optional and value is None)):
+        wanted = f"{kind.__name__} or None" if optional else kind.__name__
+        raise ValueError(f"{type(settings).__name__}.{name} is a {type(value).__name__}; it must be a {wanted}")
+
+
+def check_flags(settings: object, names: Iterable[str]) -> None:
+    """Raises `ValueError` for the first field that is neither True nor False; names it."""
+    for name in names:
+        value = getattr(settings, name)
+        if not isinstance(value, bool):
+            raise ValueError(f"{type(settings).__name__}.{name} is {value!r}; it must be True or False")
+
+
+def checked_outputs(settings: object, outputs: object, kind: type[Output]) -> tuple[Output, ...]:
+    """Returns outputs, given as members of an enumeration or as their values, as members.
+
+    Raises:
+        ValueError: they are no tuple, or empty, or one of them is unknown or named twice; names the field.
+    """
+    name = f"{type(settings).__name__}.outputs"
+    if not isinstance(outputs, tuple):
+        raise ValueError(f"{name} is a {type(outputs).__name__}; it must be a tuple of {kind.__name__}")
+    known = [output.value for output in kind]
+    for output in outputs:
+        if output not in known:
+            raise ValueError(f"{name} contains {output!r}; it must be of {', '.join(known)}")
+    if not outputs or len(set(outputs)) < len(outputs):
+        raise ValueError(f"{name} is {outputs}; it must name at least one output, each once")
+    return tuple(kind(output) for output in outputs)
 
 
 @shared
@@ -133,21 +167,8 @@ class LidarConfig:
             raise ValueError(
                 f"LidarConfig.lower_fov is {self.lower_fov}; it must be below upper_fov, which is {self.upper_fov}"
             )
-        if not isinstance(self.mount, SensorMount):
-            raise ValueError(f"LidarConfig.mount is a {type(self.mount).__name__}; it must be a SensorMount")
-        check_outputs("LidarConfig", self.outputs, LidarOutput)
-
-
-def check_outputs(name: str, outputs: object, kind: type[enum.StrEnum]) -> None:
-    """Raises `ValueError` unless `outputs` is a tuple of different members of an enumeration; names the field."""
-    if not isinstance(outputs, tuple):
-        raise ValueError(f"{name}.outputs is a {type(outputs).__name__}; it must be a tuple of {kind.__name__}")
-    known = [output.value for output in kind]
-    for output in outputs:
-        if output not in known:
-            raise ValueError(f"{name}.outputs contains {output!r}; it must be of {', '.join(known)}")
-    if not outputs or len(set(outputs)) < len(outputs):
-        raise ValueError(f"{name}.outputs is {outputs}; it must name at least one output, each once")
+        check_type(self, "mount", SensorMount)
+        object.__setattr__(self, "outputs", checked_outputs(self, self.outputs, LidarOutput))
 
 
 @shared
@@ -184,8 +205,7 @@ class RadarConfig:
                 ("vertical_fov", 0.0, 120.0, "degrees"),
             ),
         )
-        if not isinstance(self.mount, SensorMount):
-            raise ValueError(f"RadarConfig.mount is a {type(self.mount).__name__}; it must be a SensorMount")
+        check_type(self, "mount", SensorMount)
 
 
 @shared
@@ -213,15 +233,9 @@ class SensorConfig:
     collision: bool = False
 
     def __post_init__(self) -> None:
-        for name, kind in (("lidar", LidarConfig), ("radar", RadarConfig)):
-            value = getattr(self, name)
-            if value is not None and not isinstance(value, kind):
-                raise ValueError(
-                    f"SensorConfig.{name} is a {type(value).__name__}; it must be a {kind.__name__} or None"
-                )
-        for name in ("imu", "gnss", "lane_invasion", "collision"):
-            if not isinstance(getattr(self, name), bool):
-                raise ValueError(f"SensorConfig.{name} is {getattr(self, name)!r}; it must be True or False")
+        check_type(self, "lidar", LidarConfig, optional=True)
+        check_type(self, "radar", RadarConfig, optional=True)
+        check_flags(self, ("imu", "gnss", "lane_invasion", "collision"))
 
     @property
     def scans(self) -> bool:

@@ -39,7 +39,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     def compile_batch(progress: Callable[[str, int, int], None]) -> None:
         progress(BATCH_NAME, 1, 1)
 
-    def compile_camera(progress: Callable[[str, int, int], None]) -> None:
+    def compile_camera(progress: Callable[[str, int, int], None], *, rare: bool) -> None:
         progress(CAMERA_NAME, 1, 1)
 
     monkeypatch.setattr(compiling, "warm_up", compile_two)

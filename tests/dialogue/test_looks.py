@@ -51,6 +51,7 @@ def test_clothes_are_read(colour: str) -> None:
         ("a grey two-story building with a tree in front", Appearance(facade="gray", storeys=2, garden="tree")),
         ("it has three floors and a white fence", Appearance(storeys=3, garden="fence")),
         ("the one with the hedge", Appearance(garden="hedge")),
+        ("there are flowers in the front", Appearance(garden="flowers")),
         ("i bought her some flowers", Appearance()),
         ("turn left at the red light", Appearance()),
         ("the second house on the left", Appearance()),

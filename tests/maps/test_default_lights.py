@@ -152,6 +152,7 @@ def test_the_report_and_the_command_state_the_lights(file: Path) -> None:
     [
         (f"midtown{OPTION}", "OpenDRIVE"),
         (f"generated:3{OPTION}", "OpenDRIVE"),
+        (f"midtwon{OPTION}", r"give the file of a map \(\.xodr\)"),
         (f"mill.yaml{OPTION}", "name its junctions"),
         ("town.xodr,lights=some", "known are map, default"),
     ],

@@ -15,6 +15,7 @@ from gymnasium.utils.env_checker import check_env
 from dorothie_gym import DuoWizardEnv, EnvConfig
 from dorothie_gym.ontology import Sensor
 from dorothie_gym.session.config import CameraConfig, CameraOutput
+from tests.session.random_play import played
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)  # of PettingZoo's own environments
@@ -23,18 +24,6 @@ with warnings.catch_warnings():
 CAMERA = CameraConfig(width=96, height=64)
 ALL = replace(CAMERA, outputs=tuple(CameraOutput))
 CONFIG = EnvConfig(camera=CAMERA)
-
-
-def played(env: DuoWizardEnv, decisions: int = 4, seed: int = 3) -> dict[str, Any]:
-    """Returns the observations after some decisions without actions."""
-    observations: dict[str, Any]
-    observations, _ = env.reset(seed=seed)
-    for agent in env.possible_agents:
-        env.action_space(agent).seed(seed)
-    for _ in range(decisions):
-        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-        observations, *_ = env.step(actions)
-    return observations
 
 
 def test_participant_and_co_wizard_observe_rgb_and_the_ad_wizard_does_not() -> None:
@@ -114,7 +103,7 @@ def test_a_camera_that_is_none_is_refused_with_its_type() -> None:
     ("settings", "message"),
     [
         ({"width": 3}, r"CameraConfig\.width is 3; it must be a whole number in 8\.\.4096 pixels"),
-        ({"field_of_view": "wide"}, r"CameraConfig\.field_of_view is wide; it must be in 10\.\.150 degrees"),
+        ({"field_of_view": "wide"}, r"CameraConfig\.field_of_view is 'wide'; it must be in 10\.\.150 degrees"),
         ({"mount": (1, 2)}, r"CameraConfig\.mount is a tuple; it must be a CameraMount"),
         ({"antialiasing": 3}, r"CameraConfig\.antialiasing is 3; it must be True or False"),
         ({"outputs": "rgb"}, r"CameraConfig\.outputs is a str; it must be a tuple"),

@@ -24,8 +24,10 @@ from dorothie_gym import (
     LidarConfig,
     LidarOutput,
     RadarConfig,
+    Role,
     SensorConfig,
     SensorMount,
+    make_policy,
 )
 from dorothie_gym.maps.model import LANE_CHANGES
 from dorothie_gym.ontology import ObjectClass, Sensor
@@ -35,6 +37,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.sensing.inertial import ACCELEROMETER_NOISE, COMPASS_NOISE, EARTH_RADIUS, GRAVITY
 from dorothie_gym.support.compilation.records import plain
+from tests.session.random_play import played
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)  # of PettingZoo's own environments
@@ -57,18 +60,6 @@ MEASURED = {
     "lane_invasion", "collision",
 }  # fmt: skip
 PICTURED = {"camera", "optical_flow", "left_camera", "rear_camera", "rear_depth"}
-
-
-def played(env: DuoWizardEnv, decisions: int = 4, seed: int = 3) -> dict[str, Any]:
-    """Returns the observations after some decisions with random actions."""
-    observations: dict[str, Any]
-    observations, _ = env.reset(seed=seed)
-    for agent in env.possible_agents:
-        env.action_space(agent).seed(seed)
-    for _ in range(decisions):
-        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-        observations, *_ = env.step(actions)
-    return observations
 
 
 def test_each_role_observes_its_cameras_and_sensors() -> None:
@@ -176,6 +167,7 @@ def test_settings_are_read_from_mappings() -> None:
     [
         ({"cameras": (SMALL,)}, r"EnvConfig\.cameras is a tuple; it must map names to "),
         ({"cameras": {"Left side": SMALL}}, r"has the name 'Left side'; it must be a lower-case word"),
+        ({"cameras": {"lidar": SMALL}}, r"has the name 'lidar', with which the fields of the lidar begin"),
         ({"cameras": {"left": 3}}, r"EnvConfig\.cameras\['left'\] is a int; it must be a CameraConfig"),
         ({"sensors": LIDAR}, r"EnvConfig\.sensors is a LidarConfig; it must be a SensorConfig"),
     ],
@@ -192,7 +184,7 @@ def test_settings_that_no_car_has_are_refused(settings: dict[str, Any], message:
         (LidarConfig, {"range": 900.0}, r"LidarConfig\.range is 900\.0; it must be in 1\.\.250 m"),
         (LidarConfig, {"upper_fov": -40.0}, r"LidarConfig\.lower_fov is -30\.0; it must be below upper_fov"),
         (LidarConfig, {"outputs": ("smell",)}, r"LidarConfig\.outputs contains 'smell'; it must be of points"),
-        (RadarConfig, {"horizontal_fov": "wide"}, r"RadarConfig\.horizontal_fov is wide"),
+        (RadarConfig, {"horizontal_fov": "wide"}, r"RadarConfig\.horizontal_fov is 'wide'"),
         (SensorConfig, {"imu": 1}, r"SensorConfig\.imu is 1; it must be True or False"),
         (SensorConfig, {"lidar": SMALL}, r"SensorConfig\.lidar is a CameraConfig; it must be a LidarConfig or None"),
         (SensorMount, {"yaw": 270.0}, r"SensorMount\.yaw is 270\.0; it must be in -180\.\.180 degrees"),
@@ -204,13 +196,20 @@ def test_settings_that_no_sensor_has_are_refused(kind: type, settings: dict[str,
         kind(**settings)
 
 
+def test_outputs_may_be_given_by_their_names() -> None:
+    camera = replace(SMALL, outputs=("rgb", "depth"))  # type: ignore[arg-type]
+    lidar = replace(LIDAR, outputs=("points", "semantic"))  # type: ignore[arg-type]
+    env = DuoWizardEnv("brookside", config=EnvConfig(camera=camera, sensors=SensorConfig(lidar=lidar)))
+    seen = env.reset(seed=3)[0]["co_wizard"]
+    assert {"camera", "depth", "lidar", "lidar_semantic"} <= set(seen)
+    assert env.observation_space("co_wizard").contains(seen)
+
+
 # --- Sensors without pictures -----------------------------------------------------------------------------------------
 
 
 def scripted(config: EnvConfig, seed: int, decisions: int) -> tuple[DuoWizardEnv, list[ObservationMapping]]:
     """Returns an environment and the Co-Wizard's observations of a session of scripted roles."""
-    from dorothie_gym import Role, make_policy
-
     env = DuoWizardEnv("midtown", config=config)
     observations, _ = env.reset(seed=seed)
     policies = {agent: make_policy("scripted", Role(agent), env.limits) for agent in env.agents}

@@ -33,7 +33,7 @@ def copy_bodies(
     box: Array,
     target: Mesh,
 ) -> int:
-    """Writes the triangles of bodies that may be seen; returns their number, or the room plus one if there are more.
+    """Writes the triangles of bodies that may be seen; returns their number, or more than the room.
 
     Triangles that are seen from behind are left out.
 
@@ -47,18 +47,29 @@ def copy_bodies(
         box: (2, 3) scratch space.
         target: receives the triangles.
     """
-    count, room = 0, target.corners.shape[0]
+    count = 0
     for k in range(len(bodies)):
         body = bodies[k]
         surround(body, boxes[body.model], box)
         if is_in_view(view, box[0], box[1]) and not is_hidden(view, tiles, box[0], box[1]):
-            first, last = ranges[body.model, 0], ranges[body.model, 1]
-            if count + last - first <= room:
-                for row in range(first, last):
-                    if copy_triangle(view, bank, row, body, target, count):
-                        count += 1
-            else:
-                count += last - first
+            count = copy_body(view, bank, ranges, body, target, count)
+    return count
+
+
+@inlined
+def copy_body(
+    view: View, bank: Mesh, ranges: NDArray[np.int32], body: PlacementRecord, target: Mesh, count: int
+) -> int:
+    """Writes the triangles of a body that face the view behind the first `count`; returns the new count.
+
+    Without room for the whole body nothing is written, and all of its triangles count.
+    """
+    first, last = ranges[body.model, 0], ranges[body.model, 1]
+    if count + last - first > target.corners.shape[0]:
+        return count + last - first
+    for row in range(first, last):
+        if copy_triangle(view, bank, row, body, target, count):
+            count += 1
     return count
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.pictures.camera.bodies import copy_triangle, surround
+from dorothie_gym.pictures.camera.bodies import copy_body, surround
 from dorothie_gym.pictures.camera.ground.lookup import GroundArrays, material_at
 from dorothie_gym.pictures.camera.labels import mesh_of, row_in
 from dorothie_gym.pictures.camera.mesh import PADDING, Mesh, Surface
@@ -147,18 +147,12 @@ def _copy_bodies(
     bodies: RecordArray[PlacementRecord], box: Array, target: Mesh,
 ) -> int:  # fmt: skip
     """Writes the triangles of bodies within a distance; returns their number, or more than the room."""
-    count, room = 0, target.corners.shape[0]
+    count = 0
     for k in range(len(bodies)):
         body = bodies[k]
         surround(body, boxes[body.model], box)
         if _distance(view.origin, box[0], box[1]) <= reach:
-            first, last = ranges[body.model, 0], ranges[body.model, 1]
-            if count + last - first <= room:
-                for row in range(first, last):
-                    if copy_triangle(view, bank, row, body, target, count):
-                        count += 1
-            else:
-                count += last - first
+            count = copy_body(view, bank, ranges, body, target, count)
     return count
 
 

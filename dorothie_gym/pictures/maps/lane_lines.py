@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.pictures.maps.borders import BorderKind, find_borders
 from dorothie_gym.pictures.maps.shapes import TownSamples
+from dorothie_gym.session.car_sensors import LaneMarking
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.model import Array
     from dorothie_gym.maps.town import Town
 
-_ORDER: Final = (BorderKind.LANE, BorderKind.CENTRE, BorderKind.MEDIAN, BorderKind.EDGE)
-"""Kinds of lines, in the order of `session.car_sensors.LaneMarking`."""
+_ORDER: Final = tuple(BorderKind[marking.name] for marking in LaneMarking)
+"""Kinds of lines, in the order of `LaneMarking`."""
 
 _NEAR = 3.0  # [m] around the path of the wheels in which lines are looked for
 

@@ -165,8 +165,7 @@ class AerialView:
         for mark in scene.exceptions:
             found.append(_square(canvas.pixel((mark.x, mark.y)), _MARK))
         for pin in scene.landmarks:
-            tip, (x, y) = canvas.pixel((pin.x, pin.y)), _head(canvas, pin).tolist()
-            found += [_square(tip, 2.0), _square(np.array([x, y]), _HEAD)]
+            found += [_square(canvas.pixel((pin.x, pin.y)), 2.0), _square(_head(canvas, pin), _HEAD)]
         return found
 
     @property
@@ -232,8 +231,7 @@ class AerialView:
         draw_car(canvas, at, car.heading, car.length, car.width)
 
     def _draw_pins(self, canvas: Canvas, scene: Scene, follow: bool, names: list[Box]) -> None:
-        taken: list[Box] = [self._scale_bar]
-        taken.append(_square(canvas.pixel((scene.car.x, scene.car.y)), _CAR))
+        taken: list[Box] = [self._scale_bar, _square(canvas.pixel((scene.car.x, scene.car.y)), _CAR)]
         seen: list[Pin] = []
         away: list[Pin] = []
         for pin in scene.landmarks:
@@ -242,8 +240,7 @@ class AerialView:
             colour = palette.STATE[pin.state]
             done = pin.state == "complete"
             draw_pin(canvas, np.array([pin.x, pin.y]), np.array(pin.waypoint), colour, pin.hidden and not done, done)
-            x, y = _head(canvas, pin).tolist()
-            taken.append(_square(np.array([x, y]), _HEAD))
+            taken.append(_square(_head(canvas, pin), _HEAD))
         for pin in seen:
             self._write_name(canvas, pin, taken, names)
         if follow:

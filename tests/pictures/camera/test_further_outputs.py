@@ -24,19 +24,6 @@ CONFIG = CameraConfig(width=160, height=120, outputs=tuple(CameraOutput), antial
 FLAT_CLASSES = [ObjectClass.ROAD.value, ObjectClass.ROAD_LINE.value, ObjectClass.SIDE_WALK.value]
 
 
-@pytest.fixture(scope="module")
-def engine() -> SessionEngine:
-    engine = SessionEngine("brookside", config=EnvConfig(world=WorldConfig(vehicles=40, pedestrians=30)))
-    engine.reset(seed=3)
-    engine.session.world.step(150)
-    return engine
-
-
-@pytest.fixture(scope="module")
-def scene(engine: SessionEngine) -> SessionScene:
-    return scene_of(engine.town, engine.scenario)
-
-
 def points_of(frame: CameraFrame) -> NDArray[np.float64]:
     """Returns the positions (h, w, 3) [m] of the surfaces of a picture."""
     assert frame.depth is not None

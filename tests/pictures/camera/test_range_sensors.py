@@ -12,12 +12,11 @@ from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.pictures.camera.pose import CameraPose, axes_of, pose_on_car
 from dorothie_gym.pictures.camera.range_sensors import CarState, Lidar, Radar, RangeSensor
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
-from dorothie_gym.pictures.camera.session_pictures import car_state, scene_of
+from dorothie_gym.pictures.camera.session_pictures import car_state
 from dorothie_gym.pictures.camera.town_scene import SessionScene
-from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
+from dorothie_gym.session.config import CameraConfig, CameraOutput
 from dorothie_gym.session.sensor_config import LidarConfig, RadarConfig, SensorMount
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.sensing.visibility import CLARITY
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World
@@ -27,19 +26,6 @@ from dorothie_gym.support.compilation.records import plain
 ONE_RAY = CameraConfig(
     width=9, height=9, field_of_view=10.0, outputs=(CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE)
 )
-
-
-@pytest.fixture(scope="module")
-def engine() -> SessionEngine:
-    engine = SessionEngine("brookside", config=EnvConfig(world=WorldConfig(vehicles=30, pedestrians=30)))
-    engine.reset(seed=3)
-    engine.session.world.step(150)
-    return engine
-
-
-@pytest.fixture(scope="module")
-def scene(engine: SessionEngine) -> SessionScene:
-    return scene_of(engine.town, engine.scenario)
 
 
 def on_lane(world: World, lane: int, speed: float = 0.0) -> CarState:

@@ -114,9 +114,16 @@ def test_each_lane_sees_its_own_light_from_its_stop_line(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*town_names(), "Town02", *(f"generated:{seed}" for seed in range(40, 60))])
+@pytest.mark.parametrize("name", [*town_names(), *(f"generated:{seed}" for seed in range(40, 60))])
 def test_lanes_of_many_towns_see_their_own_lights(name: str) -> None:
-    stage = stage_of(name if name in town_names() or ":" in name else str(shared_map(name)))
+    assert list(lanes_that_see_too_little(stage_of(name))) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "lights"), [("Town01", ""), ("Town02", ""), ("Town05", ",lights=default")])
+def test_lanes_of_imported_towns_see_their_own_lights(name: str, lights: str) -> None:
+    stage = stage_of(f"{shared_map(name)}{lights}")
+    assert len(stage.signals) > 20
     assert list(lanes_that_see_too_little(stage)) == []
 
 

@@ -88,12 +88,13 @@ ADULTS = 24
 """Number of adults to choose from."""
 
 _CHILDREN = 6
+_CHILD_OUTFITS = Outfit.TROUSERS, Outfit.SKIRT, Outfit.BACKPACK
 
 
 def _look(k: int) -> Look:
     child = k >= ADULTS
     return Look(
-        Outfit((Outfit.TROUSERS, Outfit.SKIRT, Outfit.BACKPACK)[k % 3]) if child else Outfit(k % len(Outfit)),
+        _CHILD_OUTFITS[k % len(_CHILD_OUTFITS)] if child else Outfit(k % len(Outfit)),
         _TOPS[7 * k % len(_TOPS)],
         _TROUSERS[(k + k // 5) % len(_TROUSERS)],
         SKINS[(k * 3 + k // 4) % len(SKINS)],
@@ -104,7 +105,7 @@ def _look(k: int) -> Look:
 
 
 LOOKS = tuple(map(_look, range(ADULTS + _CHILDREN)))
-"""Persons to choose from, adults first; every fifth is a child."""
+"""Persons to choose from: the adults, then the children, which are a fifth of all."""
 
 
 def person_form(outfit: Outfit, pose: int, *, coarse: bool = False, child: bool = False) -> Mesh:
