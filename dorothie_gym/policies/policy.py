@@ -10,7 +10,7 @@ Last of the five files that explain the package. docs/architecture.md continues 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
 
@@ -134,6 +134,25 @@ class TypedPolicy(Policy[State]):
     def is_direct(self) -> bool:
         """Whether `step` is that of this class, so that `act` can be called in its place."""
         return type(self).step is TypedPolicy.step and "step" not in vars(self)
+
+
+class BatchPolicy(TypedPolicy[State]):
+    """Policy that takes the decisions of several sessions together, such as a network with one forward pass for all."""
+
+    def act(self, observation: ObservationMapping, state: State) -> tuple[RoleAction, State]:
+        """Chooses a typed action, see `TypedPolicy.act`."""
+        return self.act_all([observation], [state])[0]
+
+    @abstractmethod
+    def act_all(
+        self, observations: Sequence[ObservationMapping], states: Sequence[State]
+    ) -> Sequence[tuple[RoleAction, State]]:
+        """Chooses a typed action for each of several sessions, at least one; each result is that of the session alone.
+
+        Args:
+            observations: observation of each session, as for `act`.
+            states: state of each session.
+        """
 
 
 AnyPolicy: TypeAlias = Policy[Any]
@@ -264,10 +283,22 @@ class Players:
             session: session in progress.
             states: state of each policy, which is replaced by the next one.
         """
+        return self.choose(self.inputs(session), states)
+
+    def inputs(self, session: ObservedSession) -> dict[Role, ObservationMapping]:
+        """Returns the inputs of the policies at the current decision, valid until the next one."""
         inputs = _inputs(session, self._direct, session.observations.views(self._observers))
-        if self._others:
-            inputs |= policy_inputs(session, self._others)
+        return inputs | policy_inputs(session, self._others) if self._others else inputs
+
+    def choose(
+        self,
+        inputs: Mapping[Role, ObservationMapping],
+        states: MutableMapping[Role, Any],
+        without: Collection[Role] = (),
+    ) -> dict[str, AnyAction]:
+        """Returns the actions of the policies, but those of some roles, by agent; replaces their states."""
         actions: dict[str, AnyAction] = {}
         for role, agent, choose in self._steps:
-            actions[agent], states[role] = checked_decision(role, choose(inputs[role], states[role]))
+            if role not in without:
+                actions[agent], states[role] = checked_decision(role, choose(inputs[role], states[role]))
         return actions

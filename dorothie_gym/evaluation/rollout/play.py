@@ -1,28 +1,29 @@
-"""Playing of one session by policies."""
+"""Playing of sessions by policies: one, or several at the same time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from dorothie_gym.evaluation.rollout.folder import noticing_deletion
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.batch_players import BatchPlayers
 from dorothie_gym.policies.policy import AnyPolicy, Players, policy_seed
 from dorothie_gym.session.recorder import SessionRecorder
 from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.writer import SessionWriter
+from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import encoded
 from dorothie_gym.support.files import write_atomically
 
 if TYPE_CHECKING:
     from dorothie_gym.session.recording.header import SessionHeader
-    from dorothie_gym.session.scenario import Scenario
     from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.session_log import SessionSummary
-    from dorothie_gym.session.spaces.actions import ActionMapping
+    from dorothie_gym.session.spaces.actions import ActionMapping, AnyAction
 
 PERSONAS: Final = "personas"
 """Field of a header with the personas of the scripted speakers, by role; see `dorothie_gym.policies.persona`."""
@@ -83,43 +84,122 @@ def play_session(
         OutputFolderError: the folder was deleted during the session.
         OSError: the folder cannot be written.
     """
-    missing = [role for role in AGENT_ROLES if role not in policies]
-    if missing:
-        raise ValueError(f"policies has none for {', '.join(missing)}; each of the three roles needs one")
-    engine = host.engine
-    if scenario is None:
-        host.reset(seed=seed)
-    else:
-        engine.reset(scenario=scenario)
-    players = Players({role: policies[role] for role in AGENT_ROLES})
-    states = {role: policies[role].initial_state(policy_seed(seed, role, trial), engine.town) for role in AGENT_ROLES}
-    engine.session.dialogue.give_voices(pitches_of(personas_of(policies, states)))
-    with ExitStack() as stack:
-        writer = None
-        if folder is not None:
-            header = with_personas(engine.session_header(), policies, states)
-            writer = stack.enter_context(SessionWriter(folder, header, create=create))
-            stack.enter_context(noticing_deletion(writer.folder))
-        recorder = None if writer is None else SessionRecorder(engine, writer)
+    cast = SessionCast(
+        host=host, policies=policies, seed=seed, folder=folder, create=create, scenario=scenario, trial=trial
+    )
+    with _Play.begin(cast) as play:
         if on_step is not None:
-            on_step(engine)
-        while not engine.over:
-            actions = players.decide(engine, states)
-            if host is engine:
-                engine.step(actions)
-            else:
-                host.step({agent: encoded(action, engine.limits) for agent, action in actions.items()})
-            if recorder is not None:
-                recorder.record(actions)
+            on_step(play.engine)
+        players = Players(play.policies)
+        while not play.engine.over:
+            play.step(players.decide(play.engine, play.states))
             if on_step is not None:
-                on_step(engine)
-        usage = usage_of(policies, states)
-        if writer is not None:
+                on_step(play.engine)
+        return play.finish()
+
+
+def play_together(casts: Sequence[SessionCast]) -> list[SessionSummary]:
+    """Plays several sessions at the same time; each is the one that `play_session` plays, to the bit.
+
+    Where several sessions share a `BatchPolicy`, it decides once for all of them.
+
+    Args:
+        casts: the sessions, each with a host of its own.
+
+    Returns:
+        The summary of each session, as of `play_session`.
+
+    Raises:
+        ValueError: a role has no policy.
+        SessionError: a folder holds a session already.
+        OutputFolderError: a folder was deleted during the session.
+        OSError: a folder cannot be written.
+    """
+    with ExitStack() as stack:
+        plays = [stack.enter_context(_Play.begin(cast)) for cast in casts]
+        players = BatchPlayers([play.policies for play in plays])
+        playing = {number: (play.engine, play.states) for number, play in enumerate(plays)}
+        summaries: dict[int, SessionSummary] = {}
+        while playing:
+            for number, actions in players.decide(playing).items():
+                plays[number].step(actions)
+                if plays[number].engine.over:
+                    summaries[number] = plays[number].finish()
+                    del playing[number]
+    return [summaries[number] for number in range(len(plays))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionCast:
+    """Session to be played, and the policies that play it; see `play_session` for the fields."""
+
+    host: SessionHost
+    policies: Mapping[Role, AnyPolicy]
+    seed: int
+    folder: Path | str | None = None
+    create: bool = True
+    scenario: Scenario | None = None
+    trial: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Play:
+    """Session in progress, with the states of its policies and its recorder."""
+
+    host: SessionHost
+    policies: Mapping[Role, AnyPolicy]
+    states: dict[Role, Any]
+    writer: SessionWriter | None
+    recorder: SessionRecorder | None
+
+    @classmethod
+    @contextmanager
+    def begin(cls, cast: SessionCast) -> Iterator[_Play]:
+        """Begins a session; the end of the block closes its files."""
+        missing = [role for role in AGENT_ROLES if role not in cast.policies]
+        if missing:
+            raise ValueError(f"policies has none for {', '.join(missing)}; each of the three roles needs one")
+        engine = cast.host.engine
+        if cast.scenario is None:
+            cast.host.reset(seed=cast.seed)
+        else:
+            engine.reset(scenario=cast.scenario)
+        policies = {role: cast.policies[role] for role in AGENT_ROLES}
+        states = {
+            role: policy.initial_state(policy_seed(cast.seed, role, cast.trial), engine.town)
+            for role, policy in policies.items()
+        }
+        engine.session.dialogue.give_voices(pitches_of(personas_of(policies, states)))
+        if cast.folder is None:
+            yield cls(host=cast.host, policies=policies, states=states, writer=None, recorder=None)
+            return
+        header = with_personas(engine.session_header(), policies, states)
+        with SessionWriter(cast.folder, header, create=cast.create) as writer, noticing_deletion(writer.folder):
+            recorder = SessionRecorder(engine, writer)
+            yield cls(host=cast.host, policies=policies, states=states, writer=writer, recorder=recorder)
+
+    @property
+    def engine(self) -> SessionEngine:
+        """Engine of the session."""
+        return self.host.engine
+
+    def step(self, actions: Mapping[str, AnyAction]) -> None:
+        """Plays and records one decision."""
+        if self.host is self.engine:
+            self.engine.step(actions)
+        else:
+            self.host.step({agent: encoded(action, self.engine.limits) for agent, action in actions.items()})
+        if self.recorder is not None:
+            self.recorder.record(actions)
+
+    def finish(self) -> SessionSummary:
+        """Finishes the record; returns the summary, with the costs of the policies if there are any."""
+        usage, summary = usage_of(self.policies, self.states), self.engine.summary()
+        if self.writer is not None:
             if usage:
-                write_atomically(writer.folder / USAGE_FILE, to_page(usage))
-            writer.finish(engine.summary())
-    summary = engine.summary()
-    return {**summary, "usage": usage} if usage else summary
+                write_atomically(self.writer.folder / USAGE_FILE, to_page(usage))
+            self.writer.finish(summary)
+        return {**summary, "usage": usage} if usage else summary
 
 
 def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> dict[str, Mapping[str, object]]:

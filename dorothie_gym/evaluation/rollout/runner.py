@@ -7,7 +7,9 @@ take from each session. Replay checks write no sessions and use the pool below t
 from __future__ import annotations
 
 import logging
+import shutil
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
@@ -18,16 +20,18 @@ from typing import TYPE_CHECKING, Final, Generic, TypeVar
 from dorothie_gym.errors import EndpointError, InputFileError, OutputFolderError, ProcessError, SessionError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
-from dorothie_gym.evaluation.rollout.play import play_session
+from dorothie_gym.evaluation.rollout.play import SessionCast, play_together
 from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.evaluation.rollout.reference_drives import reference_of
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, to_page
 from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.scenario import Scenario, draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, read_json
 
@@ -40,12 +44,15 @@ COST_FILE: Final = "cost.json"
 Plan = TypeVar("Plan", bound=PlannedSession)
 Result = TypeVar("Result")
 
+AT_ONCE: Final = 32
+"""Largest number of sessions of trained policies that are played at the same time."""
+
 _LOG = logging.getLogger(__name__)
 
 
 @dataclass
 class SessionMaker:
-    """Plays planned sessions one after the other; each appears in its folder when it is finished.
+    """Plays planned sessions; they appear in their folders when they are finished.
 
     Attributes:
         root: folder of all sessions, locked by `locked_folder`.
@@ -58,39 +65,88 @@ class SessionMaker:
     config: EnvConfig
     cast: Mapping[Role, Player]
     references: bool = False
-    _engines: dict[str, SessionEngine] = field(default_factory=dict)
+    _engines: dict[str, list[SessionEngine]] = field(default_factory=dict)
+    _trained: dict[tuple[str, Role, SpaceLimits], AnyPolicy] = field(default_factory=dict)
     _scenarios: dict[tuple[str, int], Scenario] = field(default_factory=dict)
 
-    def __call__(self, plan: PlannedSession) -> tuple[Session, Path, bool]:
-        """Plays a session unless its folder is finished; returns the session, its folder, and whether it is new.
+    def __call__(self, plans: Sequence[PlannedSession]) -> list[bool]:
+        """Plays sessions at the same time, unless their folders are finished.
+
+        Args:
+            plans: the sessions.
+
+        Returns:
+            Whether each session is new.
 
         Raises:
-            SessionError: the folder contains other files.
-            OSError: the folder cannot be written, or was deleted.
+            SessionError: a folder contains other files.
+            OSError: a folder cannot be written, or was deleted.
             ValueError: a policy cannot be made, or its action is malformed; policies may raise other errors.
         """
+        new = [plan for plan in plans if not self._is_finished(plan)]
+        seats: Counter[str] = Counter()
+        casts = []
+        for plan in new:
+            casts.append(self._cast(plan, self._engine(plan.town, seats[plan.town])))
+            seats[plan.town] += 1
+        try:
+            play_together(casts)
+        except Exception:
+            for plan in new:
+                shutil.rmtree(self._part(plan), ignore_errors=True)  # a session may be played again by itself
+            raise
+        for plan in new:
+            self._publish(plan)
+        return [plan in new for plan in plans]
+
+    def _is_finished(self, plan: PlannedSession) -> bool:
+        """Returns whether a session is in its folder; raises `SessionError` if another one or other files are."""
         folder = self.root / plan.path
         if session_state(folder) is SessionState.FINISHED:
-            session = Session.load(folder)
-            there = session.header.town
-            same_town = there == plan.town or there == self.engine(plan.town).town_of(plan.seed).name
-            if session.header.seed != plan.seed or not same_town:
+            header = Session.load(folder).header
+            same_town = header.town in (plan.town, self.engine(plan.town).town_of(plan.seed).name)
+            if header.seed != plan.seed or not same_town:
                 raise SessionError(f"{folder}: is another session than belongs here; remove it")
-            return session, folder, False
+            return True
         if folder.is_dir() and any(folder.iterdir()):
             raise SessionError(f"{folder}: is in the way, and no finished session; remove it")
-        part = self.root / PARTS_FOLDER / folder.name
-        engine = self.engine(plan.town)
-        cast = {**self.cast, **plan.partners}
-        policies = {role: cast[role].make(role, engine.limits) for role in AGENT_ROLES}
-        part.mkdir(exist_ok=True)  # without its parents: a series that was deleted during the run is not recreated
-        scenario = self._scenario(plan, engine) if self.references else None
-        play_session(engine, policies, seed=plan.seed, folder=part, create=False, scenario=scenario, trial=plan.trial)
-        session = Session.load(part)
+        return False
+
+    def _part(self, plan: PlannedSession) -> Path:
+        """Returns the folder of a session in progress."""
+        return self.root / PARTS_FOLDER / Path(plan.path).name
+
+    def _publish(self, plan: PlannedSession) -> None:
+        """Moves a finished session to its folder."""
         for parent in reversed(Path(plan.path).parents[:-1]):
             (self.root / parent).mkdir(exist_ok=True)
-        part.rename(folder)
-        return session, folder, True
+        self._part(plan).rename(self.root / plan.path)
+
+    def _cast(self, plan: PlannedSession, engine: SessionEngine) -> SessionCast:
+        """Returns a session to be played by an engine, with an empty folder."""
+        players = {**self.cast, **plan.partners}
+        policies = {role: self._policy(players[role], role, engine.limits) for role in AGENT_ROLES}
+        part = self._part(plan)
+        part.mkdir(exist_ok=True)  # without its parents: a series that was deleted during the run is not recreated
+        scenario = self._scenario(plan, engine) if self.references else None
+        return SessionCast(
+            host=engine,
+            policies=policies,
+            seed=plan.seed,
+            folder=part,
+            create=False,
+            scenario=scenario,
+            trial=plan.trial,
+        )
+
+    def _policy(self, player: Player, role: Role, limits: SpaceLimits) -> AnyPolicy:
+        """Returns the policy of a role; a trained one is loaded once for all sessions of a size of the spaces."""
+        if not player.trained:
+            return player.make(role, limits)
+        key = player.name, role, limits
+        if key not in self._trained:
+            self._trained[key] = player.make(role, limits)
+        return self._trained[key]
 
     def _scenario(self, plan: PlannedSession, engine: SessionEngine) -> Scenario:
         """Returns the scenario of a session with its reference, which is measured once for all trials."""
@@ -102,10 +158,15 @@ class SessionMaker:
         return self._scenarios[key]
 
     def engine(self, town: str) -> SessionEngine:
-        """Returns the engine of a town, which is created once."""
-        if town not in self._engines:
-            self._engines[town] = SessionEngine(town, config=self.config)
-        return self._engines[town]
+        """Returns an engine of a town, which is created once."""
+        return self._engine(town, 0)
+
+    def _engine(self, town: str, number: int) -> SessionEngine:
+        """Returns the engine of the session of a number among those of a town that are played at the same time."""
+        engines = self._engines.setdefault(town, [])
+        while len(engines) <= number:
+            engines.append(SessionEngine(town, config=self.config))
+        return engines[number]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +243,18 @@ class SessionJob(Generic[Result]):
     writes_cost: bool = False
     references: bool = False
 
+    def batches(self, plans: Sequence[Plan], workers: int) -> list[PlanBatch[Plan]]:
+        """Returns the sessions that are played at the same time: several where a trained policy decides for all.
+
+        Args:
+            plans: the sessions.
+            workers: number of processes among which they are divided.
+        """
+        players = [*self.cast.values(), *(player for plan in plans for player in plan.partners.values())]
+        most = AT_ONCE if any(player.trained for player in players) else 1
+        size = min(most, max(1, len(plans) // workers))
+        return [PlanBatch(plans[first : first + size]) for first in range(0, len(plans), size)]
+
 
 @contextmanager
 def run_sessions(
@@ -221,15 +294,17 @@ def run_sessions(
     begun, spent = time.perf_counter(), 0.0
     prepare = partial(_SessionTask, job=replace(job, cast=dict(job.cast)))  # constants are proxies: not picklable
 
+    def played() -> Iterator[SessionOutcome[Plan, Result]]:
+        if ray is not None:
+            yield from run_on_ray(prepare, plans, root, address=ray)
+            return
+        for outcomes in run_tasks(partial(_BatchTask, root, prepare), job.batches(plans, workers), workers=workers):
+            yield from outcomes
+
     def outcomes() -> Generator[SessionOutcome[Plan, Result], None, None]:
         nonlocal spent
         report(0, len(plans))
-        played = (
-            run_tasks(partial(prepare, root), plans, workers=workers)
-            if ray is None
-            else run_on_ray(prepare, plans, root, address=ray)
-        )
-        for number, outcome in enumerate(played, start=1):
+        for number, outcome in enumerate(played(), start=1):
             spent += outcome.cpu_seconds
             yield outcome
             report(number, len(plans))
@@ -252,17 +327,60 @@ class _SessionTask(Generic[Result]):
     def __call__(self, plan: Plan) -> SessionOutcome[Plan, Result]:
         begun = time.process_time()
         try:
-            session, folder, played = self._maker(plan)
-        except (SessionError, OutputFolderError, EndpointError, OSError):
-            raise  # errors of the folder or of the endpoint, not of the session
+            (played,) = self._maker([plan])
+        except _ERRORS_OF_RUN:
+            raise
         except Exception as error:
             if not self._job.keep_errors:
                 raise
             text = f"{type(error).__name__}: {error}"
             return SessionOutcome(plan=plan, error=text, played=True, cpu_seconds=time.process_time() - begun)
+        return self._outcome(plan, played, time.process_time() - begun)
+
+    def together(self, plans: Sequence[Plan]) -> list[SessionOutcome[Plan, Result]]:
+        """Plays sessions at the same time; where one of them fails, they are played one by one."""
+        begun = time.process_time()
+        try:
+            played = self._maker(plans)
+        except _ERRORS_OF_RUN:
+            raise
+        except Exception:
+            _LOG.debug("one of %d sessions failed; they are played one by one", len(plans), exc_info=True)
+            return [self(plan) for plan in plans]
+        seconds = (time.process_time() - begun) / len(plans)
+        return [self._outcome(plan, new, seconds) for plan, new in zip(plans, played, strict=True)]
+
+    def _outcome(self, plan: Plan, played: bool, seconds: float) -> SessionOutcome[Plan, Result]:
+        """Evaluates a finished session; playing it took a processor time [s], if it is new."""
+        begun, folder = time.process_time(), self._root / plan.path
+        session = Session.load(folder)
         found = PlayedSession(session=session, folder=folder, root=self._root, maker=self._maker, plan=plan)
         result = self._job.evaluate(found)
-        return SessionOutcome(plan=plan, result=result, played=played, cpu_seconds=time.process_time() - begun)
+        cost = seconds + time.process_time() - begun
+        return SessionOutcome(plan=plan, result=result, played=played, cpu_seconds=cost)
+
+
+class _BatchTask(Generic[Result]):
+    """Plays and evaluates batches of sessions in one process."""
+
+    def __init__(self, root: Path, prepare: Callable[[Path], _SessionTask[Result]]) -> None:
+        self._task = prepare(root)
+
+    def __call__(self, plans: PlanBatch[Plan]) -> list[SessionOutcome[Plan, Result]]:
+        return [self._task(plans[0])] if len(plans) == 1 else self._task.together(plans)
+
+
+class PlanBatch(tuple[Plan, ...]):
+    """Sessions that are played at the same time."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self))
+
+
+_ERRORS_OF_RUN: Final = (SessionError, OutputFolderError, EndpointError, OSError)
+"""Errors of the folder or of an endpoint, not of a session."""
 
 
 def _no_report(finished: int, planned: int) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.baselines.roles.co_wizard.answers import QUESTIONS
 from dorothie_gym.baselines.roles.co_wizard.features import (
@@ -13,11 +16,11 @@ from dorothie_gym.baselines.roles.co_wizard.features import (
     MAX_COMMANDS,
     MAX_PLACES,
     PLACE_SIZE,
-    STATE_SIZE,
-    car_vector,
-    command_vectors,
+    STATE,
+    car_values,
     place_vectors,
-    state_vector,
+    state_values,
+    write_commands,
 )
 from dorothie_gym.baselines.roles.co_wizard.memory import Update, WorkingMemory
 from dorothie_gym.baselines.roles.learned_role.decision import Attention, Inputs, Percept, just_heard, kept_utterances
@@ -27,11 +30,11 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import drive_options
+from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.policy import replace
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.dialogue_acts import DialogueMove
-    from dorothie_gym.policies.language_model.navigator import RouteStep
     from dorothie_gym.policies.speech import Remark
     from dorothie_gym.session.spaces.actions import Mental, Physical
     from dorothie_gym.session.spaces.observations import ObservationMapping
@@ -43,8 +46,35 @@ class CoWizardPercept(Percept[CoWizardView, WorkingMemory]):
 
     @cached_property
     def car(self) -> list[float]:
-        """State of the car as numbers."""
-        return car_vector(self.memory, self.view)
+        """Fields of the car."""
+        return car_values(self.memory, self.view)
+
+    @cached_property
+    def _own(self) -> dict[bool, Situation]:
+        return {}
+
+    def situation(self, memory: WorkingMemory, *, queued: bool) -> Situation:
+        """Returns the next step and the inputs of the network with a memory: that before listening, or after it."""
+        if memory is not self.memory:
+            return self._situation(memory, queued)
+        if queued not in self._own:
+            self._own[queued] = self._situation(memory, queued)
+        return self._own[queued]
+
+    def _situation(self, memory: WorkingMemory, queued: bool) -> Situation:
+        step = memory.navigator.step(memory.town, self.view, memory.clock.interval, 0.0)
+        values = [*self.car, *state_values(memory, self.view, step, self.utterances, queued=queued)]
+        state = np.zeros(STATE.size + self.talk.size, dtype=np.float32)
+        STATE.write(values, self.view.time, state[: STATE.size])
+        state[STATE.size :] = self.talk
+        return Situation(step, state)
+
+
+class Situation(NamedTuple):
+    """Next step on the route, and state and utterances as inputs (n,)."""
+
+    step: RouteStep | None
+    state: NDArray[np.float32]
 
 
 def perceive(
@@ -66,46 +96,33 @@ def perceive(
 
 def listening_inputs(percept: CoWizardPercept, *, queued: bool) -> Inputs:
     """Returns the inputs of the first step, which updates the memory."""
-    vectors = place_vectors(percept.memory, percept.view, percept.utterances) if percept.heard else []
-    rows = tuple(mark.row for mark in percept.view.landmarks if mark.row < MAX_PLACES) if percept.heard else ()
-    return _inputs(
-        percept, percept.memory, vectors, rows, (MAX_PLACES, PLACE_SIZE), queued, _step(percept, percept.memory)
-    )
+    state = percept.situation(percept.memory, queued=queued).state
+    if not percept.heard:
+        return Inputs(state=state, words=percept.words, options=_NO_PLACES)
+    vectors = place_vectors(percept.memory, percept.view, percept.utterances)
+    rows = tuple(mark.row for mark in percept.view.landmarks if mark.row < MAX_PLACES)
+    return Inputs.of(state, percept.words, vectors, rows, (MAX_PLACES, PLACE_SIZE))
+
+
+_NO_PLACES: Final = np.zeros((MAX_PLACES, PLACE_SIZE), dtype=np.float32)
+_NO_PLACES.flags.writeable = False
 
 
 def acting_inputs(
     percept: CoWizardPercept, memory: WorkingMemory, *, queued: bool
 ) -> tuple[Inputs, list[Physical | None]]:
     """Returns the inputs of the second step, which chooses a command and remarks, and the possible commands."""
-    step = _step(percept, memory)
+    step, state = percept.situation(memory, queued=queued)
     commands = list(drive_options(percept.view, memory.town).values())[:MAX_COMMANDS]
-    vectors = command_vectors(commands, memory, percept.view, step)
-    return _inputs(
-        percept, memory, vectors, tuple(range(len(commands))), (MAX_COMMANDS, COMMAND_SIZE), queued, step
-    ), commands
+    options = np.zeros((MAX_COMMANDS, COMMAND_SIZE), dtype=np.float32)
+    write_commands(commands, memory, percept.view, step, options)
+    return Inputs(state=state, words=percept.words, options=options, rows=tuple(range(len(commands)))), commands
 
 
 def blank_inputs() -> Inputs:
     """Returns inputs of the second step without content, with the command "none" as the only one."""
-    state = [0.0] * (STATE_SIZE + KEPT * UTTERANCE_SIZE)
+    state = np.zeros(STATE.size + KEPT * UTTERANCE_SIZE, dtype=np.float32)
     return Inputs.of(state, word_rows(""), (), (0,), (MAX_COMMANDS, COMMAND_SIZE))
-
-
-def _step(percept: CoWizardPercept, memory: WorkingMemory) -> RouteStep | None:
-    return memory.navigator.step(memory.town, percept.view, memory.clock.interval, 0.0)
-
-
-def _inputs(
-    percept: CoWizardPercept,
-    memory: WorkingMemory,
-    vectors: list[list[float]],
-    rows: tuple[int, ...],
-    shape: tuple[int, int],
-    queued: bool,
-    step: RouteStep | None,
-) -> Inputs:
-    state = [*percept.car, *state_vector(memory, percept.view, step, percept.utterances, queued=queued), *percept.talk]
-    return Inputs.of(state, percept.words, vectors, rows, shape)
 
 
 def remember(percept: CoWizardPercept, update: Update) -> WorkingMemory:

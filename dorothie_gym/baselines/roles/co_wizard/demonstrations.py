@@ -17,7 +17,7 @@ from dorothie_gym.baselines.roles.co_wizard.decision import (
     perceive,
     remember,
 )
-from dorothie_gym.baselines.roles.co_wizard.examples import Example, correcting_example, make_example
+from dorothie_gym.baselines.roles.co_wizard.examples import Example, LessonInputs, correcting_example, make_example
 from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory, initial_values
 from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedDecision
 from dorothie_gym.baselines.roles.co_wizard.remarks import sources
@@ -101,12 +101,15 @@ class Pupil:
         places, streets = (latest.places, latest.streets) if latest is not None else ((), ())
         lesson = self._teacher.decide(observation, places, streets)
         queued = lesson.queued if turn is None else turn.queued
-        listening = listening_inputs(percept, queued=queued)
         memory = remember(percept, lesson.update)
-        acting, commands = acting_inputs(percept, memory, queued=queued)
-        available = sources(memory, percept.view, percept.utterances) if lesson.remarks else {}
+
+        def inputs() -> LessonInputs:
+            acting, commands = acting_inputs(percept, memory, queued=queued)
+            available = sources(memory, percept.view, percept.utterances) if lesson.remarks else {}
+            return LessonInputs(listening_inputs(percept, queued=queued), acting, commands, available)
+
         talks = turn is None or not turn.silent
-        example = make_example(percept, listening, acting, commands, lesson, available, self._rng, talks=talks)
+        example = make_example(percept, inputs, lesson, self._rng, talks=talks)
         if example is not None:
             on_example(example)
         return percept, memory, lesson

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import numpy as np
 import torch
@@ -22,12 +22,12 @@ from dorothie_gym.baselines.roles.learned_role.examples import (
     whole,
     word_tensor,
 )
+from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
+from dorothie_gym.session.spaces.actions import Physical
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept
     from dorothie_gym.baselines.roles.co_wizard.teacher import Lesson
-    from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
-    from dorothie_gym.session.spaces.actions import Physical
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,19 +59,25 @@ class Example:
     weight: float
 
 
+class LessonInputs(NamedTuple):
+    """Inputs of both steps, possible commands, and names and numbers that could be said."""
+
+    listening: Inputs
+    acting: Inputs
+    commands: Sequence[Physical | None]
+    available: Sources
+
+
 def make_example(
-    percept: CoWizardPercept, listening: Inputs, acting: Inputs, commands: Sequence[Physical | None], lesson: Lesson,
-    available: Sources, rng: np.random.Generator, *, talks: bool = True,
+    percept: CoWizardPercept, inputs: Callable[[], LessonInputs], lesson: Lesson, rng: np.random.Generator, *,
+    talks: bool = True,
 ) -> Example | None:  # fmt: skip
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
         percept: perception.
-        listening: inputs of the first step.
-        acting: inputs of the second step.
-        commands: possible commands.
+        inputs: returns the inputs, which are computed for those examples only that are kept.
         lesson: decision of the teacher.
-        available: names and numbers that could be said.
         rng: draws which idle decisions are kept.
         talks: whether the remarks, or silence, are learnt.
     """
@@ -88,6 +94,7 @@ def make_example(
     )
     if idle and rng.random() >= IDLE_SHARE:
         return None
+    listening, acting, commands, available = inputs()
     goal = update.goal
     if goal >= len(GoalEvent):
         row = goal - len(GoalEvent)

@@ -235,6 +235,8 @@ class WorkingMemory:
             streets: streets named in it.
             distance: distance named in it [m].
         """
+        if self._is_kept_by(update):
+            return self
         now, fresh = view.time, dict(zip(FRESH, update.fresh, strict=True))
         changed = tuple(
             now if new != old or fresh.get(name, False) else at
@@ -257,6 +259,11 @@ class WorkingMemory:
             memory = replace(memory, target=None)._marked(view, ahead)
         memory = memory._with_status(update, named)
         return memory._with_goal(update.goal, view, named)
+
+    def _is_kept_by(self, update: Update) -> bool:
+        """Returns whether an output of the network changes nothing, as at most decisions."""
+        keeps = update.goal == GoalEvent.KEEP and STATUSES[update.status] is None
+        return keeps and update.values == self.values and not any(update.fresh) and self.value("manoeuvre") != U_TURN
 
     def _carrying_on(self, view: CoWizardView) -> WorkingMemory:
         """Moves the place of a slow approach along with the car, and sends the plan if the route has changed."""

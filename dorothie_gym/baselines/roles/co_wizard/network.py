@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.roles.co_wizard.features import COMMAND_SIZE, PLACE_SIZE, STATE_SIZE
+from dorothie_gym.baselines.roles.co_wizard.features import COMMAND_SIZE, PLACE_SIZE, STATE
 from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, STATUSES, VARIABLES, GoalEvent
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
 from dorothie_gym.baselines.roles.learned_role.inference import (
@@ -65,7 +65,7 @@ class CoWizardLayout:
     @classmethod
     def of(cls, remarks: int) -> CoWizardLayout:
         """Returns the layout of this version for a vocabulary of a given size."""
-        return cls(state=STATE_SIZE + KEPT * UTTERANCE_SIZE, place=PLACE_SIZE, command=COMMAND_SIZE, remarks=remarks)
+        return cls(state=STATE.size + KEPT * UTTERANCE_SIZE, place=PLACE_SIZE, command=COMMAND_SIZE, remarks=remarks)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,6 +29,7 @@ from dorothie_gym.dialogue.realization_context import WordingContext
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
+from dorothie_gym.policies.decision_random import decision_random
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
@@ -128,14 +129,10 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
             voice=SpeechState(role=Role.CO_WIZARD, style=style),
         )
 
-    def act(self, observation: ObservationMapping, state: LearnedState) -> tuple[CoWizardAction, LearnedState]:
-        """Updates the memory, and chooses a command and remarks."""
-        return self.act_all([observation], [state])[0]
-
     def act_all(
         self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState]
     ) -> list[tuple[CoWizardAction, LearnedState]]:
-        """As `act` for several sessions, with one forward pass for all; the results are equal."""
+        """Chooses a typed action for each session, with one forward pass for all; see `BatchPolicy.act_all`."""
         return [(turn.action, turn.state) for turn in self.play_all(observations, states)]
 
     def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> LearnedDecision:
@@ -159,9 +156,10 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
             for turn, memory in zip(begun, memories, strict=True)
         ]
         scores, first, hidden = self._inference.act(InputBatch.of([inputs for inputs, _ in offered]))
+        shares = shares_of(first, TEMPERATURE)
         turns = []
         for number, (turn, memory, (_, commands)) in enumerate(zip(begun, memories, offered, strict=True)):
-            remarks = () if turn.silent else self._talk(turn, memory, first[number], hidden[number : number + 1])
+            remarks = () if turn.silent else self._talk(turn, memory, shares[number], hidden[number : number + 1])
             command = self._command(turn.percept, memory, turn.rng, scores[number])
             turns.append(_finish(turn, memory, commands[command], remarks))
         return turns
@@ -171,10 +169,7 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         inputs = [listening_inputs(turn.percept, queued=turn.queued) for turn in begun]
         before = np.array([turn.percept.memory.values for turn in begun], dtype=np.int64)
         heard = self._inference.listen(InputBatch.of(inputs), before)
-        updates = (
-            self._update(turn.percept, own.rows, HeardNumbers(*(part[number] for part in heard)))
-            for number, (turn, own) in enumerate(zip(begun, inputs, strict=True))
-        )
+        updates = _updates(begun, [own.rows for own in inputs], heard)
         return [remember(turn.percept, update) for turn, update in zip(begun, updates, strict=True)]
 
     def _command(
@@ -183,33 +178,18 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         """Returns the index of the most likely command, from the logits (k,)."""
         return int(scores.argmax())
 
-    def _update(self, percept: CoWizardPercept, rows: Sequence[int], heard: HeardNumbers) -> Update:
-        """Returns the most likely update of a memory, from the logits of one session."""
-        goal, logits = int(heard.goal.argmax()), heard.values
-        if not percept.heard:
-            logits[_STARTS + percept.memory.values] += KEPT_BONUS
-        if goal >= len(GoalEvent):
-            goal = len(GoalEvent) + rows[goal - len(GoalEvent)]
-        return Update(
-            values=tuple(int(logits[start:end].argmax()) for start, end in _SECTIONS),
-            fresh=tuple(flag > 0.0 for flag in heard.fresh.tolist()),
-            goal=goal,
-            status=int(heard.status.argmax()),
-        )
-
     def _talk(
-        self, turn: _Begun, memory: WorkingMemory, first: NDArray[np.float32], hidden: NDArray[np.float32]
+        self, turn: _Begun, memory: WorkingMemory, shares: NDArray[np.float64], hidden: NDArray[np.float32]
     ) -> tuple[Remark, ...]:
         """Returns the remarks that are drawn.
 
         Args:
             turn: decision in progress.
             memory: memory after listening.
-            first: logits of the first remark (r,).
+            shares: probabilities of the first remark (r,), changed.
             hidden: hidden layer (1, h).
         """
         percept, rng = turn.percept, turn.rng
-        shares = shares_of(first, TEMPERATURE)
         if rng.random() < shares[0]:
             return ()
         available = sources(memory, percept.view, percept.utterances)
@@ -259,14 +239,39 @@ class _Begun(NamedTuple):
 
 def _begin(observation: ObservationMapping, state: LearnedState, silent: bool) -> _Begun:
     """Reads an observation."""
-    rng = np.random.default_rng((state.seed, state.count))
-    voice = state.voice
+    rng, voice = decision_random(state.seed, state.count), state.voice
     percept = perceive(observation, state.attention, None if voice.last is None else voice.last.act.move)
     queued = not voice.idle
     if percept.latest is not None:
         late = percept.memory.clock.interval / 2.0
         voice = voice.heard_other(percept.view.time, percept.latest.heard.acts, rng, late).cleared()
     return _Begun(state, percept, rng, voice, queued, silent or not voice.idle)
+
+
+def _updates(begun: Sequence[_Begun], rows: Sequence[Sequence[int]], heard: HeardNumbers) -> list[Update]:
+    """Returns the most likely update of each memory.
+
+    Args:
+        begun: decisions in progress (b,).
+        rows: rows of the places among which each one's goal is chosen.
+        heard: logits of all.
+    """
+    before = np.array([turn.percept.memory.values for turn in begun], dtype=np.int64)
+    idle = np.array([not turn.percept.heard for turn in begun])
+    logits = heard.values
+    logits[np.flatnonzero(idle)[:, None], _STARTS + before[idle]] += KEPT_BONUS
+    values = np.stack([logits[:, start:end].argmax(axis=1) for start, end in _SECTIONS], axis=1).tolist()
+    goals, statuses = heard.goal.argmax(axis=1).tolist(), heard.status.argmax(axis=1).tolist()
+    fresh, events = (heard.fresh > 0.0).tolist(), len(GoalEvent)
+    return [
+        Update(
+            values=tuple(values[number]),
+            fresh=tuple(fresh[number]),
+            goal=goal if goal < events else events + rows[number][goal - events],
+            status=statuses[number],
+        )
+        for number, goal in enumerate(goals)
+    ]
 
 
 def _finish(
@@ -279,7 +284,7 @@ def _finish(
         view.time,
         view.speaking,
         turn.rng,
-        _wording_context(view, memory),
+        None if voice.idle else _wording_context(view, memory),
         interval=memory.clock.interval,
         other_speaking=view.other_speaking,
     )

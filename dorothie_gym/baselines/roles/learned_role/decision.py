@@ -11,7 +11,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, Utterance, utterance_vector, word_rows
+from dorothie_gym.baselines.roles.learned_role.hearing import (
+    KEPT,
+    UTTERANCE_SIZE,
+    Utterance,
+    word_rows,
+    write_utterance,
+)
 from dorothie_gym.policies.heard_utterance import heard_utterance
 
 if TYPE_CHECKING:
@@ -63,10 +69,12 @@ class Percept(Generic[View, RoleMemory]):
         return self.utterances[0] if self.heard else None
 
     @cached_property
-    def talk(self) -> list[float]:
+    def talk(self) -> NDArray[np.float32]:
         """Last utterances as numbers."""
-        kept = [*self.utterances, *[None] * KEPT][:KEPT]
-        return [number for utterance in kept for number in utterance_vector(utterance, self.view.time)]
+        inputs = np.zeros(KEPT * UTTERANCE_SIZE, dtype=np.float32)
+        for number, utterance in enumerate(self.utterances):
+            write_utterance(utterance, self.view.time, inputs[number * UTTERANCE_SIZE : (number + 1) * UTTERANCE_SIZE])
+        return inputs
 
     @cached_property
     def words(self) -> NDArray[np.int64]:
@@ -113,7 +121,7 @@ class Inputs:
     @classmethod
     def of(
         cls,
-        state: Sequence[float],
+        state: Sequence[float] | NDArray[np.float32],
         words: NDArray[np.int64],
         vectors: Sequence[Sequence[float]],
         rows: tuple[int, ...],

@@ -16,7 +16,7 @@ AWAY: Final = 300.0
 TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
 """What remarks are about: their predicate or, without content, their move."""
 
-_TIMES: Final = (1.0, 4.0, 15.0)
+TIME_SCALES: Final = (1.0, 4.0, 15.0)
 """Scales of times [s]."""
 
 
@@ -35,7 +35,7 @@ def seconds_since(now: float, then: float) -> float:
 def time_scales(seconds: float) -> tuple[float, ...]:
     """Returns a time [s] on several scales (4,)."""
     seconds = min(max(seconds, 0.0), AWAY)
-    return float(seconds <= 0.01), *(math.exp(-seconds / scale) for scale in _TIMES)
+    return float(seconds <= 0.01), *(math.exp(-seconds / scale) for scale in TIME_SCALES)
 
 
 def age_scales(now: float, then: float) -> tuple[float, ...]:

@@ -30,6 +30,7 @@ KEPT: Final = 3
 """Number of utterances that are remembered."""
 
 _UNNAMED: Final = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
+_AGES: Final = 6  # number of inputs of the age of an utterance
 _PREDICATES: Final = tuple(Predicate)
 _DIRECTIONS: Final = tuple(Direction)
 _MOVES: Final = tuple(DialogueMove)
@@ -64,9 +65,9 @@ class Utterance:
         return tuple(name for name in named if isinstance(name, StreetName) and name not in unnamed)
 
     @cached_property
-    def said(self) -> tuple[float, ...]:
+    def said(self) -> NDArray[np.float32]:
         """Moves, slot values other than names, and content of the words, as numbers."""
-        return tuple(_numbers(self))
+        return np.array(_numbers(self), dtype=np.float32)
 
     @cached_property
     def stated(self) -> Proposition | None:
@@ -126,13 +127,11 @@ def word_rows(text: str) -> NDArray[np.int64]:
     return rows
 
 
-def utterance_vector(utterance: Utterance | None, now: float) -> list[float]:
-    """Returns an utterance as numbers: its age and content."""
-    if utterance is None:
-        return [0.0] * UTTERANCE_SIZE
+def write_utterance(utterance: Utterance, now: float, inputs: NDArray[np.float32]) -> None:
+    """Writes an utterance, its age and content, into inputs (`UTTERANCE_SIZE`,)."""
     age = now - utterance.time
-    ages = (1.0, float(age <= 0.0), float(age < 1.0), float(age < 3.0), float(age < 8.0), min(age, 30.0) / 30.0)
-    return [*ages, *utterance.said]
+    inputs[:_AGES] = 1.0, age <= 0.0, age < 1.0, age < 3.0, age < 8.0, min(age, 30.0) / 30.0
+    inputs[_AGES:] = utterance.said
 
 
 def _numbers(utterance: Utterance) -> list[float]:
@@ -168,5 +167,5 @@ def _sign(value: bool | None) -> float:
     return 0.0 if value is None else 1.0 if value else -1.0
 
 
-UTTERANCE_SIZE: Final = 6 + len(Utterance(time=0.0, heard=HeardUtterance(acts=(), words=understand(""))).said)
-"""Length of `utterance_vector`."""
+UTTERANCE_SIZE: Final = _AGES + len(Utterance(time=0.0, heard=HeardUtterance(acts=(), words=understand(""))).said)
+"""Number of inputs of an utterance."""

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float32]
 Integers = NDArray[np.int64]
 
+TILE = 8
+"""Number of rows that are summed together, so that their outputs stay in the cache beside the weights."""
+
 MISSING = np.float32(-1e9)
 """Score of an option that is only filled in."""
 
@@ -41,19 +44,23 @@ def write_dense(inputs: Floats, weights: Floats, bias: Floats, rectified: bool, 
         rectified: whether negative outputs become 0.
         outputs: (b, m), written.
     """
-    for row in range(len(inputs)):
-        output = outputs[row]
-        for column in range(len(bias)):
-            output[column] = bias[column]
-        for number in range(inputs.shape[1]):
-            value = inputs[row, number]
-            if value != 0.0:
-                part = weights[number]
-                for column in range(len(bias)):
-                    output[column] += value * part[column]
-        if rectified:
+    for first in range(0, len(inputs), TILE):
+        end = min(first + TILE, len(inputs))
+        for row in range(first, end):
             for column in range(len(bias)):
-                output[column] = max(output[column], np.float32(0.0))
+                outputs[row, column] = bias[column]
+        for number in range(inputs.shape[1]):
+            part = weights[number]
+            for row in range(first, end):
+                value = inputs[row, number]
+                if value != 0.0:
+                    output = outputs[row]
+                    for column in range(len(bias)):
+                        output[column] += value * part[column]
+        if rectified:
+            for row in range(first, end):
+                for column in range(len(bias)):
+                    outputs[row, column] = max(outputs[row, column], np.float32(0.0))
 
 
 @compiled
@@ -82,8 +89,9 @@ def write_means(rows: Integers, table: Floats, outputs: Floats) -> None:
 
 @compiled
 def write_scores(
-    hidden: Floats, options: Floats, counts: Integers, weights: Floats, last: Floats, bias: np.float32, scores: Floats
-) -> None:
+    hidden: Floats, options: Floats, counts: Integers, weights: Floats, last: Floats, bias: np.float32,
+    scores: Floats, layer: Floats,
+) -> None:  # fmt: skip
     """Writes the scores of options: two layers over a hidden layer and an option, the first one a sum of two.
 
     Args:
@@ -94,16 +102,21 @@ def write_scores(
         last: (h,) weights of the second layer.
         bias: its bias.
         scores: (b, k), written where there is an option.
+        layer: (h,) room for the first layer of an option.
     """
     for row in range(len(hidden)):
         for option in range(counts[row]):
+            for column in range(len(layer)):
+                layer[column] = hidden[row, column]
+            for number in range(len(weights)):
+                value = options[row, option, number]
+                if value != 0.0:
+                    for column in range(len(layer)):
+                        layer[column] += value * weights[number, column]
             total = bias
-            for column in range(hidden.shape[1]):
-                found = hidden[row, column]
-                for number in range(len(weights)):
-                    found += options[row, option, number] * weights[number, column]
-                if found > 0.0:
-                    total += found * last[column]
+            for column in range(len(layer)):
+                if layer[column] > 0.0:
+                    total += layer[column] * last[column]
             scores[row, option] = total
 
 
@@ -153,7 +166,8 @@ class Scorer:
         """Returns the scores (b, k) of options (b, k, n), of which there are (b,); `MISSING` for others."""
         scores = np.full(options.shape[:2], MISSING, dtype=np.float32)
         if counts.any():
-            _write_scores(self._hidden(hidden), options, counts, self._option.weights, self._last, self._bias, scores)
+            own, layer = self._hidden(hidden), np.empty_like(self._last)
+            _write_scores(own, options, counts, self._option.weights, self._last, self._bias, scores, layer)
         return scores
 
 
@@ -201,8 +215,8 @@ def numbers_of(parameters: Any) -> Floats:
 
 
 def shares_of(scores: Floats, temperature: float) -> NDArray[np.float64]:
-    """Returns the probabilities of remarks (r,) at a temperature, from logits (r,)."""
+    """Returns the probabilities of remarks (..., r) at a temperature, from logits (..., r)."""
     logits = scores.astype(np.float64) / temperature
-    weights: NDArray[np.float64] = pn.exp(logits - logits.max())
-    shares: NDArray[np.float64] = weights / weights.sum()
+    weights: NDArray[np.float64] = pn.exp(logits - logits.max(axis=-1, keepdims=True))
+    shares: NDArray[np.float64] = weights / weights.sum(axis=-1, keepdims=True)
     return shares

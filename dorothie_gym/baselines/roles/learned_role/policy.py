@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from dorothie_gym.policies.policy import TypedPolicy
+from dorothie_gym.policies.policy import BatchPolicy
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
@@ -21,7 +21,7 @@ State = TypeVar("State")
 Network = TypeVar("Network", bound=nn.Module)
 
 
-class LearnedPolicy(TypedPolicy[State], Generic[State, Network]):
+class LearnedPolicy(BatchPolicy[State], Generic[State, Network]):
     """Player of a role whose decisions and forms of remarks are those of a network."""
 
     def __init__(

@@ -68,5 +68,6 @@ def speaking_inputs(percept: ParticipantPercept, memory: SessionMemory) -> Input
 def _inputs(
     percept: ParticipantPercept, memory: SessionMemory, vectors: list[list[float]], numbers: tuple[int, ...]
 ) -> Inputs:
-    state = [*state_vector(memory, percept.view, percept.utterances), *percept.talk]
+    own = np.array(state_vector(memory, percept.view, percept.utterances), dtype=np.float32)
+    state = np.concatenate([own, percept.talk])
     return Inputs.of(state, percept.words, vectors, numbers, (MAX_ERRANDS, ERRAND_SIZE))

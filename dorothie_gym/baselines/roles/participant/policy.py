@@ -80,14 +80,10 @@ class LearnedParticipant(LearnedPolicy[LearnedState, ParticipantNetwork]):
         """Returns the state before the first observation."""
         return LearnedState(attention=Attention(memory=SessionMemory.begin(town, seed)))
 
-    def act(self, observation: ObservationMapping, state: LearnedState) -> tuple[ParticipantAction, LearnedState]:
-        """Looks, listens, chooses the errand, and speaks or is silent."""
-        return self.act_all([observation], [state])[0]
-
     def act_all(
         self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState]
     ) -> list[tuple[ParticipantAction, LearnedState]]:
-        """As `act` for several sessions, with one forward pass for all; the results are equal."""
+        """Chooses a typed action for each session, with one forward pass for all; see `BatchPolicy.act_all`."""
         percepts = [perceive(seen, state.attention) for seen, state in zip(observations, states, strict=True)]
         choices = self._choose_all([choosing_inputs(percept) for percept in percepts], percepts)
         memories = [
