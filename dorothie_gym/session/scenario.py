@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Final, TypeAlias, TypedDict
 
 import gymnasium
 import numpy as np
+from msgspec import Meta
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
-from dorothie_gym.errors import StoryboardError, did_you_mean, short_repr
+from dorothie_gym.errors import SessionError, StoryboardError, did_you_mean, short_repr
 from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
 from dorothie_gym.support.copying import shared
+from dorothie_gym.support.input_files import checked, raising
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 if TYPE_CHECKING:
@@ -26,6 +28,14 @@ STREET_NAMES = tuple(
     name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
 )
 """The fourteen names that are drawn for streets."""
+
+
+class ReferencePage(TypedDict):
+    """Reference of a scenario in JSON types; fields as in `ReferenceDrive`."""
+
+    seconds: Annotated[float, Meta(ge=0.0, le=1e12)]
+    exchanges: Annotated[int, Meta(ge=0, lt=2**31)]
+    subgoals: Annotated[int, Meta(ge=0, lt=2**31)]
 
 
 @shared
@@ -47,9 +57,31 @@ class ReferenceDrive:
         """Returns the reference time for a number of live subgoals: more in proportion if some were added [s]."""
         return self.seconds * max(1.0, live / self.subgoals) if self.subgoals else self.seconds
 
+    def to_json(self) -> ReferencePage:
+        """Returns the fields in JSON types."""
+        return {"seconds": self.seconds, "exchanges": self.exchanges, "subgoals": self.subgoals}
+
+    @classmethod
+    def from_json(cls, row: ReferencePage) -> ReferenceDrive:
+        """Parses the output of `to_json`."""
+        return cls(**row)
+
 
 REFERENCE: Final = "reference"
-"""Field of `SessionHeader.extra` with the reference of the scenario: the fields of `ReferenceDrive`."""
+"""Field of `SessionHeader.extra` with the reference of the scenario (`ReferencePage`)."""
+
+
+def recorded_reference(header: SessionHeader) -> ReferenceDrive | None:
+    """Returns the reference of a recorded session's scenario; None if it was not measured.
+
+    Raises:
+        SessionError: the field of the header is damaged.
+    """
+    if REFERENCE not in header.extra:
+        return None
+    with raising(SessionError):
+        page = checked(header.extra[REFERENCE], ReferencePage, f"header, {REFERENCE}")
+    return ReferenceDrive.from_json(page)
 
 
 @shared
@@ -241,7 +273,7 @@ def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader
         story=storyboard.story,
         departure=scenario.departure,
         config=config.record(),
-        extra={} if scenario.reference is None else {REFERENCE: asdict(scenario.reference)},
+        extra={} if scenario.reference is None else {REFERENCE: scenario.reference.to_json()},
     )
 
 

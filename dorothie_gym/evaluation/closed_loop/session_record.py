@@ -31,9 +31,8 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
-from dorothie_gym.session.scenario import REFERENCE, ReferenceDrive
+from dorothie_gym.session.scenario import ReferenceDrive, ReferencePage, recorded_reference
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.support.input_files import checked, raising
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Place
@@ -276,14 +275,6 @@ class SessionRecordPage(TypedDict):
     reference: NotRequired[ReferencePage]
 
 
-class ReferencePage(TypedDict):
-    """Reference of a scenario in JSON types; fields as in `ReferenceDrive`."""
-
-    seconds: Amount
-    exchanges: Count
-    subgoals: Count
-
-
 @dataclass(frozen=True, kw_only=True)
 class SessionRecord:
     """Measures of one session.
@@ -337,12 +328,7 @@ class SessionRecord:
         if self.conduct is not None:
             page["conduct"] = self.conduct.to_json()
         if self.reference is not None:
-            reference = self.reference
-            page["reference"] = {
-                "seconds": reference.seconds,
-                "exchanges": reference.exchanges,
-                "subgoals": reference.subgoals,
-            }
+            page["reference"] = self.reference.to_json()
         return page
 
     @classmethod
@@ -363,7 +349,7 @@ class SessionRecord:
             talk=TalkRecord.from_json(row["talk"]),
             exceptions=tuple(MetException.from_json(each) for each in row["exceptions"]),
             conduct=ConductRecord.from_json(row["conduct"]) if "conduct" in row else None,
-            reference=ReferenceDrive(**row["reference"]) if "reference" in row else None,
+            reference=ReferenceDrive.from_json(row["reference"]) if "reference" in row else None,
         )
 
 
@@ -392,15 +378,8 @@ def measure(session: Session, town: Town) -> SessionRecord:
         talk=talk_of(session),
         exceptions=met_exceptions(session, town),
         conduct=conduct_of(session, town),
-        reference=_reference_of(session),
+        reference=recorded_reference(session.header),
     )
-
-
-def _reference_of(session: Session) -> ReferenceDrive | None:
-    """Returns the reference of a session's scenario from its header; None if it has none."""
-    page = session.header.extra.get(REFERENCE)
-    with raising(RolloutError):
-        return None if page is None else checked(page, ReferenceDrive, f"{session.name}: header, {REFERENCE}")
 
 
 def count_infractions(session: Session) -> dict[str, int]:
