@@ -44,3 +44,16 @@ class ClosedLoopMetric(ABC):
         sums = [self.parts(record) for record in records]
         lower = sum(part for _, part in sums)
         return sum(part for part, _ in sums) / lower if lower else None
+
+
+class SessionMetric(ClosedLoopMetric):
+    """Metric that a session has once; over several sessions it is the mean."""
+
+    @abstractmethod
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the value of a session; None leaves the session out."""
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the value and 1, or (0, 0) for a session that is left out."""
+        value = self.value(record)
+        return (0.0, 0.0) if value is None else (value, 1.0)
