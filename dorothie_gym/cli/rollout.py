@@ -133,6 +133,8 @@ def rollout(
         config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures, usual=usual)
         pool = participants_of(participant, found)
         ad_wizard = ad_wizard or (found.ad_wizard if found else "scripted")
+        if oracle and found is not None:
+            co_wizard = found.oracle_player
         cast = find_cast(pool[0], co_wizard, ad_wizard, asked)
         try:
             settings = closed_loop.RolloutSettings(
@@ -145,7 +147,7 @@ def rollout(
                 trials=trials,
                 tier=tier,
                 oracle=oracle,
-                references=found is not None or trials > 1,
+                references=config.talk is None and (found is not None or trials > 1),
             )
         except ValueError as error:
             fail(str(error))

@@ -40,9 +40,19 @@ LANE_FOLLOW = "lane-follow"
 """Name of the Co-Wizard's policy that drives and never talks."""
 
 
+TALK_POLICIES: Final[Mapping[Role, tuple[str, ...]]] = MappingProxyType(
+    {
+        Role.PARTICIPANT: ("client",),
+        Role.CO_WIZARD: ("talk-oracle", "always-asks", "never-asks", "says-yes", "keyword-rule"),
+        Role.AD_WIZARD: ("street-closer",),
+    }
+)
+"""Names of the policies of talk tasks (docs/tiers.md), by role."""
+
+
 def policy_names(role: Role) -> tuple[str, ...]:
     """Returns the names that `make_policy` accepts for a role."""
-    own = (LANE_FOLLOW,) if role is Role.CO_WIZARD else ()
+    own = (*((LANE_FOLLOW,) if role is Role.CO_WIZARD else ()), *TALK_POLICIES.get(role, ()))
     return (*POLICY_NAMES, *own, *names_for(role))
 
 
@@ -88,11 +98,18 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if is_pretrained(name):
         check_fits(name)
         return _trained_player(name, pretrained_folder(name), role).make(role, limits or SpaceLimits())
-    if name == LANE_FOLLOW:
-        return policies.LaneFollowPolicy(limits)
+    if name == LANE_FOLLOW or name in TALK_POLICIES[role]:
+        return _simple_policy(name, role, limits)
     if role is Role.PARTICIPANT:
         return policies.ScriptedParticipant(limits)
     return policies.ScriptedCoWizard(limits) if role is Role.CO_WIZARD else policies.ScriptedAdWizard(limits)
+
+
+def _simple_policy(name: str, role: Role, limits: SpaceLimits | None) -> AnyPolicy:
+    """Returns the policy that follows its lane, or one of talk tasks."""
+    if role is Role.CO_WIZARD:
+        return policies.LaneFollowPolicy(limits) if name == LANE_FOLLOW else policies.TalkDriver(name, limits)
+    return policies.Client(limits) if role is Role.PARTICIPANT else policies.StreetCloser(limits)
 
 
 def _gives_traits(name: str, role: Role) -> bool:

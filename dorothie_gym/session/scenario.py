@@ -16,6 +16,8 @@ from dorothie_gym.errors import SessionError, StoryboardError, did_you_mean, sho
 from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
+from dorothie_gym.session.talk_kinds import draw_talk_task
+from dorothie_gym.session.talk_tasks import storyboard_of
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.input_files import checked, raising
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
@@ -23,6 +25,7 @@ from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoa
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.tasks.briefs import TalkFamily
 
 STREET_NAMES = tuple(
     name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
@@ -148,7 +151,11 @@ def template_option(storyboard: str | Path | StoryboardTemplate | None) -> Story
 
 
 def draw_scenario(
-    town: Town, template: StoryboardTemplate | None, seed: int, stops: tuple[int, int] | None = None
+    town: Town,
+    template: StoryboardTemplate | None,
+    seed: int,
+    stops: tuple[int, int] | None = None,
+    talk: TalkFamily | None = None,
 ) -> Scenario:
     """Draws a scenario; equal arguments give equal scenarios.
 
@@ -157,11 +164,14 @@ def draw_scenario(
         template: template of the storyboard; None draws one of the shipped templates that fit the town.
         seed: any integer >= 0.
         stops: range of the number of stops of a drawn template, see `EnvConfig.stops`; None draws from all.
+        talk: family of a talk task that replaces a drawn template, see `EnvConfig.talk`.
 
     Raises:
         StoryboardError: the template cannot be bound to the town, or none fits it.
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    if talk is not None and template is None:
+        return _talk_scenario(town, talk, seed, streets, departure)
     sites = connected_sites(town)
     if template is None and stops is not None:
         fitting = _with_stops(fitting_templates(town), stops, town)
@@ -181,6 +191,24 @@ def draw_scenario(
         storyboard=storyboard,
         street_names=_name_streets(town, streets),
         departure=(start.lane, start.station),
+    )
+
+
+def _talk_scenario(
+    town: Town, family: TalkFamily, seed: int, streets: np.random.Generator, departure: np.random.Generator
+) -> Scenario:
+    """Draws the scenario of a talk task."""
+    names = _name_streets(town, streets)
+    task = draw_talk_task(town, names, family, seed)
+    storyboard = storyboard_of(task)
+    taken = {landmark.site for landmark in storyboard.landmarks}
+    free = [site for site in connected_sites(town) if site.id not in taken] or list(connected_sites(town))
+    start = free[int(departure.integers(len(free)))]
+    return Scenario(
+        seed=seed,
+        storyboard=storyboard,
+        street_names=names,
+        departure=task.departure or (start.lane, start.station),
     )
 
 

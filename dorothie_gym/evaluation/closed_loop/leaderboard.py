@@ -322,7 +322,7 @@ def leaderboard_page(
 def _figures(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
     tables = {entry.policy: entry.table for entry in entries}
     metrics: list[ShownMetric] = [next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS]
-    columns = [metric for metric in metrics if not (metric.needs_reference and is_undefined(metric, tables))]
+    columns = [metric for metric in metrics if not (metric.optional and is_undefined(metric, tables))]
     rows = [["Co-Wizard", "sessions", "errored", CLAIMED, *(metric.title for metric in columns)]]
     for entry in entries:
         cells = [figure_text(metric, entry.table.figures[metric.key]) for metric in columns]

@@ -25,7 +25,7 @@ class ClosedLoopMetric(ABC):
         worst: value of a session that ended in an error; None leaves such sessions out.
         is_share: whether tables show the metric in per cent.
         counts_sessions: whether the metric is 0 or 1 for a session.
-        needs_reference: whether it needs the reference of the scenario, see `ReferenceDrive`.
+        optional: whether tables leave it out where no session has it, as without a `ReferenceDrive`.
     """
 
     key: ClassVar[str]
@@ -33,7 +33,7 @@ class ClosedLoopMetric(ABC):
     worst: ClassVar[float | None] = None
     is_share: ClassVar[bool] = True
     counts_sessions: ClassVar[bool] = False
-    needs_reference: ClassVar[bool] = False
+    optional: ClassVar[bool] = False
 
     @abstractmethod
     def parts(self, record: SessionRecord) -> tuple[float, float]:

@@ -26,6 +26,7 @@ from dorothie_gym.evaluation.closed_loop.sub_scores import (
     Truth,
     UnansweredQuestions,
 )
+from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkSuccess, UnnecessaryQuestions
 from dorothie_gym.support import portable_arrays as pn
 
 if TYPE_CHECKING:
@@ -152,7 +153,7 @@ class TimelyCompletion(SessionMetric):
     key: ClassVar[str] = "timely_completion"
     title: ClassVar[str] = "timely completion"
     worst: ClassVar[float | None] = 0.0
-    needs_reference: ClassVar[bool] = True
+    optional: ClassVar[bool] = True
 
     def value(self, record: SessionRecord) -> float | None:
         """Returns the product."""
@@ -257,6 +258,7 @@ class ExceptionsRecovered(ClosedLoopMetric):
 
 
 METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
+    TalkSuccess(),
     TimelyCompletion(),
     Success(),
     GoalConditionSuccess(),
@@ -272,6 +274,7 @@ METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
     ClarificationRate(),
     ExchangesAgainstReference(),
     UnansweredQuestions(),
+    UnnecessaryQuestions(),
     Truth(),
     Discomfort(),
     HardBraking(),
@@ -288,7 +291,7 @@ class RecoverySeconds:
     key: ClassVar[str] = "recovery_seconds"
     title: ClassVar[str] = "seconds to recovery"
     is_share: ClassVar[bool] = False
-    needs_reference: ClassVar[bool] = False
+    optional: ClassVar[bool] = False
 
     def values(self, record: SessionRecord) -> tuple[float, ...]:
         """Returns the times of one session."""
@@ -310,7 +313,7 @@ class AllTrials:
     key: ClassVar[str] = "all_trials"
     title: ClassVar[str] = "Pass^3"
     is_share: ClassVar[bool] = True
-    needs_reference: ClassVar[bool] = True
+    optional: ClassVar[bool] = True
     trials: int = 3
 
     def interval(self, scenarios: Iterable[Sequence[bool]]) -> MetricInterval:
@@ -377,7 +380,7 @@ def figures_of(records: Sequence[SessionRecord], errored: int = 0) -> dict[str, 
 def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], errored: int = 0) -> MetricInterval:
     """Returns a metric over sessions with its interval; see `figures_of`."""
     parts = [metric.parts(record) for record in records]
-    if metric.worst is not None and not (metric.needs_reference and not any(lower for _, lower in parts)):
+    if metric.worst is not None and not (metric.optional and not any(lower for _, lower in parts)):
         parts += [(metric.worst, 1.0)] * errored
     if not any(lower for _, lower in parts):
         return MetricInterval(mean=None)

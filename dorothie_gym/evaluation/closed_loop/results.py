@@ -398,7 +398,7 @@ def figure_text(metric: ShownMetric, figure: FigurePage) -> str:
 def _overall(page: RolloutTable) -> Table:
     table = Table("metric", "mean [95 % interval]", title="Closed loop")
     for metric in ALL_METRICS:
-        if metric.needs_reference and page.figures[metric.key]["mean"] is None:
+        if metric.optional and page.figures[metric.key]["mean"] is None:
             continue
         table.add_row(metric.title, figure_text(metric, page.figures[metric.key]))
     return table
@@ -418,7 +418,7 @@ def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...], 
     figures = {
         metric.title: [figure_text(metric, page.figures[metric.key]).replace(" [", "\n[") for page in parts.values()]
         for metric in ALL_METRICS
-        if metric.key in keys and not (metric.needs_reference and is_undefined(metric, parts))
+        if metric.key in keys and not (metric.optional and is_undefined(metric, parts))
     }
     taken, chosen = _width(first) + 1, dict[str, list[str]]()
     for title, cells in figures.items():

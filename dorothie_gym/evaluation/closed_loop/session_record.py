@@ -17,6 +17,7 @@ from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTA
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT
 from dorothie_gym.evaluation.closed_loop.sub_scores import ConductPage, ConductRecord, conduct_of
+from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkVerdict, TalkVerdictPage, verdict_of
 from dorothie_gym.evaluation.closed_loop.task_progress import (
     TaskRecord,
     TaskRoutes,
@@ -273,6 +274,7 @@ class SessionRecordPage(TypedDict):
     exceptions: list[MetExceptionPage]
     conduct: NotRequired[ConductPage]
     reference: NotRequired[ReferencePage]
+    talk_task: NotRequired[TalkVerdictPage]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -294,6 +296,7 @@ class SessionRecord:
         exceptions: exceptions of the session.
         conduct: answers, truth and comfort; None in results of versions that did not measure them.
         reference: reference of the scenario; None if it was not measured.
+        talk_task: verdict on the talk task; None if the session has none.
     """
 
     live: int
@@ -309,9 +312,10 @@ class SessionRecord:
     exceptions: tuple[MetException, ...] = ()
     conduct: ConductRecord | None = None
     reference: ReferenceDrive | None = None
+    talk_task: TalkVerdict | None = None
 
     def to_json(self) -> SessionRecordPage:
-        """Returns the fields in JSON types; `conduct` and `reference` are left out if there are none."""
+        """Returns the fields in JSON types; `conduct`, `reference` and `talk_task` are left out if there are none."""
         page: SessionRecordPage = {
             "live": self.live,
             "reached": self.reached,
@@ -329,6 +333,8 @@ class SessionRecord:
             page["conduct"] = self.conduct.to_json()
         if self.reference is not None:
             page["reference"] = self.reference.to_json()
+        if self.talk_task is not None:
+            page["talk_task"] = self.talk_task.to_json()
         return page
 
     @classmethod
@@ -350,6 +356,7 @@ class SessionRecord:
             exceptions=tuple(MetException.from_json(each) for each in row["exceptions"]),
             conduct=ConductRecord.from_json(row["conduct"]) if "conduct" in row else None,
             reference=ReferenceDrive.from_json(row["reference"]) if "reference" in row else None,
+            talk_task=TalkVerdict.from_json(row["talk_task"]) if "talk_task" in row else None,
         )
 
 
@@ -379,6 +386,7 @@ def measure(session: Session, town: Town) -> SessionRecord:
         exceptions=met_exceptions(session, town),
         conduct=conduct_of(session, town),
         reference=recorded_reference(session.header),
+        talk_task=verdict_of(session, town),
     )
 
 

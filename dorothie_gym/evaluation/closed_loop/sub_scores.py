@@ -174,7 +174,7 @@ class ExchangesAgainstReference(ClosedLoopMetric):
     key: ClassVar[str] = "exchanges_against_reference"
     title: ClassVar[str] = "exchanges / reference"
     is_share: ClassVar[bool] = False
-    needs_reference: ClassVar[bool] = True
+    optional: ClassVar[bool] = True
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
         """Returns exchanges per subgoal of the session, and of its reference."""

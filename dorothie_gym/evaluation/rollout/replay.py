@@ -185,8 +185,8 @@ def _scenario(session: Session, seed: int, town: Town, storyboard: StoryboardTem
     templates: list[StoryboardTemplate | None] = [storyboard]
     if storyboard is None and header.storyboard in template_names():
         templates.append(load_template(header.storyboard))
-    stops = config_of(header).stops
-    drawn = [draw_scenario(town, template, seed, stops) for template in templates]
+    config = config_of(header)
+    drawn = [draw_scenario(town, template, seed, config.stops, config.talk) for template in templates]
     for scenario in drawn:
         if _fits(scenario, header):
             return scenario
