@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
@@ -154,34 +155,36 @@ def env_config(
     speech: bool = False,
     *,
     pictures: bool = False,
+    usual: EnvConfig | None = None,
 ) -> EnvConfig:
-    """Returns the engine settings of a command line.
+    """Returns the engine settings of a command line; exits if options exclude each other, or speech is not installed.
 
     Args:
-        max_seconds: simulated time after which a session is truncated [s]; None keeps the default.
-        word_errors: word error rate of the speech recogniser; None keeps the default.
+        max_seconds: simulated time after which a session is truncated, in place of a multiple of the reference [s];
+            None keeps the usual time.
+        word_errors: word error rate of simulated recognition, also in place of speech; None keeps the usual channel.
         perception: what participant and Co-Wizard see.
         speech: whether they speak; a word error rate is then refused.
         pictures: whether they observe the picture of the car's camera.
+        usual: settings that the options change, those of a tier; None for the default ones.
     """
     from dorothie_gym.session.config import CameraConfig, ChannelKind, EnvConfig
 
     if speech and word_errors is not None:
         fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")
+    config = EnvConfig() if usual is None else usual
+    if max_seconds is not None:
+        config = replace(config, max_seconds=max_seconds, time_factor=None)
+    if word_errors is not None:
+        config = replace(config, word_error_rate=word_errors, channel=ChannelKind.TEXT)
     if speech:
+        config = replace(config, channel=ChannelKind.SPEECH)
+    if config.channel is ChannelKind.SPEECH:
         try:
             check_installed()
         except SpeechError as error:
-            fail(str(error))
-
-    usual = EnvConfig()
-    return EnvConfig(
-        max_seconds=usual.max_seconds if max_seconds is None else max_seconds,
-        word_error_rate=usual.word_error_rate if word_errors is None else word_errors,
-        perception=perception,
-        camera=CameraConfig() if pictures else None,
-        channel=ChannelKind.SPEECH if speech else ChannelKind.TEXT,
-    )
+            fail(str(error) if speech else f"{error}; --word-errors RATE replaces speech by simulated recognition")
+    return replace(config, perception=perception, camera=CameraConfig() if pictures else None)
 
 
 # --- Players ----------------------------------------------------------------------------------------------------------
@@ -198,7 +201,11 @@ def find_cast(
         ad_wizard: as for the participant.
         language_model: options of the policies `llm:MODEL`.
     """
-    given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
+    return find_players(dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True)), language_model)
+
+
+def find_players(given: Mapping[Role, str], language_model: LanguageModelOptions) -> dict[Role, players.Player]:
+    """Returns the players of roles by their names or files; exits if one is unknown or cannot be loaded."""
     asks = any(name.startswith(players.LANGUAGE_MODEL) for name in given.values())
     config = language_model.config() if asks else None
     try:

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.completion import complete_towns
 from dorothie_gym.cli.options import AsJson, Players
-from dorothie_gym.cli.output import fail, print_json, reporting_errors, session_progress, stdout
+from dorothie_gym.cli.output import (
+    check_file,
+    exit_interrupted,
+    fail,
+    print_json,
+    reporting_errors,
+    session_progress,
+    stdout,
+)
 from dorothie_gym.cli.tier_options import TierName, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.support.processors import available_processors
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dorothie_gym.evaluation.closed_loop.running import RolloutPlan
+    from dorothie_gym.evaluation.tiers import Tier
+    from dorothie_gym.session.scenario import ReferenceDrive
 
 
 def reference_times(
@@ -44,20 +59,35 @@ def reference_times(
         except ValueError as error:
             fail(str(error))
         known = rollouts.read_drives(out) if out.is_file() else {}
-        compile_first()
+        check_file(out)
         drives = dict(known)
-        tasks = [(plan.town, plan.seed) for plan in plans]
-        with session_progress(quiet=as_json) as on_session:
-            on_session(0, len(tasks))
-            measured = rollouts.measure_drives(
-                tasks, found.config.stops, known, workers=workers or available_processors()
-            )
-            for number, (key, drive) in enumerate(measured, start=1):
-                drives[key] = drive
-                rollouts.write_drives(out, drives)
-                on_session(number, len(tasks))
+        try:
+            compile_first()
+            _measure(out, drives, plans, found, workers, quiet=as_json)
+        except KeyboardInterrupt:
+            exit_interrupted(f"Interrupted with {len(drives)} references in {out}; the same command measures the rest.")
     added = len(drives) - len(known)
     if as_json:
         print_json({"file": str(out), "drives": len(drives), "added": added})
         return
     stdout().print(f"{len(drives)} references in {out}, {added} of them new", markup=False, soft_wrap=True)
+
+
+def _measure(
+    out: Path,
+    drives: dict[str, ReferenceDrive],
+    plans: Sequence[RolloutPlan],
+    tier: Tier,
+    workers: int | None,
+    *,
+    quiet: bool,
+) -> None:
+    """Measures the references of scenarios that `drives` does not have; writes each as soon as it is known."""
+    tasks = [(plan.town, plan.seed) for plan in plans]
+    with session_progress(quiet=quiet) as on_session:
+        on_session(0, len(tasks))
+        measured = rollouts.measure_drives(tasks, tier.config.stops, drives, workers=workers or available_processors())
+        for number, (key, drive) in enumerate(measured, start=1):
+            drives[key] = drive
+            rollouts.write_drives(out, drives)
+            on_session(number, len(tasks))

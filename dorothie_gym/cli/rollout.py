@@ -36,6 +36,7 @@ from dorothie_gym.cli.options import (
     TierAdWizard,
     TierParticipant,
     WordErrors,
+    env_config,
     find_cast,
 )
 from dorothie_gym.cli.output import (
@@ -47,11 +48,12 @@ from dorothie_gym.cli.output import (
     session_progress,
     wide_stdout,
 )
-from dorothie_gym.cli.tier_options import TierName, chosen_config, find_pool, participants_of, tier_of
+from dorothie_gym.cli.tier_options import TierName, check_oracle, find_pool, participants_of, tier_config, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.maps.folds import TownFold
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.config import PerceptionModel
 from dorothie_gym.support.processors import available_processors
 
@@ -119,19 +121,20 @@ def rollout(
             prices=llm_prices,
         )
         found = tier_of(tier)
-        if oracle and found is None:
-            fail("--oracle plays the oracle of a tier; give it with --tier")
-        config = chosen_config(
-            found,
-            oracle=oracle,
-            max_seconds=max_seconds,
-            word_errors=word_errors,
-            perception=perception,
-            speech=speech,
-            pictures=llm_pictures,
-        )
+        if oracle:
+            replaced = {
+                "--co-wizard": co_wizard != "scripted",
+                "--word-errors": word_errors is not None,
+                "--speech": speech,
+                "--perception": perception is not PerceptionModel.SYMBOLIC,
+            }
+            check_oracle(found, replaced)
+        usual = tier_config(found, oracle=oracle)
+        config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures, usual=usual)
         pool = participants_of(participant, found)
         ad_wizard = ad_wizard or (found.ad_wizard if found else "scripted")
+        if oracle and found is not None:
+            co_wizard = found.oracle_player
         cast = find_cast(pool[0], co_wizard, ad_wizard, asked)
         try:
             settings = closed_loop.RolloutSettings(
@@ -140,11 +143,11 @@ def rollout(
                 sessions=sessions,
                 seed=seed,
                 config=config,
-                pool=find_pool(pool, asked),
+                pool=find_pool(pool, cast[Role.PARTICIPANT], asked),
                 trials=trials,
                 tier=tier,
                 oracle=oracle,
-                references=found is not None or trials > 1,
+                references=config.talk is None and (found is not None or trials > 1),
             )
         except ValueError as error:
             fail(str(error))

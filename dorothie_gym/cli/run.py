@@ -37,6 +37,7 @@ from dorothie_gym.cli.options import (
     TierParticipant,
     View,
     WordErrors,
+    env_config,
     find_cast,
     needs,
 )
@@ -50,7 +51,7 @@ from dorothie_gym.cli.output import (
     reporting_errors,
     stdout,
 )
-from dorothie_gym.cli.tier_options import TierName, chosen_config, participant_of, tier_of
+from dorothie_gym.cli.tier_options import TierName, participant_of, tier_config, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import closed_loop
 from dorothie_gym.evaluation import rollout as rollouts
@@ -60,6 +61,7 @@ from dorothie_gym.session.config import PerceptionModel, RenderView
 if TYPE_CHECKING:
     from dorothie_gym.cli.live import Pace
     from dorothie_gym.cli.live_film import Film
+    from dorothie_gym.session.config import EnvConfig
     from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.session_log import SessionSummary
 
@@ -73,7 +75,6 @@ class _Plan:
     """Options of the command line."""
 
     town: str
-    tier: str | None
     storyboard: str | None
     seed: int
     out: Path | None
@@ -81,10 +82,7 @@ class _Plan:
     video: Path | None
     view: RenderView
     players: tuple[str, str, str]
-    max_seconds: float | None
-    word_errors: float | None
-    perception: PerceptionModel
-    speech: bool
+    config: EnvConfig
     language_model: LanguageModelOptions
     speed: float | None
 
@@ -148,9 +146,10 @@ def run(
         fail("--picture and --no-picture exclude each other; give one of them")
     found = tier_of(tier)
     ad_wizard = ad_wizard or (found.ad_wizard if found else "scripted")
+    usual = tier_config(found)
+    config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures, usual=usual)
     plan = _Plan(
         town=town or (found.town if found else DEFAULT_TOWN),
-        tier=tier,
         storyboard=storyboard,
         seed=seed,
         out=out,
@@ -158,10 +157,7 @@ def run(
         video=video,
         view=view,
         players=(participant_of(participant, found, seed), co_wizard, ad_wizard),
-        max_seconds=max_seconds,
-        word_errors=word_errors,
-        perception=perception,
-        speech=speech,
+        config=config,
         language_model=LanguageModelOptions(
             url=llm_url,
             timeout=llm_timeout,
@@ -201,17 +197,9 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
 
     cast = find_cast(*plan.players, plan.language_model)
     filmed = plan.video is not None and plan.view is not RenderView.MAP
-    drawn = plan.perception is PerceptionModel.CAMERA or plan.language_model.pictures
+    drawn = plan.config.perception is PerceptionModel.CAMERA or plan.config.camera is not None
     compile_first(pictures=filmed or drawn)
-    config = chosen_config(
-        tier_of(plan.tier),
-        max_seconds=plan.max_seconds,
-        word_errors=plan.word_errors,
-        perception=plan.perception,
-        speech=plan.speech,
-        pictures=plan.language_model.pictures,
-    )
-    engine = SessionEngine(plan.town, plan.storyboard, config=config)
+    engine = SessionEngine(plan.town, plan.storyboard, config=plan.config)
     engine.reset(seed=plan.seed)
     try:
         policies = {role: player.make(role, engine.limits) for role, player in cast.items()}

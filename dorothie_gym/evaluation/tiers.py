@@ -15,6 +15,7 @@ from dorothie_gym.maps.folds import DEFAULT_TOWN, DEVELOPMENT_TOWNS, SEEN_TOWNS,
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.sim.config import AutomaticBraking, WorldConfig
 from dorothie_gym.support.copying import shared
+from dorothie_gym.tasks.briefs import TalkFamily
 
 HELD_OUT_PERSONAS: Final = ("scripted:talkativeness=0.8..1", "scripted:certainty=0..0.2")
 """Participants with traits that no learned role has met in training (`learned_role.practice.TRAINED`)."""
@@ -38,6 +39,7 @@ class Tier:
         ad_wizard: player of the Ad-Wizard.
         towns: towns, which take turns.
         town: town of environments and single sessions that name none.
+        oracle_player: player of the Co-Wizard that is the oracle.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Tier:
     ad_wizard: str
     towns: tuple[str, ...]
     town: str = DEFAULT_TOWN
+    oracle_player: str = "scripted"
 
     @property
     def oracle(self) -> EnvConfig:
@@ -118,8 +121,29 @@ STRANGERS: Final = Tier(
 )
 """Spoken words, in generated towns that nothing was trained in; `--towns` adds imported maps."""
 
-TIERS: Final[Mapping[str, Tier]] = MappingProxyType({tier.name: tier for tier in (STANDARD, EARS, ROUGH, STRANGERS)})
-"""All tiers by name, from the easiest."""
+
+def _talk_tier(family: TalkFamily) -> Tier:
+    """Returns the tier of a family of talk tasks: exact words without acts, and a minute."""
+    return Tier(
+        name=str(family),
+        config=EnvConfig(observe_acts=False, word_error_rate=0.0, max_seconds=60.0, talk=family),
+        participants=("client",),
+        ad_wizard="street-closer",
+        towns=_SHIPPED,
+        oracle_player="talk-oracle",
+    )
+
+
+ASK_FIRST: Final = _talk_tier(TalkFamily.ASK_FIRST)
+"""Requests of which some must be settled before anything is done."""
+
+ADMIT_IT: Final = _talk_tier(TalkFamily.ADMIT_IT)
+"""Requests of which some cannot or must not be fulfilled."""
+
+TIERS: Final[Mapping[str, Tier]] = MappingProxyType(
+    {tier.name: tier for tier in (STANDARD, EARS, ROUGH, STRANGERS, ASK_FIRST, ADMIT_IT)}
+)
+"""All tiers by name: those of driving from the easiest, and those of talk."""
 
 
 def find_tier(name: str) -> Tier:

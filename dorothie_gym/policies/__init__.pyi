@@ -2,6 +2,8 @@
 
 from .ad_wizard import ScriptedAdWizard as ScriptedAdWizard
 from .ad_wizard import Trick as Trick
+from .client import Client as Client
+from .client import StreetCloser as StreetCloser
 from .co_wizard.policy import ScriptedCoWizard as ScriptedCoWizard
 from .participant.policy import ScriptedParticipant as ScriptedParticipant
 from .policy import DESCRIPTION as DESCRIPTION
@@ -23,6 +25,7 @@ from .pretrained import pretrained_card as pretrained_card
 from .pretrained import pretrained_folder as pretrained_folder
 from .pretrained import pretrained_names as pretrained_names
 from .pretrained import pretrained_size as pretrained_size
+from .talk_drivers import TalkDriver as TalkDriver
 from .trivial import LaneFollowPolicy as LaneFollowPolicy
 from .trivial import RandomPolicy as RandomPolicy
 from .trivial import SilentPolicy as SilentPolicy

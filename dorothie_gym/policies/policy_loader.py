@@ -50,9 +50,19 @@ LANE_FOLLOW = "lane-follow"
 """Name of the Co-Wizard's policy that drives and never talks."""
 
 
+TALK_POLICIES: Final[Mapping[Role, tuple[str, ...]]] = MappingProxyType(
+    {
+        Role.PARTICIPANT: ("client",),
+        Role.CO_WIZARD: ("talk-oracle", "always-asks", "never-asks", "says-yes", "keyword-rule"),
+        Role.AD_WIZARD: ("street-closer",),
+    }
+)
+"""Names of the policies of talk tasks (docs/tiers.md), by role."""
+
+
 def policy_names(role: Role) -> tuple[str, ...]:
     """Returns the names that `make_policy` accepts for a role."""
-    own = (LANE_FOLLOW,) if role is Role.CO_WIZARD else ()
+    own = (*((LANE_FOLLOW,) if role is Role.CO_WIZARD else ()), *TALK_POLICIES.get(role, ()))
     return (*POLICY_NAMES, *own, *names_for(role))
 
 
@@ -93,8 +103,8 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if is_pretrained(name):
         check_fits(name)
         return _trained_player(name, pretrained_folder(name), role).make(role, limits or SpaceLimits())
-    if name == LANE_FOLLOW:
-        return policies.LaneFollowPolicy(limits)
+    if name == LANE_FOLLOW or name in TALK_POLICIES[role]:
+        return _simple_policy(name, role, limits)
     if role is Role.PARTICIPANT:
         return policies.ScriptedParticipant(limits)
     return policies.ScriptedCoWizard(limits) if role is Role.CO_WIZARD else policies.ScriptedAdWizard(limits)
@@ -114,6 +124,13 @@ def _with_traits(given: str, role: Role, limits: SpaceLimits | None) -> AnyPolic
 def _is_own(name: str) -> bool:
     """Returns whether a name refers to a class of the user."""
     return is_reference(name) and not name.startswith((WITH_TRAITS, LANGUAGE_MODEL, PREFIX))
+
+
+def _simple_policy(name: str, role: Role, limits: SpaceLimits | None) -> AnyPolicy:
+    """Returns the policy that follows its lane, or one of talk tasks."""
+    if role is Role.CO_WIZARD:
+        return policies.LaneFollowPolicy(limits) if name == LANE_FOLLOW else policies.TalkDriver(name, limits)
+    return policies.Client(limits) if role is Role.PARTICIPANT else policies.StreetCloser(limits)
 
 
 def _gives_traits(name: str, role: Role) -> bool:

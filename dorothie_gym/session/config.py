@@ -20,6 +20,7 @@ from dorothie_gym.session.sensor_config import (
 )
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
+from dorothie_gym.tasks.briefs import TalkFamily
 
 # --- First-person camera ----------------------------------------------------------------------------------------------
 
@@ -153,6 +154,8 @@ class EnvConfig:
         time_factor: time after which the session is truncated as a multiple of the reference time of its scenario
             (`Scenario.reference`); `max_seconds` is then an upper bound. None for `max_seconds` alone.
         stops: range of the number of stops, the subgoals at the start, of drawn storyboards; None draws from all.
+        talk: family of talk tasks that replace drawn storyboards, see `dorothie_gym.session.talk_tasks`; None draws
+            storyboards.
     """
 
     decision_frequency: float = 2.0
@@ -169,6 +172,7 @@ class EnvConfig:
     channel: ChannelKind = ChannelKind.TEXT
     time_factor: float | None = None
     stops: tuple[int, int] | None = None
+    talk: TalkFamily | None = None
 
     def __post_init__(self) -> None:
         frames = FRAME_RATE / self.decision_frequency if self.decision_frequency > 0 else 0.5
@@ -192,6 +196,10 @@ class EnvConfig:
         object.__setattr__(self, "channel", ChannelKind(self.channel))
         if self.time_factor is not None and not 0.1 <= self.time_factor <= 100.0:
             raise ValueError(f"EnvConfig.time_factor is {self.time_factor}; it must be in 0.1..100, or None")
+        if self.talk is not None:
+            if self.talk not in (families := list(map(str, TalkFamily))):
+                raise ValueError(f"EnvConfig.talk is {self.talk!r}; it must be {' or '.join(families)}, or None")
+            object.__setattr__(self, "talk", TalkFamily(self.talk))
         self._check_stops()
 
     def _check_stops(self) -> None:
@@ -240,8 +248,8 @@ class EnvConfig:
     def record(self) -> dict[str, object]:
         """Returns the settings in JSON types, for records.
 
-        They lack cameras and sensors, which have no effect on a session, and the usual perception, channel, time and
-        stops, so that records are equal to those of versions without a choice.
+        They lack cameras and sensors, which have no effect on a session, and the usual perception, channel, time,
+        stops and storyboards, so that records are equal to those of versions without a choice.
         """
         settings = {**asdict(self), "world": self.world.record()}
         for name in ("camera", "cameras", "sensors"):
@@ -254,6 +262,8 @@ class EnvConfig:
             del settings["time_factor"]
         if settings.pop("stops") is not None:
             settings["stops"] = list(self.stops or ())
+        if settings.pop("talk") is not None:
+            settings["talk"] = str(self.talk)
         return settings
 
 

@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Final, TypeAlias, TypedDict
 
 import gymnasium
 import numpy as np
+from msgspec import Meta
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
-from dorothie_gym.errors import StoryboardError, did_you_mean, short_repr
+from dorothie_gym.errors import SessionError, StoryboardError, did_you_mean, short_repr
 from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
+from dorothie_gym.session.talk_kinds import draw_talk_task
+from dorothie_gym.session.talk_tasks import storyboard_of
 from dorothie_gym.support.copying import shared
+from dorothie_gym.support.input_files import checked, raising
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.tasks.briefs import TalkFamily
 
 STREET_NAMES = tuple(
     name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
 )
 """The fourteen names that are drawn for streets."""
+
+
+class ReferencePage(TypedDict):
+    """Reference of a scenario in JSON types; fields as in `ReferenceDrive`."""
+
+    seconds: Annotated[float, Meta(ge=0.0, le=1e12)]
+    exchanges: Annotated[int, Meta(ge=0, lt=2**31)]
+    subgoals: Annotated[int, Meta(ge=0, lt=2**31)]
 
 
 @shared
@@ -47,9 +60,31 @@ class ReferenceDrive:
         """Returns the reference time for a number of live subgoals: more in proportion if some were added [s]."""
         return self.seconds * max(1.0, live / self.subgoals) if self.subgoals else self.seconds
 
+    def to_json(self) -> ReferencePage:
+        """Returns the fields in JSON types."""
+        return {"seconds": self.seconds, "exchanges": self.exchanges, "subgoals": self.subgoals}
+
+    @classmethod
+    def from_json(cls, row: ReferencePage) -> ReferenceDrive:
+        """Parses the output of `to_json`."""
+        return cls(**row)
+
 
 REFERENCE: Final = "reference"
-"""Field of `SessionHeader.extra` with the reference of the scenario: the fields of `ReferenceDrive`."""
+"""Field of `SessionHeader.extra` with the reference of the scenario (`ReferencePage`)."""
+
+
+def recorded_reference(header: SessionHeader) -> ReferenceDrive | None:
+    """Returns the reference of a recorded session's scenario; None if it was not measured.
+
+    Raises:
+        SessionError: the field of the header is damaged.
+    """
+    if REFERENCE not in header.extra:
+        return None
+    with raising(SessionError):
+        page = checked(header.extra[REFERENCE], ReferencePage, f"header, {REFERENCE}")
+    return ReferenceDrive.from_json(page)
 
 
 @shared
@@ -116,7 +151,11 @@ def template_option(storyboard: str | Path | StoryboardTemplate | None) -> Story
 
 
 def draw_scenario(
-    town: Town, template: StoryboardTemplate | None, seed: int, stops: tuple[int, int] | None = None
+    town: Town,
+    template: StoryboardTemplate | None,
+    seed: int,
+    stops: tuple[int, int] | None = None,
+    talk: TalkFamily | None = None,
 ) -> Scenario:
     """Draws a scenario; equal arguments give equal scenarios.
 
@@ -125,11 +164,14 @@ def draw_scenario(
         template: template of the storyboard; None draws one of the shipped templates that fit the town.
         seed: any integer >= 0.
         stops: range of the number of stops of a drawn template, see `EnvConfig.stops`; None draws from all.
+        talk: family of a talk task that replaces a drawn template, see `EnvConfig.talk`.
 
     Raises:
         StoryboardError: the template cannot be bound to the town, or none fits it.
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    if talk is not None and template is None:
+        return _talk_scenario(town, talk, seed, streets, departure)
     sites = connected_sites(town)
     if template is None and stops is not None:
         fitting = _with_stops(fitting_templates(town), stops, town)
@@ -149,6 +191,24 @@ def draw_scenario(
         storyboard=storyboard,
         street_names=_name_streets(town, streets),
         departure=(start.lane, start.station),
+    )
+
+
+def _talk_scenario(
+    town: Town, family: TalkFamily, seed: int, streets: np.random.Generator, departure: np.random.Generator
+) -> Scenario:
+    """Draws the scenario of a talk task."""
+    names = _name_streets(town, streets)
+    task = draw_talk_task(town, names, family, seed)
+    storyboard = storyboard_of(task)
+    taken = {landmark.site for landmark in storyboard.landmarks}
+    free = [site for site in connected_sites(town) if site.id not in taken] or list(connected_sites(town))
+    start = free[int(departure.integers(len(free)))]
+    return Scenario(
+        seed=seed,
+        storyboard=storyboard,
+        street_names=names,
+        departure=task.departure or (start.lane, start.station),
     )
 
 
@@ -241,7 +301,7 @@ def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader
         story=storyboard.story,
         departure=scenario.departure,
         config=config.record(),
-        extra={} if scenario.reference is None else {REFERENCE: asdict(scenario.reference)},
+        extra={} if scenario.reference is None else {REFERENCE: scenario.reference.to_json()},
     )
 
 

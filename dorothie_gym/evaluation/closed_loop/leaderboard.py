@@ -19,13 +19,15 @@ from dorothie_gym.evaluation.closed_loop.results import (
     RolloutResult,
     RolloutTable,
     figure_text,
+    is_undefined,
     read_result,
 )
-from dorothie_gym.evaluation.closed_loop.running import command_of, fold_of_towns
+from dorothie_gym.evaluation.closed_loop.running import command_of, fold_of_towns, is_given, towns_text, usual_settings
 from dorothie_gym.evaluation.closed_loop.session_record import Amount
 from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, SubmissionCheck, check_submission
 from dorothie_gym.evaluation.closed_loop.usage import tokens_text
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
+from dorothie_gym.evaluation.tiers import TIERS
 from dorothie_gym.maps.default_lights import split_lights
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
@@ -49,8 +51,9 @@ PART_TITLES: Final[Mapping[str, str]] = {
     "unseen": "Unseen towns",
     IMPORTED: "Imported towns",
     OTHER: "Other towns",
+    **{name: f"Tier {name}" for name in TIERS},
 }
-"""Parts of the page and their titles."""
+"""Parts of the page and their titles: towns, and tiers of the benchmark."""
 
 ENOUGH: Final = 100
 """Minimum number of sessions of a row that is compared, as in `submission.LeaderboardProtocol`."""
@@ -58,10 +61,11 @@ ENOUGH: Final = 100
 _KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind if kind is not ExceptionKind.NONE), NO_EXCEPTION)
 
 PAGE_METRICS: Final = (
+    "timely_completion", "all_trials",
     "success", "goal_condition_success", "spl", "route_completion", "infraction_score", "driving_score", "seconds",
     "exchanges_per_subgoal", "clarification_rate", "exceptions_recovered", "recovery_seconds",
 )  # fmt: skip
-"""Keys of the metrics on the page."""
+"""Keys of the metrics on the page; those that need references or trials are left out of parts without them."""
 
 _IN_TABLES: Final = (Claim.FIGURES, Claim.NAME, Claim.WEIGHTS, Claim.LANGUAGE_MODEL, Claim.PERSONA)
 """Claims in the column of the tables of figures; other claims have columns of their own, whose titles say so."""
@@ -98,20 +102,27 @@ class LeaderboardEntry:
 
     @property
     def policy(self) -> str:
-        """Name of the row: the Co-Wizard, other roles that are not scripted, and the word error rate."""
-        settings = self.result.settings
+        """Name of the row: the Co-Wizard, and what is unusual: other roles, words, perception, time, trials."""
+        settings, usual = self.result.settings, usual_settings(self.result.settings)
+        config = settings["config"]
         name = str(settings[str(Role.CO_WIZARD)])
-        others = [
+        others = [f"tier {settings['tier']}"] if "tier" in settings.keys() - usual.keys() else []
+        others += ["oracle"] if settings.get("oracle") else []
+        others += [
             f"{role.value.replace('_', '-')} {settings[str(role)]}"
             for role in (Role.PARTICIPANT, Role.AD_WIZARD)
-            if settings[str(role)] != "scripted"
+            if settings[str(role)] != usual[str(role)]
         ]
-        if (rate := settings["config"]["word_error_rate"]) != EnvConfig.word_error_rate:
-            others.append(f"word errors {100 * rate:g} %")
-        if perception := settings["config"].get("perception"):
+        if is_given(config, usual["config"], "word_error_rate"):
+            others.append(f"word errors {100 * config['word_error_rate']:g} %")
+        if perception := config.get("perception"):
             others.append(f"perception {perception}")
-        if channel := settings["config"].get("channel"):
+        if (channel := config.get("channel")) and channel != usual["config"].get("channel"):
             others.append(f"channel {channel}")
+        if "tier" in usual and settings["towns"] != usual["towns"]:
+            others.append(f"towns {towns_text(settings['towns'])}")
+        if trials := settings.get("trials"):
+            others.append(f"{trials} trials")
         if self.shortened:
             others.append(f"sessions of at most {self.time_limit:g} s")
         if self.silent:
@@ -132,7 +143,7 @@ class LeaderboardEntry:
     @property
     def shortened(self) -> bool:
         """Whether sessions were truncated earlier than usual."""
-        return self.time_limit < EnvConfig().max_seconds
+        return self.time_limit < float(usual_settings(self.result.settings)["config"]["max_seconds"])
 
     @property
     def silent(self) -> bool:
@@ -142,15 +153,21 @@ class LeaderboardEntry:
     @property
     def part(self) -> str:
         """Part of the page, a key of `PART_TITLES`."""
-        towns = self.result.settings["towns"]
+        towns, usual = self.result.settings["towns"], usual_settings(self.result.settings)
+        if "tier" in usual:
+            return str(usual["tier"])
         imported = all(split_lights(str(town))[0].lower().endswith(".xodr") for town in towns)
         return fold_of_towns(towns) or (IMPORTED if imported else OTHER)
 
     @property
     def rank(self) -> tuple[bool, float, float, str]:
-        """Sort key: neither shortened nor silent first; success, then driving score, best first; then the name."""
-        success, score = (self.table.figures[key]["mean"] for key in ("success", "driving_score"))
-        return self.shortened or self.silent, -(success or 0.0), -(score or 0.0), self.policy
+        """Sort key: neither shortened nor silent first; success, then driving score, best first; then the name.
+
+        In a tier, timely completion is in place of success.
+        """
+        keys = ("timely_completion" if self.part in TIERS else "success", "driving_score")
+        first, second = (self.table.figures[key]["mean"] for key in keys)
+        return self.shortened or self.silent, -(first or 0.0), -(second or 0.0), self.policy
 
 
 def read_entries(folders: Sequence[Path | str]) -> tuple[LeaderboardEntry, ...]:
@@ -260,8 +277,8 @@ def leaderboard_page(
         "package has the policy, which is then played again, too. The cost of training and running, and the usage of",
         "language models, are always claims.",
     ]
-    usual = f"{EnvConfig().max_seconds:g} s"
     if any(entry.shortened for entry in entries):
+        usual = f"{EnvConfig().max_seconds:g} s{' or those of their tier' * any(e.part in TIERS for e in entries)}"
         lines += [
             "",
             f"Rollouts with sessions shorter than {usual} are marked and ranked after the others:",
@@ -303,7 +320,9 @@ def leaderboard_page(
 
 
 def _figures(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
-    columns: list[ShownMetric] = [next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS]
+    tables = {entry.policy: entry.table for entry in entries}
+    metrics: list[ShownMetric] = [next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS]
+    columns = [metric for metric in metrics if not (metric.optional and is_undefined(metric, tables))]
     rows = [["Co-Wizard", "sessions", "errored", CLAIMED, *(metric.title for metric in columns)]]
     for entry in entries:
         cells = [figure_text(metric, entry.table.figures[metric.key]) for metric in columns]

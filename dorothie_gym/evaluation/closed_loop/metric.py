@@ -25,7 +25,7 @@ class ClosedLoopMetric(ABC):
         worst: value of a session that ended in an error; None leaves such sessions out.
         is_share: whether tables show the metric in per cent.
         counts_sessions: whether the metric is 0 or 1 for a session.
-        needs_reference: whether it needs the reference of the scenario, see `ReferenceDrive`.
+        optional: whether tables leave it out where no session has it, as without a `ReferenceDrive`.
     """
 
     key: ClassVar[str]
@@ -33,7 +33,7 @@ class ClosedLoopMetric(ABC):
     worst: ClassVar[float | None] = None
     is_share: ClassVar[bool] = True
     counts_sessions: ClassVar[bool] = False
-    needs_reference: ClassVar[bool] = False
+    optional: ClassVar[bool] = False
 
     @abstractmethod
     def parts(self, record: SessionRecord) -> tuple[float, float]:
@@ -44,3 +44,16 @@ class ClosedLoopMetric(ABC):
         sums = [self.parts(record) for record in records]
         lower = sum(part for _, part in sums)
         return sum(part for part, _ in sums) / lower if lower else None
+
+
+class SessionMetric(ClosedLoopMetric):
+    """Metric that a session has once; over several sessions it is the mean."""
+
+    @abstractmethod
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the value of a session; None leaves the session out."""
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the value and 1, or (0, 0) for a session that is left out."""
+        value = self.value(record)
+        return (0.0, 0.0) if value is None else (value, 1.0)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.evaluation.analysis.intervals import bootstrap_weights, percentile_interval, wilson_interval
-from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT, ClosedLoopMetric
+from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT, ClosedLoopMetric, SessionMetric
 from dorothie_gym.evaluation.closed_loop.sub_scores import (
     Discomfort,
     ExchangesAgainstReference,
@@ -26,6 +26,7 @@ from dorothie_gym.evaluation.closed_loop.sub_scores import (
     Truth,
     UnansweredQuestions,
 )
+from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkSuccess, UnnecessaryQuestions
 from dorothie_gym.support import portable_arrays as pn
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ PENALTIES: Final[Mapping[str, float]] = MappingProxyType(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Success(ClosedLoopMetric):
+class Success(SessionMetric):
     """Whether all live subgoals were reached in an allowed order, destination last, without an at-fault collision."""
 
     key: ClassVar[str] = "success"
@@ -46,57 +47,57 @@ class Success(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
     counts_sessions: ClassVar[bool] = True
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns 1 for a success, else 0; and 1."""
-        return float(record.success), 1.0
+    def value(self, record: SessionRecord) -> float:
+        """Returns 1 for a success, else 0."""
+        return float(record.success)
 
 
 @dataclass(frozen=True, kw_only=True)
-class GoalConditionSuccess(ClosedLoopMetric):
+class GoalConditionSuccess(SessionMetric):
     """Share of the live subgoals that were reached (ALFRED; Shridhar et al., 2020)."""
 
     key: ClassVar[str] = "goal_condition_success"
     title: ClassVar[str] = "goals"
     worst: ClassVar[float | None] = 0.0
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the share) and the denominator (1) of the metric."""
-        return (record.reached / record.live, 1.0) if record.live else (0.0, 0.0)
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the share."""
+        return record.reached / record.live if record.live else None
 
 
 @dataclass(frozen=True, kw_only=True)
-class SPL(ClosedLoopMetric):
+class SPL(SessionMetric):
     """Success weighted by path length: success x shortest / max(shortest, driven) (Anderson et al., 2018)."""
 
     key: ClassVar[str] = "spl"
     title: ClassVar[str] = "SPL"
     worst: ClassVar[float | None] = 0.0
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the product) and the denominator (1) of the metric."""
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the product."""
         if not record.success:
-            return 0.0, 1.0
+            return 0.0
         if record.shortest is None:
-            return 0.0, 0.0
+            return None
         longest = max(record.shortest, record.driven)
-        return (record.shortest / longest if longest else 1.0), 1.0
+        return record.shortest / longest if longest else 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class RouteCompletion(ClosedLoopMetric):
+class RouteCompletion(SessionMetric):
     """Share of the route through the live subgoals that was driven (`session_record.route_completion`)."""
 
     key: ClassVar[str] = "route_completion"
     title: ClassVar[str] = "completion"
     worst: ClassVar[float | None] = 0.0
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the share) and the denominator (1) of the metric."""
-        return (0.0, 0.0) if record.completion is None else (record.completion, 1.0)
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the share."""
+        return record.completion
 
 
 @dataclass(frozen=True, kw_only=True)
-class InfractionScore(ClosedLoopMetric):
+class InfractionScore(SessionMetric):
     """Product of the penalties of all infractions; 1 without infractions.
 
     Attributes:
@@ -108,43 +109,42 @@ class InfractionScore(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
     penalties: Mapping[str, float] = field(default_factory=lambda: PENALTIES)
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the product) and the denominator (1) of the metric."""
+    def value(self, record: SessionRecord) -> float:
+        """Returns the product."""
         product = 1.0
         for name, count in record.infractions.items():
             product *= math.prod([self.penalties.get(name, 1.0)] * count)
-        return product, 1.0
+        return product
 
 
 @dataclass(frozen=True, kw_only=True)
-class Infractions(ClosedLoopMetric):
+class Infractions(SessionMetric):
     """Number of infractions of a session that have a penalty."""
 
     key: ClassVar[str] = "infractions"
     title: ClassVar[str] = "infractions"
     is_share: ClassVar[bool] = False
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the number of infractions) and the denominator (1) of the metric."""
-        return float(sum(count for name, count in record.infractions.items() if name in PENALTIES)), 1.0
+    def value(self, record: SessionRecord) -> float:
+        """Returns the number."""
+        return float(sum(count for name, count in record.infractions.items() if name in PENALTIES))
 
 
 @dataclass(frozen=True, kw_only=True)
-class DrivingScore(ClosedLoopMetric):
+class DrivingScore(SessionMetric):
     """Route completion x infraction score."""
 
     key: ClassVar[str] = "driving_score"
     title: ClassVar[str] = "driving score"
     worst: ClassVar[float | None] = 0.0
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the product) and the denominator (1) of the metric."""
-        share, counts = RouteCompletion().parts(record)
-        return share * InfractionScore().parts(record)[0], counts
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the product."""
+        return None if record.completion is None else record.completion * InfractionScore().value(record)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimelyCompletion(ClosedLoopMetric):
+class TimelyCompletion(SessionMetric):
     """Route completion x infraction score x min(1, 2 T_ref / T), with the time T and the reference time T_ref.
 
     The reference is that of the scenario (`ReferenceDrive`); sessions without one are left out.
@@ -153,14 +153,14 @@ class TimelyCompletion(ClosedLoopMetric):
     key: ClassVar[str] = "timely_completion"
     title: ClassVar[str] = "timely completion"
     worst: ClassVar[float | None] = 0.0
-    needs_reference: ClassVar[bool] = True
+    optional: ClassVar[bool] = True
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the product) and the denominator (1) of the metric."""
-        if record.reference is None:
-            return 0.0, 0.0
-        share, counts = DrivingScore().parts(record)
-        return share * min(1.0, TIMELY * record.reference.seconds_for(record.live) / max(record.seconds, 1e-9)), counts
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the product."""
+        score = DrivingScore().value(record)
+        if record.reference is None or score is None:
+            return None
+        return score * min(1.0, TIMELY * record.reference.seconds_for(record.live) / max(record.seconds, 1e-9))
 
 
 TIMELY: Final = 2.0
@@ -168,16 +168,16 @@ TIMELY: Final = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seconds(ClosedLoopMetric):
+class Seconds(SessionMetric):
     """Simulated time of a session [s]."""
 
     key: ClassVar[str] = "seconds"
     title: ClassVar[str] = "seconds"
     is_share: ClassVar[bool] = False
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the time) and the denominator (1) of the metric."""
-        return record.seconds, 1.0
+    def value(self, record: SessionRecord) -> float:
+        """Returns the time."""
+        return record.seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,16 +232,16 @@ class ClarificationRate(ClosedLoopMetric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExceptionsMet(ClosedLoopMetric):
+class ExceptionsMet(SessionMetric):
     """Number of exceptions that the car met (`met_exceptions`)."""
 
     key: ClassVar[str] = "exceptions_met"
     title: ClassVar[str] = "exceptions met"
     is_share: ClassVar[bool] = False
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the number of exceptions) and the denominator (1) of the metric."""
-        return float(sum(each.met is not None for each in record.exceptions)), 1.0
+    def value(self, record: SessionRecord) -> float:
+        """Returns the number."""
+        return float(sum(each.met is not None for each in record.exceptions))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,6 +258,7 @@ class ExceptionsRecovered(ClosedLoopMetric):
 
 
 METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
+    TalkSuccess(),
     TimelyCompletion(),
     Success(),
     GoalConditionSuccess(),
@@ -273,6 +274,7 @@ METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
     ClarificationRate(),
     ExchangesAgainstReference(),
     UnansweredQuestions(),
+    UnnecessaryQuestions(),
     Truth(),
     Discomfort(),
     HardBraking(),
@@ -289,7 +291,7 @@ class RecoverySeconds:
     key: ClassVar[str] = "recovery_seconds"
     title: ClassVar[str] = "seconds to recovery"
     is_share: ClassVar[bool] = False
-    needs_reference: ClassVar[bool] = False
+    optional: ClassVar[bool] = False
 
     def values(self, record: SessionRecord) -> tuple[float, ...]:
         """Returns the times of one session."""
@@ -311,7 +313,7 @@ class AllTrials:
     key: ClassVar[str] = "all_trials"
     title: ClassVar[str] = "Pass^3"
     is_share: ClassVar[bool] = True
-    needs_reference: ClassVar[bool] = True
+    optional: ClassVar[bool] = True
     trials: int = 3
 
     def interval(self, scenarios: Iterable[Sequence[bool]]) -> MetricInterval:
@@ -378,7 +380,7 @@ def figures_of(records: Sequence[SessionRecord], errored: int = 0) -> dict[str, 
 def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], errored: int = 0) -> MetricInterval:
     """Returns a metric over sessions with its interval; see `figures_of`."""
     parts = [metric.parts(record) for record in records]
-    if metric.worst is not None and not (metric.needs_reference and not any(lower for _, lower in parts)):
+    if metric.worst is not None and not (metric.optional and not any(lower for _, lower in parts)):
         parts += [(metric.worst, 1.0)] * errored
     if not any(lower for _, lower in parts):
         return MetricInterval(mean=None)

@@ -236,6 +236,9 @@ class _SettingsPage(TypedDict):
     seed: Annotated[int, Meta(ge=0)]
     config: _ConfigPage
     training: NotRequired[dict[str, _TrainingPage]]
+    tier: NotRequired[str]
+    oracle: NotRequired[bool]
+    trials: NotRequired[Annotated[int, Meta(ge=1, lt=2**31)]]
 
 
 class _ResultPage(TypedDict):
@@ -395,7 +398,7 @@ def figure_text(metric: ShownMetric, figure: FigurePage) -> str:
 def _overall(page: RolloutTable) -> Table:
     table = Table("metric", "mean [95 % interval]", title="Closed loop")
     for metric in ALL_METRICS:
-        if metric.needs_reference and page.figures[metric.key]["mean"] is None:
+        if metric.optional and page.figures[metric.key]["mean"] is None:
             continue
         table.add_row(metric.title, figure_text(metric, page.figures[metric.key]))
     return table
@@ -415,7 +418,7 @@ def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...], 
     figures = {
         metric.title: [figure_text(metric, page.figures[metric.key]).replace(" [", "\n[") for page in parts.values()]
         for metric in ALL_METRICS
-        if metric.key in keys and not (metric.needs_reference and _is_undefined(metric, parts))
+        if metric.key in keys and not (metric.optional and is_undefined(metric, parts))
     }
     taken, chosen = _width(first) + 1, dict[str, list[str]]()
     for title, cells in figures.items():
@@ -426,7 +429,8 @@ def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...], 
     yield _table(name, {**first, **chosen}, width)
 
 
-def _is_undefined(metric: ShownMetric, parts: Mapping[str, RolloutTable]) -> bool:
+def is_undefined(metric: ShownMetric, parts: Mapping[str, RolloutTable]) -> bool:
+    """Returns whether no table has a value of a metric."""
     return all(page.figures[metric.key]["mean"] is None for page in parts.values())
 
 

@@ -144,10 +144,9 @@ class RolloutSettings:
         Fields of tiers are left out where they have their defaults.
         """
         cast = self.players
+        players = [*cast.items(), *((Role.PARTICIPANT, player) for player in self.pool)]
         models = {
-            str(role): player.language_model.record()
-            for role, player in cast.items()
-            if player.language_model is not None
+            str(role): player.language_model.record() for role, player in players if player.language_model is not None
         }
         names = {str(role): cast[role].name for role in AGENT_ROLES}
         if self.pool:
@@ -177,8 +176,7 @@ def command_of(settings: Mapping[str, Any]) -> str:
 
     Settings of the engine without a command-line option are left out.
     """
-    config = settings["config"]
-    usual = _usual_config(settings)
+    config, usual = settings["config"], usual_settings(settings)["config"]
     words = ["dorothie-gym", "rollout"]
     if tier := settings.get("tier"):
         words += ["--tier", str(tier), *(["--oracle"] if settings.get("oracle") else [])]
@@ -189,22 +187,44 @@ def command_of(settings: Mapping[str, Any]) -> str:
     words += ["--towns", towns_text(settings["towns"])]
     words += ["--sessions", str(settings["sessions_planned"]), "--seed", str(settings["seed"])]
     for option, name in (("--max-seconds", "max_seconds"), ("--word-errors", "word_error_rate")):
-        if config[name] != getattr(usual, name):
+        if is_given(config, usual, name):
             words += [option, f"{config[name]:g}"]
     if perception := config.get("perception"):
         words += ["--perception", perception]
-    if config.get("channel") == ChannelKind.SPEECH and usual.channel is not ChannelKind.SPEECH:
+    if config.get("channel") == ChannelKind.SPEECH != usual.get("channel"):
         words += ["--speech"]
     words += _language_model_options(settings.get("language_models", {}))
     return shlex.join(words)
 
 
-def _usual_config(settings: Mapping[str, Any]) -> EnvConfig:
-    """Returns the settings of the engine that a rollout has without options for them."""
-    if settings.get("tier") not in TIERS:
-        return EnvConfig()
-    tier = TIERS[settings["tier"]]
-    return tier.oracle if settings.get("oracle") else tier.config
+def usual_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the settings that a rollout has without options for them: those of its tier, or the default ones.
+
+    Those of a tier have its name in the field `tier`, and its towns; no other settings have these fields.
+    """
+    tier = TIERS.get(str(settings.get("tier")))
+    if tier is None:
+        return {**{str(role): player.name for role, player in ALL_SCRIPTED.items()}, "config": EnvConfig().record()}
+    return {
+        str(Role.PARTICIPANT): POOL_SEPARATOR.join(tier.participants),
+        str(Role.CO_WIZARD): ALL_SCRIPTED[Role.CO_WIZARD].name,
+        str(Role.AD_WIZARD): tier.ad_wizard,
+        "config": (tier.oracle if settings.get("oracle") else tier.config).record(),
+        "tier": tier.name,
+        "towns": list(tier.towns),
+    }
+
+
+def is_given(config: Mapping[str, Any], usual: Mapping[str, Any], name: str) -> bool:
+    """Returns whether time or word errors were given as an option, which replaces the factor or the channel of a tier.
+
+    Args:
+        config: settings of the engine of a rollout (`EnvConfig.record`).
+        usual: those without options (`usual_settings`).
+        name: `max_seconds` or `word_error_rate`.
+    """
+    replaced = {"max_seconds": "time_factor", "word_error_rate": "channel"}[name]
+    return bool(config[name] != usual[name]) or (replaced in usual and replaced not in config)
 
 
 def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str]:

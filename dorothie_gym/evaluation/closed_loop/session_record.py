@@ -17,6 +17,7 @@ from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTA
 from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT
 from dorothie_gym.evaluation.closed_loop.sub_scores import ConductPage, ConductRecord, conduct_of
+from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkVerdict, TalkVerdictPage, verdict_of
 from dorothie_gym.evaluation.closed_loop.task_progress import (
     TaskRecord,
     TaskRoutes,
@@ -31,9 +32,8 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
-from dorothie_gym.session.scenario import REFERENCE, ReferenceDrive
+from dorothie_gym.session.scenario import ReferenceDrive, ReferencePage, recorded_reference
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.support.input_files import checked, raising
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Place
@@ -274,14 +274,7 @@ class SessionRecordPage(TypedDict):
     exceptions: list[MetExceptionPage]
     conduct: NotRequired[ConductPage]
     reference: NotRequired[ReferencePage]
-
-
-class ReferencePage(TypedDict):
-    """Reference of a scenario in JSON types; fields as in `ReferenceDrive`."""
-
-    seconds: Amount
-    exchanges: Count
-    subgoals: Count
+    talk_task: NotRequired[TalkVerdictPage]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -303,6 +296,7 @@ class SessionRecord:
         exceptions: exceptions of the session.
         conduct: answers, truth and comfort; None in results of versions that did not measure them.
         reference: reference of the scenario; None if it was not measured.
+        talk_task: verdict on the talk task; None if the session has none.
     """
 
     live: int
@@ -318,9 +312,10 @@ class SessionRecord:
     exceptions: tuple[MetException, ...] = ()
     conduct: ConductRecord | None = None
     reference: ReferenceDrive | None = None
+    talk_task: TalkVerdict | None = None
 
     def to_json(self) -> SessionRecordPage:
-        """Returns the fields in JSON types; `conduct` and `reference` are left out if there are none."""
+        """Returns the fields in JSON types; `conduct`, `reference` and `talk_task` are left out if there are none."""
         page: SessionRecordPage = {
             "live": self.live,
             "reached": self.reached,
@@ -337,12 +332,9 @@ class SessionRecord:
         if self.conduct is not None:
             page["conduct"] = self.conduct.to_json()
         if self.reference is not None:
-            reference = self.reference
-            page["reference"] = {
-                "seconds": reference.seconds,
-                "exchanges": reference.exchanges,
-                "subgoals": reference.subgoals,
-            }
+            page["reference"] = self.reference.to_json()
+        if self.talk_task is not None:
+            page["talk_task"] = self.talk_task.to_json()
         return page
 
     @classmethod
@@ -363,7 +355,8 @@ class SessionRecord:
             talk=TalkRecord.from_json(row["talk"]),
             exceptions=tuple(MetException.from_json(each) for each in row["exceptions"]),
             conduct=ConductRecord.from_json(row["conduct"]) if "conduct" in row else None,
-            reference=ReferenceDrive(**row["reference"]) if "reference" in row else None,
+            reference=ReferenceDrive.from_json(row["reference"]) if "reference" in row else None,
+            talk_task=TalkVerdict.from_json(row["talk_task"]) if "talk_task" in row else None,
         )
 
 
@@ -392,15 +385,9 @@ def measure(session: Session, town: Town) -> SessionRecord:
         talk=talk_of(session),
         exceptions=met_exceptions(session, town),
         conduct=conduct_of(session, town),
-        reference=_reference_of(session),
+        reference=recorded_reference(session.header),
+        talk_task=verdict_of(session, town),
     )
-
-
-def _reference_of(session: Session) -> ReferenceDrive | None:
-    """Returns the reference of a session's scenario from its header; None if it has none."""
-    page = session.header.extra.get(REFERENCE)
-    with raising(RolloutError):
-        return None if page is None else checked(page, ReferenceDrive, f"{session.name}: header, {REFERENCE}")
 
 
 def count_infractions(session: Session) -> dict[str, int]:

@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
 from dorothie_gym.evaluation.analysis.truth_checks.truth import is_true
 from dorothie_gym.evaluation.analysis.units import Units
-from dorothie_gym.evaluation.closed_loop.metric import ClosedLoopMetric
+from dorothie_gym.evaluation.closed_loop.metric import ClosedLoopMetric, SessionMetric
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.sim.config import FRAME_RATE
@@ -174,7 +174,7 @@ class ExchangesAgainstReference(ClosedLoopMetric):
     key: ClassVar[str] = "exchanges_against_reference"
     title: ClassVar[str] = "exchanges / reference"
     is_share: ClassVar[bool] = False
-    needs_reference: ClassVar[bool] = True
+    optional: ClassVar[bool] = True
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
         """Returns exchanges per subgoal of the session, and of its reference."""
@@ -224,13 +224,13 @@ class Discomfort(ClosedLoopMetric):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HardBraking(ClosedLoopMetric):
+class HardBraking(SessionMetric):
     """Number of hard brakings of a session."""
 
     key: ClassVar[str] = "hard_brakings"
     title: ClassVar[str] = "hard brakings"
     is_share: ClassVar[bool] = False
 
-    def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Returns the numerator (the number) and the denominator (1) of the metric."""
-        return (0.0, 0.0) if record.conduct is None else (float(record.conduct.hard_brakings), 1.0)
+    def value(self, record: SessionRecord) -> float | None:
+        """Returns the number."""
+        return None if record.conduct is None else float(record.conduct.hard_brakings)

@@ -82,6 +82,7 @@ class LeaderboardProtocol:
 
     def faults(self, settings: Mapping[str, Any]) -> Iterator[str]:
         """Yields the parts of a rollout's settings (`RolloutSettings.to_json`) that the protocol does not allow."""
+        yield from faults_of_tier(settings)
         towns = [str(town) for town in settings["towns"]]
         whole = {fold: list(parse_towns(fold)) for fold in self.folds}
         if fold_of_towns(towns) not in self.folds or towns not in whole.values():
@@ -105,6 +106,14 @@ class LeaderboardProtocol:
     def plans(self, towns: Sequence[str]) -> tuple[RolloutPlan, ...]:
         """Returns the sessions of the protocol in the towns of a fold, in order."""
         return RolloutSettings(towns=tuple(towns), sessions=self.sessions, seed=self.seed).plans()
+
+
+def faults_of_tier(settings: Mapping[str, Any]) -> Iterator[str]:
+    """Yields the parts of a rollout's settings that come from the options `--tier` and `--trials`."""
+    if tier := settings.get("tier"):
+        yield f"tier is {short_repr(tier)}; submissions have the default conditions: run the rollout without --tier"
+    if trials := settings.get("trials"):
+        yield f"{short_repr(trials)} trials of each scenario; the protocol has one: run the rollout without --trials"
 
 
 PROTOCOL: Final = LeaderboardProtocol()
@@ -164,8 +173,10 @@ def check_submission(
     root = Path(folder)
     result = read_result(root)
     settings = result.settings
-    faults = [*protocol.faults(settings), *faults_of_claims(settings), *_differences_of_settings(root, result)]
-    faults += _surplus_files(root)
+    faults = [*faults_of_tier(settings)]  # from which most others would follow
+    if not faults:
+        faults += [*protocol.faults(settings), *faults_of_claims(settings), *_differences_of_settings(root, result)]
+        faults += _surplus_files(root)
     if faults:
         return SubmissionCheck(faults=tuple(faults), submission=None, resimulated=(), sessions=protocol.sessions)
     plans, cast = protocol.plans(settings["towns"]), _cast(settings)

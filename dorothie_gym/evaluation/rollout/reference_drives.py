@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -28,7 +28,7 @@ from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.session import Session
-from dorothie_gym.session.scenario import ReferenceDrive, Scenario, draw_scenario
+from dorothie_gym.session.scenario import ReferenceDrive, ReferencePage, Scenario, draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.time_allowed import reference_seconds
 from dorothie_gym.support.files import write_atomically
@@ -51,15 +51,9 @@ STORED_FILE: Final = Path(str(files("dorothie_gym.evaluation.rollout"))) / "data
 """References that are stored with the package."""
 
 
-class _DrivePage(TypedDict):
-    seconds: float
-    exchanges: int
-    subgoals: int
-
-
 class _FilePage(TypedDict):
     version: str
-    drives: dict[str, _DrivePage]
+    drives: dict[str, ReferencePage]
 
 
 def drive_key(scenario: Scenario, town: str) -> str:
@@ -149,10 +143,10 @@ def read_drives(file: Path) -> dict[str, ReferenceDrive]:
         OSError: it cannot be read.
     """
     page = checked(read_json(file, MAX_MODEL_JSON), _FilePage, file)
-    return {key: ReferenceDrive(**drive) for key, drive in page["drives"].items()}
+    return {key: ReferenceDrive.from_json(drive) for key, drive in page["drives"].items()}
 
 
 def write_drives(file: Path, drives: Mapping[str, ReferenceDrive]) -> None:
     """Writes references, sorted by key, so that equal ones give equal bytes."""
-    rows = {key: asdict(drives[key]) for key in sorted(drives)}
+    rows = {key: drives[key].to_json() for key in sorted(drives)}
     write_atomically(file, to_page({"version": __version__, "drives": rows}))

@@ -21,7 +21,7 @@ from dorothie_gym.session.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.session.recording.events import EndReason, EventType
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.recording.writer import SessionWriter
-from dorothie_gym.session.scenario import Scenario, draw_scenario
+from dorothie_gym.session.scenario import Scenario, draw_scenario, recorded_reference
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict
 from dorothie_gym.session.spaces.observations import Observation
@@ -129,7 +129,8 @@ def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate
         raise SessionError(f"{session.name}: has no seed; it cannot be played again")
     config = config_of(session.header)
     engine = SessionEngine(town, config=config, max_cycles=_cycles(session, config))
-    engine.reset(scenario=_scenario(session, seed, town, storyboard))
+    scenario = _scenario(session, seed, town, storyboard)
+    engine.reset(scenario=replace(scenario, reference=recorded_reference(session.header)))
     engine.session.dialogue.give_voices(_voices(session))
     return engine
 
@@ -184,8 +185,8 @@ def _scenario(session: Session, seed: int, town: Town, storyboard: StoryboardTem
     templates: list[StoryboardTemplate | None] = [storyboard]
     if storyboard is None and header.storyboard in template_names():
         templates.append(load_template(header.storyboard))
-    stops = config_of(header).stops
-    drawn = [draw_scenario(town, template, seed, stops) for template in templates]
+    config = config_of(header)
+    drawn = [draw_scenario(town, template, seed, config.stops, config.talk) for template in templates]
     for scenario in drawn:
         if _fits(scenario, header):
             return scenario

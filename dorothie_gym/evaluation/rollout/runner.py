@@ -153,7 +153,7 @@ class SessionMaker:
         key = plan.town, plan.seed
         if key not in self._scenarios:
             town = engine.town_of(plan.seed)
-            drawn = draw_scenario(town, engine.template, plan.seed, self.config.stops)
+            drawn = draw_scenario(town, engine.template, plan.seed, self.config.stops, self.config.talk)
             self._scenarios[key] = replace(drawn, reference=reference_of(town, drawn))
         return self._scenarios[key]
 

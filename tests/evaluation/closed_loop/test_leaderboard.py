@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,12 @@ from dorothie_gym.cli.app import app
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutRow, RolloutSettings, roll_out, submission
 from dorothie_gym.evaluation.closed_loop.leaderboard import labels_of, leaderboard_page, read_entries
+from dorothie_gym.evaluation.tiers import TIERS, Tier
 from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.scenario import ReferenceDrive
 from tests.evaluation.closed_loop.drives import record
 from tests.evaluation.closed_loop.rollout_edits import PROTOCOL, edit, settings
 
@@ -191,3 +194,55 @@ def test_page_of_the_documentation_has_the_columns_and_words_of_the_command(tmp_
     assert len(heads) == 2 and all(head in kept for head in heads)
     assert made.split("\n\n")[2] in kept and "`claimed` names" in made.split("\n\n")[2]
     assert {claims for _, claims in claims_in(kept)} >= {"figures, name", "figures, name, weights"}
+
+
+def in_tier(folder: Path, tier: Tier, name: str = "scripted", *, oracle: bool = False, **changes: Any) -> Path:
+    """The result of four sessions of a Co-Wizard in a tier."""
+    participants = tuple(Player(name=each) for each in tier.participants)
+    cast = {Role.PARTICIPANT: participants[0], Role.AD_WIZARD: Player(name=tier.ad_wizard)}
+    given: dict[str, Any] = {
+        "towns": tier.towns,
+        "config": tier.oracle if oracle else tier.config,
+        "pool": participants if len(participants) > 1 else (),
+        "tier": tier.name,
+        "oracle": oracle,
+        "references": True,
+    }
+    made = RolloutSettings(
+        cast={**ALL_SCRIPTED, **cast, Role.CO_WIZARD: Player(name=name)}, sessions=4, **{**given, **changes}
+    )
+    drive = ReferenceDrive(seconds=300.0, exchanges=9, subgoals=3)
+    rows = tuple(
+        RolloutRow(number=k, town=made.towns[0], seed=k, record=record(success=k < 2, reference=drive))
+        for k in range(4)
+    )
+    folder.mkdir(parents=True)
+    (folder / "rollout.json").write_text(json.dumps(RolloutResult(settings=made.to_json(), rows=rows).to_json()))
+    return folder
+
+
+@pytest.mark.parametrize("tier", TIERS.values(), ids=list(TIERS))
+def test_each_tier_is_a_part_of_its_own_with_its_headline(tmp_path: Path, tier: Tier) -> None:
+    write(tmp_path / "usual", "scripted", 4)
+    in_tier(tmp_path / "tier", tier)
+    in_tier(tmp_path / "oracle", tier, oracle=True)
+    in_tier(tmp_path / "trials", tier, trials=2)
+    in_tier(tmp_path / "town", tier, towns=("my town.yaml",))
+    in_tier(tmp_path / "exact", tier, config=dataclasses.replace(tier.oracle, max_seconds=60.0, time_factor=None))
+    entries = read_entries([tmp_path])
+    assert (entries[0].part, entries[0].policy) == ("unseen", "scripted")
+    assert {entry.part for entry in entries[1:]} == {tier.name}
+    names = {entry.policy for entry in entries[1:]}
+    assert {"scripted", "scripted (oracle)", "scripted (2 trials)", "scripted (towns my town.yaml)"} < names
+    assert "sessions of at most 60 s" in entries[-1].policy and "word errors 0 %" in entries[-1].policy
+    page = leaderboard_page(entries)
+    usual, hard = page.split(f"## Tier {tier.name}")[:2]
+    assert "timely completion" not in usual.split("## Unseen towns")[1]
+    assert "timely completion" in hard.splitlines()[2]
+
+
+def test_a_rollout_in_a_tier_or_with_trials_is_no_submission(tmp_path: Path) -> None:
+    (fault,) = submission.check_submission(in_tier(tmp_path / "tier", TIERS["strangers"])).faults
+    assert "without --tier" in fault and "strangers" in fault
+    (fault,) = submission.check_submission(write(tmp_path / "trials", "scripted", 4, trials=2)).faults
+    assert "without --trials" in fault

@@ -16,7 +16,9 @@ from dorothie_gym.policies import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recorder import SessionRecorder, idle_actions
 from dorothie_gym.session.recording import Decision, EndReason, Session, SessionWriter
+from dorothie_gym.session.scenario import ReferenceDrive, draw_scenario, recorded_reference
 from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.time_allowed import reference_seconds
 from dorothie_gym.wrappers.record_session import RecordSession
 
 TOWN = load_town("brookside")
@@ -68,6 +70,31 @@ def test_interrupted_session_is_checked_up_to_its_last_frame(tmp_path: Path) -> 
     session = Session.load(tmp_path)
     assert not session.complete
     assert first_difference(session, resimulate(session, TOWN)) is None
+
+
+def test_time_that_depends_on_the_reference_is_that_of_the_record(tmp_path: Path) -> None:
+    scenario = draw_scenario(TOWN, None, 3)
+    reference = ReferenceDrive(seconds=9.0 * reference_seconds(TOWN, scenario), exchanges=5, subgoals=3)
+    engine = SessionEngine(TOWN, config=EnvConfig(time_factor=0.1))
+
+    def stop(engine: SessionEngine) -> None:
+        if engine.session.world.time > 0.15 * reference_seconds(TOWN, scenario):
+            raise KeyboardInterrupt
+
+    policies = {role: make_policy("silent", role, engine.limits) for role in AGENT_ROLES}
+    measured = dataclasses.replace(scenario, reference=reference)
+    with pytest.raises(KeyboardInterrupt):
+        play_session(engine, policies, seed=3, folder=tmp_path, on_step=stop, scenario=measured)
+    session = Session.load(tmp_path)
+    assert recorded_reference(session.header) == reference
+    assert first_difference(session, resimulate(session, TOWN)) is None
+
+
+def test_damaged_reference_is_refused_by_its_field(recorded: Session) -> None:
+    for page in ({"seconds": -1.0, "exchanges": 1, "subgoals": 1}, {"seconds": 1.0}, 5):
+        header = dataclasses.replace(recorded.header, extra={"reference": page})
+        with pytest.raises(SessionError, match="header, reference"):
+            resimulate(dataclasses.replace(recorded, header=header), TOWN)
 
 
 def test_other_action_is_found_at_the_frame_after_it(recorded: Session) -> None:

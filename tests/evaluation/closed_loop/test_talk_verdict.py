@@ -1,0 +1,82 @@
+"""Talk tasks are judged by the session alone: demonstrations of both outcomes of each kind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from dorothie_gym.agents.text_session import TextSession
+from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
+from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkVerdict, verdict_of
+from dorothie_gym.evaluation.rollout.play import play_session
+from dorothie_gym.evaluation.tiers import TIERS
+from dorothie_gym.maps import load_town
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies import make_policy
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.scenario import draw_scenario
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.talk_kinds import KINDS, draw_talk_task
+from dorothie_gym.session.talk_tasks import Reaction
+from dorothie_gym.tasks.briefs import TalkFamily
+
+TOWN = "brookside"
+ACTS = (Reaction.GO_TO, Reaction.AGREE, Reaction.ANSWER)
+
+
+@cache
+def engine(family: TalkFamily) -> SessionEngine:
+    return SessionEngine(TOWN, config=replace(TIERS[family].config, max_seconds=45.0))
+
+
+def seed_of(family: TalkFamily, kind: str, *, acts: bool) -> int:
+    """A seed whose session is of a kind, and can (or cannot) be done as it is."""
+    town = load_town(TOWN)
+    for seed in range(2000):
+        names = draw_scenario(town, None, seed, None, family).street_names
+        task = draw_talk_task(town, names, family, seed)
+        if task.kind == kind and (task.reaction in ACTS) is acts:
+            return seed
+    raise AssertionError(kind)
+
+
+def play(family: TalkFamily, seed: int, co_wizard: str, folder: Path) -> tuple[Session, TalkVerdict]:
+    players = {Role.PARTICIPANT: "client", Role.CO_WIZARD: co_wizard, Role.AD_WIZARD: "street-closer"}
+    host = engine(family)
+    policies = {role: make_policy(name, role, host.limits) for role, name in players.items()}
+    play_session(host, policies, seed=seed, folder=folder)
+    session = Session.load(folder)
+    verdict = verdict_of(session, host.town)
+    assert verdict is not None
+    return session, verdict
+
+
+@pytest.mark.parametrize(("family", "kind"), [(family, kind) for family in TalkFamily for kind in KINDS[family]])
+def test_each_kind_can_be_done_and_failed(family: TalkFamily, kind: str, tmp_path: Path) -> None:
+    seed = seed_of(family, kind, acts=False)
+    right = play(family, seed, "talk-oracle", tmp_path / "right")[1]
+    assert right.passed and right.kind == kind and right.unnecessary == 0, right
+    wrong = play(family, seed, "says-yes", tmp_path / "wrong")[1]
+    assert not wrong.passed and wrong.cause, wrong
+
+
+def test_a_question_without_need_fails_and_a_plain_request_is_done(tmp_path: Path) -> None:
+    seed = seed_of(TalkFamily.ASK_FIRST, "two_houses", acts=True)
+    asked = play(TalkFamily.ASK_FIRST, seed, "always-asks", tmp_path / "asks")[1]
+    assert (asked.passed, asked.unnecessary, asked.cause) == (False, 1, "an unnecessary question")
+    session, done = play(TalkFamily.ASK_FIRST, seed, "never-asks", tmp_path / "acts")
+    assert done.passed
+    record = measure(session, load_town(TOWN))
+    assert record.talk_task == done and SessionRecord.from_json(record.to_json()) == record
+
+
+def test_a_text_session_of_the_tier_has_the_client(tmp_path: Path) -> None:
+    seed = seed_of(TalkFamily.ASK_FIRST, "two_houses", acts=False)
+    session = TextSession(tier="ask-first", town=TOWN)
+    turn = session.reset(seed=seed)
+    while "take me to the house" not in turn.page and not turn.done:
+        turn = session.answer({"say": ""})
+    assert "take me to the house" in turn.page
