@@ -102,8 +102,8 @@ def parse_parameters(text: str, tokens: int | None = None) -> tuple[dict[str, ob
             found[name.removeprefix("no-")] = None
         else:
             raise ValueError(
-                f"parameters have {short_repr(item)}; {did_you_mean(item, PROFILES)}give NAME=VALUE, no-NAME, or a "
-                f"profile: {', '.join(PROFILES)}"
+                f"parameters have {short_repr(item)}; {did_you_mean(item, PROFILES)}give NAME=VALUE, no-NAME, "
+                f"a profile ({', '.join(PROFILES)}), or one JSON object for values with commas"
             )
     count = usual if tokens is None else tokens
     if limit != LIMITS[0]:

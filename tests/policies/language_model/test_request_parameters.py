@@ -15,6 +15,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import Fault, LanguageModelConfig, ModelUsage, parse_parameters
 from dorothie_gym.policies.language_model.cassette import Cassette
 from dorothie_gym.policies.language_model.chat_endpoint import Tokens
+from dorothie_gym.policies.language_model.event_stream import joined_completion
 from dorothie_gym.policies.language_model.language_model import LanguageModel
 from dorothie_gym.session.config import EnvConfig
 from tests.policies.language_model.fake_server import FakeServer, serving
@@ -154,6 +155,14 @@ def test_endpoint_that_only_streams_is_read(server: FakeServer, kind: str) -> No
         reply = model.ask(replace(PROMPT, seed=seed))
         assert (reply.answer, reply.tokens) == (RIGHT, Tokens(100, 7))
     assert reply.refused == (("stream",) if kind == "streams only" else ())
+
+
+def test_separators_of_unicode_do_not_end_the_line_of_an_event() -> None:
+    parts = [{"choices": [{"delta": {"content": words}}]} for words in ("Turn\u2028left, ", "then\u0085right.")]
+    lines = [f"data:{json.dumps(part, ensure_ascii=False)}" for part in parts]
+    for end in ("\n\n", "\r\n\r\n", "\r\r"):
+        (choice,) = joined_completion(end.join([": hello", *lines, "data: [DONE]", ""]))["choices"]
+        assert choice["message"]["content"] == "Turn\u2028left, then\u0085right."
 
 
 @pytest.mark.parametrize(
