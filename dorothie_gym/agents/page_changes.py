@@ -14,7 +14,8 @@ from typing import Final
 _GONE: Final = "No longer"
 _GROWING: Final = "Conversation"
 _PLACES: Final = "Places"
-_ALWAYS: Final = ("Time", "Just now")
+_TIME: Final = "Time"
+_ALWAYS: Final = (_TIME, "Just now")
 _NUMBER: Final = re.compile(r"\d+")
 
 Sections = dict[str, list[str]]
@@ -55,9 +56,11 @@ def merged_page(before: str, changes: str) -> str:
 
     Args:
         before: the whole page before.
-        changes: output of `page_changes`, or a whole page.
+        changes: page of the next turn. One without a time, as after a fault, changes nothing.
     """
     sections, new = _sections(before), _sections(changes)
+    if _TIME not in new:
+        return before
     gone = new.pop(_GONE, [])
     for title in gone[0].partition(": ")[2].split("; ") if gone else ():
         sections.pop(title, None)

@@ -89,6 +89,13 @@ def test_page_after_changes_is_the_whole_page_but_for_distances_of_places() -> N
         one, other = whole.answer(answer), changes.answer(answer)
 
 
+def test_pages_of_faults_and_tools_do_not_become_part_of_the_page() -> None:
+    session = TextSession(config=MINUTE, pages="changes")
+    page = session.reset(5).page
+    for turn in (session.answer("no"), session.tool("say", value="Hello."), session.tool("fly")):
+        assert merged_page(page, turn.page) == page
+
+
 # --- Tools ------------------------------------------------------------------------------------------------------------
 
 
@@ -135,6 +142,8 @@ def test_tools_of_a_role_fill_all_fields_and_have_schemas(role: Role) -> None:
         ("say", {"value": 5}, "it must be a text"),
         ("say", {"value": "x" * 10**6}, "at most 20000 characters"),
         ("", {}, "there is no tool"),
+        ("drive", {"name": "Stop"}, "has no argument 'name'"),
+        ("drive", {"self": "Stop"}, "has no argument 'self'"),
     ],
 )
 def test_wrong_call_of_a_tool_is_words_and_takes_no_time(
@@ -187,6 +196,15 @@ def test_limit_of_turns_ends_a_session(session: TextSession) -> None:
     assert turn.done and turn.truncated and "after 3 turns" in turn.page
 
 
+@pytest.mark.parametrize(("name", "arguments"), [("look", {}), ("say", {"value": "Hello."}), ("fly", {})])
+def test_calls_that_take_no_time_count_for_the_limit_of_turns(name: str, arguments: dict[str, object]) -> None:
+    limited = TextSession(config=MINUTE, max_turns=3)
+    limited.reset(2)
+    turns = [limited.tool(name, **arguments) for _ in range(4)]
+    assert [turn.done for turn in turns] == [False, False, True, True]
+    assert turns[-1].truncated and limited.finish().turns == 3
+
+
 def test_use_before_reset_is_an_error_in_words() -> None:
     session = TextSession(config=MINUTE)
     for call in (lambda: session.answer("{}"), lambda: session.tool("look"), session.finish):
@@ -200,8 +218,7 @@ def test_use_after_the_end_is_words_and_changes_nothing(session: TextSession) ->
     outcome = session.finish()
     for turn in (session.answer({"say": "Bye."}), session.tool("wait")):
         assert turn.done and "over" in turn.error and turn.choices == {} and turn.schema == {}
-    again = session.finish()
-    assert (again.turns, again.seconds, again.score) == (outcome.turns, outcome.seconds, outcome.score)
+    assert session.finish() == outcome
     assert not session.reset(2).done
 
 
@@ -218,6 +235,12 @@ def test_wrong_seed_is_refused(session: TextSession, seed: object) -> None:
         ({"pages": "short"}, "pages is 'short'; it must be one of full, changes"),
         ({"max_turns": 0}, "max_turns is 0"),
         ({"max_faults": 1.5}, "max_faults is 1.5"),
+        ({"quiet_time": math.nan}, "quiet_time is nan; it must be in 1..3600"),
+        ({"quiet_time": "10"}, "quiet_time is '10'"),
+        (
+            {"partners": {"participant": None}},
+            "partners has None for participant; it must be a policy or the name of one",
+        ),
         ({"partners": {"co_wizard": "silent"}}, "partners has 'co_wizard'; the others are"),
         ({"partners": {"participant": "shy"}}, "there is no policy 'shy'"),
     ],
