@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
     from dorothie_gym.session.recording.header import SessionHeader
     from dorothie_gym.session.session_engine import SessionEngine
-    from dorothie_gym.session.spaces.actions import ActionMapping
+    from dorothie_gym.session.spaces.actions import AnyAction
 
 
 class Players:
@@ -61,14 +61,13 @@ class Players:
         """Roles that policies play."""
         return frozenset(self._policies)
 
-    def actions(self) -> dict[str, ActionMapping]:
+    def actions(self) -> dict[str, AnyAction]:
         """Returns the actions of the policies in the current decision, by role."""
-        actions: dict[str, ActionMapping] = {}
+        actions: dict[str, AnyAction] = {}
         inputs = policy_inputs(self._engine, self._policies)
         for role, policy in self._policies.items():
             if isinstance(policy, TypedPolicy) and policy.is_direct:
-                action, self._states[role] = policy.act(inputs[role], self._states[role])
-                actions[role.value] = action.encode(self._engine.limits)
+                actions[role.value], self._states[role] = policy.act(inputs[role], self._states[role])
             else:
                 actions[role.value], self._states[role] = policy.step(inputs[role], self._states[role])
         return actions

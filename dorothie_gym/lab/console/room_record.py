@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role
     from dorothie_gym.session.recording.header import SessionHeader
     from dorothie_gym.session.session_engine import SessionEngine
-    from dorothie_gym.session.spaces.actions import ActionMapping
+    from dorothie_gym.session.spaces.actions import AnyAction
 
 
 class RoomRecord:
@@ -55,7 +55,7 @@ class RoomRecord:
         """
         self._spans.say(role, text, audio)
 
-    def record(self, actions: Mapping[str, ActionMapping]) -> None:
+    def record(self, actions: Mapping[str, AnyAction]) -> None:
         """Records a decision after the engine has played it."""
         self._recorder.record(actions, self._spans.named(self._engine.last_events))
 
