@@ -109,6 +109,16 @@ class TextSession:
         """The role, and the fields of an answer and their meanings."""
         return self._turns.system
 
+    @property
+    def schema(self) -> dict[str, Any]:
+        """JSON schema of the answers, the same in all turns of the role; `Turn.schema` lists the choices of a turn.
+
+        Raises:
+            AgentSessionError: `reset` was not called.
+        """
+        self._begun()
+        return self._schema.json_schema(shared=True)
+
     def tools(self) -> tuple[ToolSpec, ...]:
         """Returns the tools of the role, the same in all sessions."""
         return TOOLS[self.role]

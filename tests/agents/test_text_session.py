@@ -6,6 +6,7 @@ import gc
 import json
 import math
 import random
+import re
 import weakref
 
 import pytest
@@ -77,14 +78,18 @@ def test_pages_of_changes_are_short_and_sufficient() -> None:
     assert changes.characters / 4 <= 12_000  # tokens of a whole session
 
 
-def test_page_after_changes_is_the_whole_page_but_for_distances_of_places() -> None:
+def _without_far_distances(page: str) -> set[str]:
+    """Lines of a page; those of places and of things in sight without their distances."""
+    return {re.sub(r"\d+ m away", "", line) for line in page.splitlines()}
+
+
+def test_page_after_changes_is_the_whole_page_but_for_distances_of_places_and_things() -> None:
     whole, changes = (TextSession(config=MINUTE, pages=pages) for pages in ("full", "changes"))
     one, other, page = whole.reset(5), changes.reset(5), ""
     reader = reader_of("co_wizard")
     while not one.done:
         page = merged_page(page, other.page) if page else other.page
-        lines = [line for line in one.page.splitlines() if "as the crow flies" not in line]
-        assert set(lines) <= set(page.splitlines())
+        assert _without_far_distances(one.page) <= _without_far_distances(page)
         answer = reader(one.page)
         one, other = whole.answer(answer), changes.answer(answer)
 
@@ -94,6 +99,30 @@ def test_pages_of_faults_and_tools_do_not_become_part_of_the_page() -> None:
     page = session.reset(5).page
     for turn in (session.answer("no"), session.tool("say", value="Hello."), session.tool("fly")):
         assert merged_page(page, turn.page) == page
+
+
+@pytest.mark.parametrize("role", AGENT_ROLES)
+def test_schema_of_a_role_is_the_same_in_all_turns_and_begins_with_a_thought(role: Role) -> None:
+    session, found = TextSession(role, config=MINUTE), set()
+    turn = session.reset(5)
+    while not turn.done:
+        found.add(json.dumps(session.schema))
+        assert list(session.schema["properties"]) == list(turn.schema["properties"])  # type: ignore[arg-type, call-overload]
+        turn = session.answer({"again": "5"})
+    (schema,) = map(json.loads, found)
+    assert next(iter(schema["properties"])) == "thought"
+    for name, choices in session.reset(5).choices.items():
+        spec = schema["properties"][name]
+        assert spec.get("enum", list(choices)) == list(choices)
+        assert "enum" in spec or "page" in spec["description"] or "choices under" in spec["description"]
+
+
+@pytest.mark.parametrize("role", AGENT_ROLES)
+def test_thoughts_and_their_absence_change_nothing(role: Role) -> None:
+    session, reader = TextSession(role, "brookside", config=MINUTE), reader_of(role)
+    plain = play(session, reader, 6)
+    reader = reader_of(role)
+    assert play(session, lambda page: {"thought": "The passenger hears nothing of this.", **reader(page)}, 6) == plain
 
 
 # --- Tools ------------------------------------------------------------------------------------------------------------
@@ -121,7 +150,7 @@ def test_tools_of_a_role_fill_all_fields_and_have_schemas(role: Role) -> None:
     session = TextSession(role, config=MINUTE)
     fields = {spec.field for spec in session.tools() if spec.field}
     turn = session.reset(1)
-    assert fields == set(turn.schema["properties"]) - {"again"}  # type: ignore[arg-type]
+    assert fields == set(turn.schema["properties"]) - {"again", "thought"}  # type: ignore[arg-type]
     for spec in session.tools():
         function = spec.function()["function"]
         assert json.loads(json.dumps(function)) == function

@@ -13,6 +13,7 @@ import pytest
 from dorothie_gym.errors import EndpointError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import Fault, LanguageModelConfig, ModelUsage, parse_parameters
+from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField
 from dorothie_gym.policies.language_model.cassette import Cassette
 from dorothie_gym.policies.language_model.chat_endpoint import Tokens
 from dorothie_gym.policies.language_model.event_stream import joined_completion
@@ -62,6 +63,20 @@ def test_request_has_the_parameters_of_the_text(server: FakeServer, text: str, e
     assert sent == expected
     again, _ = parse_parameters(json.dumps(config.record().get("parameters", {})))
     assert dict(config.parameters) == again  # as `command_of` writes them
+
+
+def test_schema_that_is_shared_by_all_calls_lists_no_choices_of_the_moment(server: FakeServer) -> None:
+    fields = (
+        ChoiceField(name="drive", labels=("left", "right"), meaning="the way", listed="one of those in the page"),
+        ChoiceField(name="again", labels=("10", "1"), meaning="the time"),
+    )
+    prompt = replace(PROMPT, schema=AnswerSchema(name="way", fields=fields))
+    for text in ("reasoning,shared-schema", "response_format=shared", "no-seed"):
+        LanguageModel(config_of(server, text)).ask(prompt)
+    shared, again, exact = (each["response_format"]["json_schema"]["schema"] for each in server.requests)
+    assert shared == again and "enum" not in shared["properties"]["drive"]
+    assert shared["properties"]["drive"]["description"] == "the way: one of those in the page"
+    assert shared["properties"]["again"] == exact["properties"]["again"] and exact["properties"]["drive"]["enum"]
 
 
 def test_profile_without_a_schema_sends_none(server: FakeServer) -> None:
