@@ -68,7 +68,8 @@ def _task_of(role: Role) -> Callable[..., Task]:
             epochs=Epochs(epochs, ["mean", f"pass_k_{epochs}"] if epochs > 1 else ["mean"]),
         )
 
-    return sessions
+    registered: Callable[..., Task] = sessions
+    return registered
 
 
 co_wizard = _task_of(Role.CO_WIZARD)
