@@ -33,6 +33,8 @@ FOREIGN: Final = frozenset(
         "--url",  # openenv validate
         "--model",  # inspect eval
         "--epochs",  # inspect eval
+        "--client",  # vf-eval, as the next one
+        "--no-push",
     ]
 )
 """Options of other programs that the pages name."""

@@ -16,11 +16,11 @@ from tests.session.recording.dialogues import talk
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-LONGEST = {"ppo": 150}
+LONGEST = {"ppo": 150, "trl_grpo": 100}
 """Lines of an example; 80 where nothing else is said."""
 
-REQUIRED = {"torchrl_ppo": "torchrl"}
-"""Libraries that only the extra `integrations` brings."""
+REQUIRED = {"torchrl_ppo": "torchrl", "trl_grpo": "trl"}
+"""Libraries that only the extras `integrations` and `trl` bring."""
 
 ARGUMENTS = {
     "corpus_analysis": "--sessions 2 --seconds 20 --out made",
@@ -32,6 +32,7 @@ ARGUMENTS = {
     "rl_navigation": "--steps 64 --rollout 32 --rounds 2 --episodes 1 --max-seconds 10",
     "rl_pictures": "--steps 64 --environments 2 --rollout 16 --frames 2 --rounds 2 --max-seconds 5",
     "torchrl_ppo": "--environments 2 --rollout 64 --steps 128",
+    "trl_grpo": "--steps 2 --group 2 --calls 4",
 }
 PRINTED = {
     "corpus_analysis": "words per utterance",
@@ -43,6 +44,7 @@ PRINTED = {
     "rl_navigation": "64 steps: success",
     "rl_pictures": "64 steps: mean return",
     "torchrl_ppo": "128 steps: mean reward",
+    "trl_grpo": "2 steps: mean reward",
 }
 
 

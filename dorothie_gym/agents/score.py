@@ -67,8 +67,10 @@ class TaskProgress:
         for i in task.live:
             if task.allowed(i):
                 mark = task.storyboard.landmarks[task.landmark_of(i)]
-                way = self._ways.setdefault((mark.lane, mark.station), _Way(town, (mark.lane, mark.station)))
-                best = max(best, way.covered(self._places))
+                goal = mark.lane, mark.station
+                if goal not in self._ways:
+                    self._ways[goal] = _Way(town, goal)
+                best = max(best, self._ways[goal].covered(self._places))
         return min(best, 1.0)
 
 

@@ -10,7 +10,6 @@ import enum
 import json
 import operator
 from collections.abc import Mapping
-from dataclasses import replace as changed
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from dorothie_gym.agents.page_changes import page_changes
@@ -23,9 +22,10 @@ from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.casting import partners_of
 from dorothie_gym.policies.language_model.answer_schema import MAX_ANSWER, AnswerSchema, ChoiceField
+from dorothie_gym.policies.language_model.config import QUIET_TIME
 from dorothie_gym.policies.language_model.faults import CallError, Fault
-from dorothie_gym.policies.language_model.turns import QUIET_TIME, RoleTurns
-from dorothie_gym.policies.policy import policy_inputs, policy_seed
+from dorothie_gym.policies.language_model.turns import RoleTurns
+from dorothie_gym.policies.policy import Players, policy_seed, replace
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.session_engine import SessionEngine
 
@@ -101,12 +101,23 @@ class TextSession:
         )
         self._turns = RoleTurns(self.role, self.engine.limits, quiet_time)
         self._partners = partners_of(self.role, {**usual.partners, **(partners or {})}, self.engine.limits)
+        self._players = Players(self._partners)
         self._progress: TaskProgress | None = None
 
     @property
     def system(self) -> str:
         """The role, and the fields of an answer and their meanings."""
         return self._turns.system
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """JSON schema of the answers, the same in all turns of the role; `Turn.schema` lists the choices of a turn.
+
+        Raises:
+            AgentSessionError: `reset` was not called.
+        """
+        self._begun()
+        return self._schema.json_schema(shared=True)
 
     def tools(self) -> tuple[ToolSpec, ...]:
         """Returns the tools of the role, the same in all sessions."""
@@ -151,7 +162,7 @@ class TextSession:
             AgentSessionError: `reset` was not called.
         """
         if self._ended():
-            return self._turn(_OVER, error=_OVER)
+            return self._shown(_OVER, error=_OVER)
         self._count += 1
         try:
             read = self._schema.read(_as_text(given))
@@ -161,7 +172,7 @@ class TextSession:
 
     # --- Tools --------------------------------------------------------------------------------------------------------
 
-    def tool(self, name: str, **arguments: object) -> Turn:
+    def tool(self, name: str, /, **arguments: object) -> Turn:
         """Calls a tool: fields of the answer are collected until `wait`, which lets time pass.
 
         Args:
@@ -172,7 +183,7 @@ class TextSession:
             AgentSessionError: `reset` was not called.
         """
         if self._ended():
-            return self._turn(_OVER, error=_OVER)
+            return self._shown(_OVER, error=_OVER)
         self._count += 1
         spec = next((each for each in self.tools() if each.name == name), None)
         if spec is None:
@@ -251,7 +262,6 @@ class TextSession:
         self._draft = {}
         self._step()
         if self._count >= self.max_turns and not self.engine.over:
-            self._truncated = True
             return self._turn(f"The session ends after {self._count} turns.")
         return self._until_asked()
 
@@ -274,22 +284,24 @@ class TextSession:
         """Plays one decision of all roles."""
         engine = self.engine
         action, self._state = self._turns.act(self._observation, self._state)
-        inputs, actions = policy_inputs(engine, self._partners), {str(self.role): action}
-        for role, policy in self._partners.items():
-            actions[str(role)], self._states[role] = policy.step(inputs[role], self._states[role])
-        outcome = engine.step(actions)
+        outcome = engine.step({**self._players.decide(engine, self._states), str(self.role): action})
         self._gained += sum(outcome.reward_terms[self.role].values())
         self._begun().note()
 
     def _fault(self, reason: str) -> Turn:
         self._faults += 1
-        self._truncated = self._faults >= self.max_faults or self._count >= self.max_turns
         return self._turn(f"Refused: {reason}", error=reason)
 
     def _turn(self, page: str, error: str = "") -> Turn:
+        """Returns the next turn, which is the last one where a limit is reached."""
+        self._characters += len(page)
+        if self._count >= self.max_turns or self._faults >= self.max_faults:
+            self._truncated = not self.engine.over
+        return self._shown(page, error)
+
+    def _shown(self, page: str, error: str) -> Turn:
         gained, self._gained = self._gained, 0.0
         self._reward += gained
-        self._characters += len(page)
         turn = Turn(
             page=page,
             system=self.system,
@@ -301,7 +313,7 @@ class TextSession:
         )
         if turn.done:
             return turn
-        return changed(turn, choices=_choices(self._schema), schema=self._schema.json_schema())
+        return replace(turn, choices=_choices(self._schema), schema=self._schema.json_schema())
 
 
 _OVER: Final = "the session is over; nothing happens any more"

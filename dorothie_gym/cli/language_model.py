@@ -50,8 +50,8 @@ LlmParameters = Annotated[
     str,
     typer.Option(
         metavar="PROFILE|NAME=VALUE|no-NAME,...",
-        help="Parameters of requests: a profile (usual, completion-tokens, reasoning, plain), values, and those that "
-        "are not sent; or a JSON object.",
+        help="Parameters of requests: a profile (usual, completion-tokens, reasoning, shared-schema, plain), values, "
+        "and those that are not sent; or a JSON object.",
         rich_help_panel=_PANEL,
     ),
 ]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import enum
-from importlib import import_module
 from typing import Annotated
 
 import typer
 
+from dorothie_gym.agents.openenv import SESSIONS
 from dorothie_gym.cli.options import needs
-from dorothie_gym.cli.output import fail
-from dorothie_gym.support.installation import pip_install
+from dorothie_gym.cli.serving import LOCAL, Host, Port, address, check_libraries, listen, run_server
+from dorothie_gym.cli.warm_up import compile_first
 
 
 class Framework(enum.StrEnum):
-    """Framework with a server of environments."""
+    """Framework with a server of environments; the name is also that of the extra."""
 
     OPENENV = "openenv"
 
@@ -23,17 +23,20 @@ def serve(
     framework: Annotated[
         Framework, typer.Argument(metavar="openenv", help=f"Framework of the clients ({needs('openenv')}).")
     ],
-    host: Annotated[str, typer.Option(metavar="HOST", help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port.")] = 8000,
-    sessions: Annotated[int, typer.Option(min=1, max=10_000, help="Largest number of sessions at once.")] = 64,
+    host: Host = LOCAL,
+    port: Port = 8000,
+    sessions: Annotated[int, typer.Option(min=1, max=10_000, help="Largest number of sessions at once.")] = SESSIONS,
 ) -> None:
     """Serve sessions by text for language-model agents, until Ctrl-C.
 
     Each connection plays sessions of its own; see docs/agents-openenv.md.
     """
-    try:
-        server = import_module(f"dorothie_gym.agents.{framework}.server")
-    except ModuleNotFoundError as error:
-        fail(f"serve {framework} needs {error.name}, which is not installed; run: {pip_install('openenv')}")
-    typer.echo(f"http://{host}:{port}", err=True)
-    server.serve(host, port, sessions)
+    check_libraries(f"serve {framework}", str(framework), ("openenv", "uvicorn"))
+    listener = listen(host, port)
+    compile_first()
+    from dorothie_gym.agents.openenv.server import make_server
+
+    server = make_server(sessions)
+    typer.echo(address(host, listener.getsockname()[1]), err=True)
+    run_server(server, listener)
+    raise KeyboardInterrupt  # nothing else ends the server, and uvicorn loses the interruption at times

@@ -6,6 +6,7 @@ import atexit
 import gc
 import socket
 import sys
+from collections.abc import Collection
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
+    from uvicorn import Server
 
 
 LOCAL = "127.0.0.1"
@@ -34,11 +36,11 @@ Port = Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 
 _LIBRARIES = ("starlette", "uvicorn", "websockets")
 
 
-def check_libraries(command: str) -> None:
-    """Fails if a library of the extra `console` is missing."""
-    for library in _LIBRARIES:
+def check_libraries(command: str, extra: str = "console", libraries: Collection[str] = _LIBRARIES) -> None:
+    """Fails if a library of an extra that a command needs is missing."""
+    for library in libraries:
         if find_spec(library) is None:
-            fail(f"{command} needs {library}, which is not installed; run: {pip_install('console')}")
+            fail(f"{command} needs {library}, which is not installed; run: {pip_install(extra)}")
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -69,6 +71,16 @@ def serve(app: Starlette, listener: socket.socket, host: str) -> None:
     """
     from dorothie_gym.lab.web import web_server
 
+    run_server(web_server(app, host_names=[host]), listener)
+
+
+def run_server(server: Server, listener: socket.socket) -> None:
+    """Runs a server until Ctrl-C.
+
+    Args:
+        server: the server.
+        listener: socket that listens.
+    """
     atexit.register(gc.freeze)  # a last search for garbage would take as long as a session has objects
     sys.setswitchinterval(SWITCH_INTERVAL)
-    web_server(app, host_names=[host]).run(sockets=[listener])
+    server.run(sockets=[listener])

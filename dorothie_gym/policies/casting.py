@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.policy_loader import make_policy
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ def partners_of(role: Role, wanted: Mapping[str, str | AnyPolicy], limits: Space
     cast: dict[Role, AnyPolicy] = {}
     for other in others:
         policy = wanted.get(other, "scripted")
+        if not isinstance(policy, str | Policy):
+            raise ValueError(f"partners has {short_repr(policy)} for {other}; it must be a policy or the name of one")
         cast[other] = make_policy(policy, other, limits) if isinstance(policy, str) else policy
         if cast[other].role is not other:
             raise ValueError(f"partners has a policy of {cast[other].role} for {other}")

@@ -78,3 +78,21 @@ def test_spoilt_answers_and_limits_lower_the_score_and_raise_nothing(tmp_path: P
     log = run("dorothie_gym/participant", tmp_path, samples=1, epochs=1, max_turns=3)
     (score,) = (next(iter(sample.scores.values())) for sample in log.samples)
     assert score.metadata["turns"] == 3 and 0.0 <= score.value["score"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"samples": 0}, "samples is 0; it must be a whole number of at least 1"),
+        ({"epochs": 0}, "epochs is 0"),
+        ({"remember": -1}, "remember is -1; it must be a whole number of at least 0"),
+        ({"max_turns": 0}, "max_turns is 0"),
+        ({"first_seed": -1}, "seed is -1"),
+        ({"town": "atlantis"}, "there is no such town"),
+    ],
+)
+def test_wrong_parameters_are_errors_of_the_task(arguments: dict[str, Any], words: str) -> None:
+    from dorothie_gym.agents.inspect.tasks import participant
+
+    with pytest.raises(ValueError, match=words):
+        participant(**arguments)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import signal
 import socket
 import statistics
 import subprocess
@@ -16,6 +17,7 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -140,6 +142,63 @@ def test_faults_from_outside_are_words_and_disturb_nobody(url: str) -> None:
         return await other
 
     assert asyncio.run(everything())["score"] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"role": "driver"}, "role is 'driver'; it must be one of participant"),
+        ({"role": ["driver"]}, "role is"),
+        ({"pages": 3}, "pages is 3; it must be one of full, changes"),
+        ({"town": "atlantis"}, "town is 'atlantis'; the towns are .* and generated:SEED"),
+        ({"town": "/etc/passwd"}, "town is '/etc/passwd'; the towns are"),
+        ({"town": str(files("dorothie_gym.maps") / "data" / "brookside.yaml")}, "town is .*; the towns are"),
+        ({"town": None}, "town is None"),
+        ({"seed": -1}, "seed is -1"),
+        ({"seed": "7"}, "seed is '7'"),
+    ],
+)
+def test_wrong_arguments_of_a_reset_are_words(url: str, arguments: dict[str, object], words: str) -> None:
+    from dorothie_gym.agents.openenv.client import DorothieClient
+
+    async def reset() -> None:
+        async with DorothieClient(base_url=url) as env:
+            with pytest.raises(Exception, match=words):
+                await env.reset(**arguments)
+            assert not (await env.reset(seed=1)).done  # the connection goes on
+
+    asyncio.run(reset())
+
+
+def test_port_in_use_is_named(url: str) -> None:
+    command = [sys.executable, "-m", "dorothie_gym", "serve", "openenv", "--port", url.rpartition(":")[2]]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2 and "cannot be used (Address already in use); give another --port" in done.stderr
+
+
+def test_interruption_ends_the_server_amid_a_session() -> None:
+    from dorothie_gym.agents.openenv.client import DorothieClient
+    from dorothie_gym.agents.openenv.models import TextAction
+
+    command = [sys.executable, "-m", "dorothie_gym", "serve", "openenv", "--port", "0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stderr is not None
+            address = server.stderr.readline().strip()
+
+            async def played() -> None:
+                async with DorothieClient(base_url=address) as env:
+                    await env.reset(seed=1)
+                    waiting = asyncio.create_task(env.step(TextAction(value='{"again": "30"}')))
+                    await asyncio.sleep(0.01)
+                    server.send_signal(signal.SIGINT)
+                    await asyncio.wait([waiting])  # answered, or cut off
+
+            asyncio.run(played())
+            assert server.wait(20) == 130
+            assert server.stderr.read().splitlines()[-1] == "Interrupted."
+        finally:
+            server.kill()
 
 
 def test_server_and_manifest_are_valid(url: str) -> None:

@@ -6,6 +6,7 @@ import gc
 import json
 import math
 import random
+import re
 import weakref
 
 import pytest
@@ -77,16 +78,51 @@ def test_pages_of_changes_are_short_and_sufficient() -> None:
     assert changes.characters / 4 <= 12_000  # tokens of a whole session
 
 
-def test_page_after_changes_is_the_whole_page_but_for_distances_of_places() -> None:
+def _without_far_distances(page: str) -> set[str]:
+    """Lines of a page; those of places and of things in sight without their distances."""
+    return {re.sub(r"\d+ m away", "", line) for line in page.splitlines()}
+
+
+def test_page_after_changes_is_the_whole_page_but_for_distances_of_places_and_things() -> None:
     whole, changes = (TextSession(config=MINUTE, pages=pages) for pages in ("full", "changes"))
     one, other, page = whole.reset(5), changes.reset(5), ""
     reader = reader_of("co_wizard")
     while not one.done:
         page = merged_page(page, other.page) if page else other.page
-        lines = [line for line in one.page.splitlines() if "as the crow flies" not in line]
-        assert set(lines) <= set(page.splitlines())
+        assert _without_far_distances(one.page) <= _without_far_distances(page)
         answer = reader(one.page)
         one, other = whole.answer(answer), changes.answer(answer)
+
+
+def test_pages_of_faults_and_tools_do_not_become_part_of_the_page() -> None:
+    session = TextSession(config=MINUTE, pages="changes")
+    page = session.reset(5).page
+    for turn in (session.answer("no"), session.tool("say", value="Hello."), session.tool("fly")):
+        assert merged_page(page, turn.page) == page
+
+
+@pytest.mark.parametrize("role", AGENT_ROLES)
+def test_schema_of_a_role_is_the_same_in_all_turns_and_begins_with_a_thought(role: Role) -> None:
+    session, found = TextSession(role, config=MINUTE), set()
+    turn = session.reset(5)
+    while not turn.done:
+        found.add(json.dumps(session.schema))
+        assert list(session.schema["properties"]) == list(turn.schema["properties"])  # type: ignore[arg-type, call-overload]
+        turn = session.answer({"again": "5"})
+    (schema,) = map(json.loads, found)
+    assert next(iter(schema["properties"])) == "thought"
+    for name, choices in session.reset(5).choices.items():
+        spec = schema["properties"][name]
+        assert spec.get("enum", list(choices)) == list(choices)
+        assert "enum" in spec or "page" in spec["description"] or "choices under" in spec["description"]
+
+
+@pytest.mark.parametrize("role", AGENT_ROLES)
+def test_thoughts_and_their_absence_change_nothing(role: Role) -> None:
+    session, reader = TextSession(role, "brookside", config=MINUTE), reader_of(role)
+    plain = play(session, reader, 6)
+    reader = reader_of(role)
+    assert play(session, lambda page: {"thought": "The passenger hears nothing of this.", **reader(page)}, 6) == plain
 
 
 # --- Tools ------------------------------------------------------------------------------------------------------------
@@ -114,7 +150,7 @@ def test_tools_of_a_role_fill_all_fields_and_have_schemas(role: Role) -> None:
     session = TextSession(role, config=MINUTE)
     fields = {spec.field for spec in session.tools() if spec.field}
     turn = session.reset(1)
-    assert fields == set(turn.schema["properties"]) - {"again"}  # type: ignore[arg-type]
+    assert fields == set(turn.schema["properties"]) - {"again", "thought"}  # type: ignore[arg-type]
     for spec in session.tools():
         function = spec.function()["function"]
         assert json.loads(json.dumps(function)) == function
@@ -135,6 +171,8 @@ def test_tools_of_a_role_fill_all_fields_and_have_schemas(role: Role) -> None:
         ("say", {"value": 5}, "it must be a text"),
         ("say", {"value": "x" * 10**6}, "at most 20000 characters"),
         ("", {}, "there is no tool"),
+        ("drive", {"name": "Stop"}, "has no argument 'name'"),
+        ("drive", {"self": "Stop"}, "has no argument 'self'"),
     ],
 )
 def test_wrong_call_of_a_tool_is_words_and_takes_no_time(
@@ -187,6 +225,15 @@ def test_limit_of_turns_ends_a_session(session: TextSession) -> None:
     assert turn.done and turn.truncated and "after 3 turns" in turn.page
 
 
+@pytest.mark.parametrize(("name", "arguments"), [("look", {}), ("say", {"value": "Hello."}), ("fly", {})])
+def test_calls_that_take_no_time_count_for_the_limit_of_turns(name: str, arguments: dict[str, object]) -> None:
+    limited = TextSession(config=MINUTE, max_turns=3)
+    limited.reset(2)
+    turns = [limited.tool(name, **arguments) for _ in range(4)]
+    assert [turn.done for turn in turns] == [False, False, True, True]
+    assert turns[-1].truncated and limited.finish().turns == 3
+
+
 def test_use_before_reset_is_an_error_in_words() -> None:
     session = TextSession(config=MINUTE)
     for call in (lambda: session.answer("{}"), lambda: session.tool("look"), session.finish):
@@ -200,8 +247,7 @@ def test_use_after_the_end_is_words_and_changes_nothing(session: TextSession) ->
     outcome = session.finish()
     for turn in (session.answer({"say": "Bye."}), session.tool("wait")):
         assert turn.done and "over" in turn.error and turn.choices == {} and turn.schema == {}
-    again = session.finish()
-    assert (again.turns, again.seconds, again.score) == (outcome.turns, outcome.seconds, outcome.score)
+    assert session.finish() == outcome
     assert not session.reset(2).done
 
 
@@ -218,6 +264,12 @@ def test_wrong_seed_is_refused(session: TextSession, seed: object) -> None:
         ({"pages": "short"}, "pages is 'short'; it must be one of full, changes"),
         ({"max_turns": 0}, "max_turns is 0"),
         ({"max_faults": 1.5}, "max_faults is 1.5"),
+        ({"quiet_time": math.nan}, "quiet_time is nan; it must be in 1..3600"),
+        ({"quiet_time": "10"}, "quiet_time is '10'"),
+        (
+            {"partners": {"participant": None}},
+            "partners has None for participant; it must be a policy or the name of one",
+        ),
         ({"partners": {"co_wizard": "silent"}}, "partners has 'co_wizard'; the others are"),
         ({"partners": {"participant": "shy"}}, "there is no policy 'shy'"),
     ],

@@ -14,10 +14,13 @@ from inspect_ai.solver import solver
 from inspect_ai.util import JSONSchema
 
 from dorothie_gym.agents.text_session import TextSession
+from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import Role
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from inspect_ai.scorer import Scorer, Target
     from inspect_ai.solver import Generate, Solver, TaskState
 
@@ -27,58 +30,55 @@ FIRST_SEED: Final = 7000
 _OUTCOME: Final = "outcome"
 
 
-@task
-def co_wizard(
-    samples: int = 10,
-    epochs: int = 3,
-    town: str = DEFAULT_TOWN,
-    first_seed: int = FIRST_SEED,
-    remember: int = 0,
-    max_turns: int = 400,
-) -> Task:
-    """The model drives and talks; scripted policies play the others.
+def _task_of(role: Role) -> Callable[..., Task]:
+    @task(name=str(role))
+    def sessions(
+        samples: int = 10,
+        epochs: int = 3,
+        town: str = DEFAULT_TOWN,
+        first_seed: int = FIRST_SEED,
+        remember: int = 0,
+        max_turns: int = 400,
+    ) -> Task:
+        """The model plays a role; scripted policies play the others.
 
-    Args:
-        samples: number of sessions.
-        epochs: number of times that each is played; `pass_k_N` is the share of those in which all of them succeed.
-        town: name of a town.
-        first_seed: seed of the first session; the others follow.
-        remember: number of earlier pages, with their answers, that the model is shown.
-        max_turns: number of answers after which a session is truncated.
-    """
-    return _task(Role.CO_WIZARD, samples, epochs, town, first_seed, remember, max_turns)
+        Args:
+            samples: number of sessions.
+            epochs: number of times that each is played; `pass_k_N` is the share of those in which all of them succeed.
+            town: name of a town.
+            first_seed: seed of the first session; the others follow.
+            remember: number of earlier pages, with their answers, that the model is shown.
+            max_turns: number of answers after which a session is truncated.
+
+        Raises:
+            ValueError: a number is out of its range, or there is no such town.
+        """
+        for name, value, least in (("samples", samples, 1), ("epochs", epochs, 1), ("remember", remember, 0)):
+            if not isinstance(value, int) or value < least:
+                raise ValueError(f"{name} is {short_repr(value)}; it must be a whole number of at least {least}")
+        TextSession(role, town, max_turns=max_turns).reset(first_seed)  # a wrong argument is an error of the task
+        dataset = [
+            Sample(input="(the pages of the session)", id=f"{town}-{seed}", metadata={"seed": seed})
+            for seed in range(first_seed, first_seed + samples)
+        ]
+        return Task(
+            dataset=MemoryDataset(dataset, name=f"dorothie-{role}"),
+            solver=play_session(role, town, remember, max_turns),
+            scorer=session_score(),
+            epochs=Epochs(epochs, ["mean", f"pass_k_{epochs}"] if epochs > 1 else ["mean"]),
+        )
+
+    registered: Callable[..., Task] = sessions
+    return registered
 
 
-@task
-def participant(
-    samples: int = 10,
-    epochs: int = 3,
-    town: str = DEFAULT_TOWN,
-    first_seed: int = FIRST_SEED,
-    remember: int = 0,
-    max_turns: int = 400,
-) -> Task:
-    """The model has errands and guides the scripted Co-Wizard; arguments as in `co_wizard`."""
-    return _task(Role.PARTICIPANT, samples, epochs, town, first_seed, remember, max_turns)
-
-
-def _task(role: Role, samples: int, epochs: int, town: str, first_seed: int, remember: int, max_turns: int) -> Task:
-    seeds = range(first_seed, first_seed + samples)
-    dataset = [
-        Sample(input="(the pages of the session)", id=f"{town}-{seed}", metadata={"seed": seed}) for seed in seeds
-    ]
-    reducers = ["mean", f"pass_k_{epochs}"] if epochs > 1 else ["mean"]
-    return Task(
-        dataset=MemoryDataset(dataset, name=f"dorothie-{role}"),
-        solver=play_session(role, town, remember, max_turns),
-        scorer=session_score(),
-        epochs=Epochs(epochs, reducers),
-    )
+co_wizard = _task_of(Role.CO_WIZARD)
+participant = _task_of(Role.PARTICIPANT)
 
 
 @solver
 def play_session(role: str, town: str, remember: int, max_turns: int) -> Solver:
-    """Returns the solver, which plays a session by its pages; arguments as in `co_wizard`."""
+    """Returns the solver, which plays a session by its pages; arguments as those of the tasks."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
         in_thread: Any = anyio.to_thread.run_sync

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from secrets import randbits
-from typing import TYPE_CHECKING, Any
+from threading import Lock
+from typing import TYPE_CHECKING, Any, Final
 
 from openenv.core.env_server.interfaces import Environment
 from openenv.core.env_server.types import EnvironmentMetadata, State
 
 from dorothie_gym.agents.openenv.models import TextAction, TextObservation
 from dorothie_gym.agents.text_session import TextSession
-from dorothie_gym.errors import AgentSessionError
+from dorothie_gym.errors import AgentSessionError, short_repr
+from dorothie_gym.maps.catalogue import find_town, town_names
 from dorothie_gym.maps.folds import DEFAULT_TOWN
+from dorothie_gym.maps.generated.specification import parse_series
 
 if TYPE_CHECKING:
     from dorothie_gym.agents.turn import Turn
+
+
+_PLAYING: Final = Lock()
+"""Held by the session that plays: the interpreter runs one thread at a time, and turns that share it are all late."""
 
 
 class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
@@ -48,7 +55,7 @@ class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
             seed: seed of the session; None draws one, which is in the state.
             episode_id: name of the episode.
             role: role of the agent.
-            town: name of a town.
+            town: name of a shipped or generated town; a client cannot name files of the server.
             pages: "full" or "changes".
             unknown: must be empty.
 
@@ -58,9 +65,11 @@ class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
         if unknown:
             raise ValueError(f"reset has no argument {', '.join(unknown)}; it has seed, episode_id, role, town, pages")
         if self._session is None or self._settings != (role, town, pages):
+            _check_town(town)
             self._session, self._settings = TextSession(role, town, pages=pages), (role, town, pages)
         drawn = randbits(31) if seed is None else seed
-        turn = self._session.reset(drawn)
+        with _PLAYING:
+            turn = self._session.reset(drawn)
         self._score = 0.0
         self._state = State(episode_id=episode_id, step_count=0, seed=drawn, role=role, town=town)
         return self._observation(self._session, turn)
@@ -71,12 +80,9 @@ class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
         if session is None:
             raise AgentSessionError("no session has begun here: call reset() first, also after a lost connection")
         self._state.step_count += 1
-        if action.tool == "answer":
-            return self._observation(session, session.answer(action.value))
-        argument = next((tool.argument for tool in session.tools() if tool.name == action.tool), "value")
-        return self._observation(
-            session, session.tool(action.tool, **({argument or "value": action.value} if action.value else {}))
-        )
+        with _PLAYING:
+            turn = _played(session, action)
+        return self._observation(session, turn)
 
     @property
     def state(self) -> State:
@@ -95,3 +101,16 @@ class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
             choices={name: list(labels) for name, labels in turn.choices.items()},
             outcome=session.finish().numbers() if turn.done else {},
         )  # fmt: skip
+
+
+def _played(session: TextSession, action: TextAction) -> Turn:
+    if action.tool == "answer":
+        return session.answer(action.value)
+    argument = next((tool.argument for tool in session.tools() if tool.name == action.tool), "")
+    return session.tool(action.tool, **({argument or "value": action.value} if action.value else {}))
+
+
+def _check_town(name: object) -> None:
+    """Raises `ValueError` unless a name is that of a shipped or generated town, or of a series of these."""
+    if not isinstance(name, str) or not (parse_series(name) or find_town(name, None)):
+        raise ValueError(f"town is {short_repr(name)}; the towns are {', '.join(town_names())} and generated:SEED")

@@ -20,6 +20,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     street_here,
     street_name,
     talk_lines,
+    thought_field,
     weather_words,
     with_heard,
 )
@@ -213,7 +214,13 @@ def _schema(options: tuple[str, ...]) -> AnswerSchema:
     return AnswerSchema(
         name="ad_wizard",
         fields=(
-            ChoiceField(name="change", labels=options, meaning="what you change now; none for nothing"),
+            thought_field(),
+            ChoiceField(
+                name="change",
+                labels=options,
+                meaning="what you change now; none for nothing",
+                listed='one of the choices under "You can change"',
+            ),
             WordsField(
                 name="message",
                 length=MESSAGE_LENGTH,

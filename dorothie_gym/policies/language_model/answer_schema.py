@@ -29,11 +29,19 @@ _WORDS: Final = "[A-Za-z0-9 ,.?!':;()-]"
 
 @dataclass(frozen=True, kw_only=True)
 class ChoiceField:
-    """Field that takes one of the given labels; the first is the default of an answer without the field."""
+    """Field that takes one of the given labels; the first is the default of an answer without the field.
+
+    Attributes:
+        name: name of the field.
+        labels: what it may be.
+        meaning: meaning of the field.
+        listed: where the labels of the moment are found, such as in the page; empty if they are always the same.
+    """
 
     name: str
     labels: tuple[str, ...]
     meaning: str
+    listed: str = ""
 
     @property
     def default(self) -> str:
@@ -43,6 +51,12 @@ class ChoiceField:
     def schema(self) -> dict[str, Any]:
         """Returns the JSON schema of the field."""
         return {"type": "string", "enum": list(self.labels), "description": self.meaning}
+
+    def shared_schema(self) -> dict[str, Any]:
+        """Returns the JSON schema of the field for all turns: labels that change are described, not listed."""
+        if not self.listed:
+            return self.schema()
+        return {"type": "string", "description": f"{self.meaning}: {self.listed}"}
 
     def read(self, value: object) -> str:
         """Returns the value; raises `CallError` if it is not one of the labels."""
@@ -71,6 +85,10 @@ class WordsField:
         """Returns the JSON schema of the field; a pattern limits the length, as not all endpoints know `maxLength`."""
         return {"type": "string", "pattern": f"^{_WORDS}{{0,{self.length}}}$", "description": self.meaning}
 
+    def shared_schema(self) -> dict[str, Any]:
+        """Returns the JSON schema of the field for all turns."""
+        return self.schema()
+
     def read(self, value: object) -> str:
         """Returns the words in the characters of utterances; raises `CallError` if the value is not a text."""
         if value is None:
@@ -94,18 +112,24 @@ class AnswerSchema:
     name: str
     fields: tuple[AnswerField, ...]
 
-    def json_schema(self) -> dict[str, Any]:
-        """Returns the JSON schema of an answer, which requires every field."""
+    def json_schema(self, *, shared: bool = False) -> dict[str, Any]:
+        """Returns the JSON schema of an answer, which requires every field.
+
+        Args:
+            shared: whether it is the schema of all turns of the role, with which prompts can be cached. Choices that
+                change are then free words in it, which `read` checks.
+        """
         return {
             "type": "object",
-            "properties": {field.name: field.schema() for field in self.fields},
+            "properties": {field.name: field.shared_schema() if shared else field.schema() for field in self.fields},
             "required": [field.name for field in self.fields],
             "additionalProperties": False,
         }
 
-    def response_format(self) -> dict[str, Any]:
-        """Returns the request's `response_format`: a strict JSON schema."""
-        return {"type": "json_schema", "json_schema": {"name": self.name, "strict": True, "schema": self.json_schema()}}
+    def response_format(self, *, shared: bool = False) -> dict[str, Any]:
+        """Returns the request's `response_format`: a strict JSON schema; `shared` as in `json_schema`."""
+        schema = self.json_schema(shared=shared)
+        return {"type": "json_schema", "json_schema": {"name": self.name, "strict": True, "schema": schema}}
 
     def read(self, text: str) -> dict[str, str]:
         """Returns the value of each field of an answer.

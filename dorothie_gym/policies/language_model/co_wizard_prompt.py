@@ -21,6 +21,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     street_here,
     street_name,
     talk_lines,
+    thought_field,
     weather_words,
     words_fields,
 )
@@ -113,6 +114,16 @@ def goal_options(view: CoWizardView, town: Town) -> dict[str, tuple[LandmarkName
     return options
 
 
+_LISTED_GOALS = (
+    f"{KEEP}, {NONE}, a place of the page, a name that is not on it ({', '.join(name.label for name in ALL_NAMES)}), "
+    f"or another one ({', '.join(f'another {name.label}' for name in SHARED_NAMES)})"
+)
+_LISTED_MARKS = (
+    f"{NONE}, here, {', '.join(f'{metres} m ahead' for metres in AHEAD)}, beside a place of the page (beside PLACE), "
+    "or on a street of the town (on STREET)"
+)
+
+
 def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
     """Returns the places that can be marked by their labels: ahead, beside places on the map, and on streets."""
     options = {"here": (view.lane, view.station)}
@@ -147,20 +158,24 @@ def answer_schema(view: CoWizardView, town: Town) -> AnswerSchema:
     return AnswerSchema(
         name="co_wizard",
         fields=(
+            thought_field(),
             ChoiceField(
                 name="drive",
                 labels=tuple(drive_options(view, town)),
                 meaning="what the car does now; none to go on as before",
+                listed='one of the choices under "You can drive"',
             ),
             ChoiceField(
                 name="goal",
                 labels=distinct((KEEP, NONE, *goal_options(view, town))),
                 meaning="the place that you drive to",
+                listed=_LISTED_GOALS,
             ),
             ChoiceField(
                 name="mark",
                 labels=distinct((NONE, *mark_options(view, town))),
                 meaning="where you suppose the goal if it is not on your map; you drive there and slow down near it",
+                listed=_LISTED_MARKS,
             ),
             ChoiceField(name="status", labels=(KEEP, *statuses), meaning="status of the goal, for your records"),
             say,

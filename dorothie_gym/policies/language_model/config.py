@@ -11,11 +11,16 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
+from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.language_model.request_parameters import USUAL_TOKENS, check_parameters
 from dorothie_gym.support.copying import shared
 
 URL_VARIABLE: Final = "OPENAI_BASE_URL"
 """Environment variable with the address of the endpoint if none is given, as in OpenAI's client."""
+
+
+QUIET_TIME: Final = 10.0
+"""Usual longest time between two turns of a role that is played by text [s]."""
 
 
 class SimulatedTime(enum.StrEnum):
@@ -58,7 +63,7 @@ class LanguageModelConfig:
     timeout: float = 30.0
     max_tokens: int = USUAL_TOKENS
     temperature: float = 0.0
-    quiet_time: float = 10.0
+    quiet_time: float = QUIET_TIME
     time: SimulatedTime = SimulatedTime.WAITS
     pictures: bool = False
     cassette: Path | None = None
@@ -73,10 +78,9 @@ class LanguageModelConfig:
             raise ValueError("offline is set without a cassette; give the file with the recorded calls")
         if not self.offline:
             _check_url(self.url)
-        for name, low, high in (("timeout", 0.1, 3600.0), ("temperature", 0.0, 2.0), ("quiet_time", 1.0, 3600.0)):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} is {value}; it must be in {low:g}..{high:g}")
+        _check_range("timeout", self.timeout, 0.1, 3600.0)
+        _check_range("temperature", self.temperature, 0.0, 2.0)
+        check_quiet_time(self.quiet_time)
         if not 16 <= self.max_tokens <= 100_000:
             raise ValueError(f"max_tokens is {self.max_tokens}; it must be in 16..100000")
         if self.prices is not None and not all(0.0 <= price < math.inf for price in self.prices):
@@ -108,6 +112,16 @@ class LanguageModelConfig:
             **({} if self.prices is None else {"prices": list(self.prices)}),
             **({"parameters": dict(self.parameters)} if self.parameters else {}),
         }
+
+
+def check_quiet_time(seconds: float) -> None:
+    """Raises `ValueError` for a longest time between two turns that is out of its range [s]."""
+    _check_range("quiet_time", seconds, 1.0, 3600.0)
+
+
+def _check_range(name: str, value: float, low: float, high: float) -> None:
+    if not isinstance(value, int | float) or not low <= value <= high:
+        raise ValueError(f"{name} is {short_repr(value)}; it must be in {low:g}..{high:g}")
 
 
 def _check_url(url: str) -> None:

@@ -6,6 +6,7 @@ answer; the last one is `data: [DONE]`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ from dorothie_gym.support.input_files import parse_json
 
 _PREFIX: Final = "data:"
 _END: Final = "[DONE]"
+_LINE_END: Final = re.compile(r"\r\n|\r|\n")  # other separators, as U+2028, may stand in the texts of an event
 
 
 def is_event_stream(headers: Mapping[str, str], body: bytes) -> bool:
@@ -49,8 +51,8 @@ def joined_completion(text: str) -> dict[str, Any]:
 
 
 def _events(text: str) -> Iterator[Mapping[str, Any]]:
-    for line in text.splitlines():
-        data = line.strip().removeprefix(_PREFIX).strip() if line.strip().startswith(_PREFIX) else ""
+    for line in map(str.strip, _LINE_END.split(text)):
+        data = line.removeprefix(_PREFIX).strip() if line.startswith(_PREFIX) else ""
         if data == _END:
             return
         event = parse_json(data, "an event of the stream", unique=False) if data else None

@@ -18,7 +18,7 @@ from dorothie_gym.policies.language_model.chat_endpoint import (
     httpx_module,
 )
 from dorothie_gym.policies.language_model.faults import ABOUT_THE_ANSWER, WORTH_REPEATING, CallError
-from dorothie_gym.policies.language_model.request_parameters import with_parameters, without_parameter
+from dorothie_gym.policies.language_model.request_parameters import SHARED, with_parameters, without_parameter
 from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
@@ -54,10 +54,11 @@ class Prompt:
                 {"type": "text", "text": self.text},
                 {"type": "image_url", "image_url": {"url": self.picture}},
             ]
+        shared = config.parameters.get("response_format") == SHARED
         usual = {
             "model": config.model,
             "messages": [{"role": "system", "content": self.system}, {"role": "user", "content": content}],
-            "response_format": self.schema.response_format(),
+            "response_format": self.schema.response_format(shared=shared),
             "temperature": config.temperature,
             "max_tokens": config.max_tokens,
             "seed": self.seed,

@@ -21,6 +21,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     street_here,
     street_name,
     talk_lines,
+    thought_field,
     weather_words,
     with_heard,
     with_talk,
@@ -152,8 +153,13 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
 def _schema(observation: ObservationMapping, town: Town) -> AnswerSchema:
     say, note, again = words_fields()
     labels = distinct((KEEP, NONE, *named_places(observation, town)))
-    guide = ChoiceField(name="guide", labels=labels, meaning="the place that you guide the car to; you see the way")
-    return AnswerSchema(name="participant", fields=(guide, say, note, again))
+    guide = ChoiceField(
+        name="guide",
+        labels=labels,
+        meaning="the place that you guide the car to; you see the way",
+        listed=f"{KEEP}, {NONE}, or a place of the page",
+    )
+    return AnswerSchema(name="participant", fields=(thought_field(), guide, say, note, again))
 
 
 def task_lines(observation: ObservationMapping, view: ParticipantView) -> list[str]:

@@ -28,6 +28,9 @@ USUAL_TOKENS: Final = 300
 _REASONING_TOKENS: Final = 4000
 """Usual limit of an answer of a model that reasons before it answers; its reasoning counts [tokens]."""
 
+SHARED: Final = "shared"
+"""Value of `response_format` for the schema that is the same in all calls of a role."""
+
 _FIXED: Final = ("model", "messages")
 """Fields of a request that are no parameters."""
 
@@ -65,9 +68,13 @@ PROFILES: Final[Mapping[str, ParameterProfile]] = {
     "reasoning": ParameterProfile(
         values={"temperature": None, "seed": None, "reasoning_effort": "low"}, limit=LIMITS[1], tokens=_REASONING_TOKENS
     ),
+    "shared-schema": ParameterProfile(values={"response_format": SHARED}),
     "plain": ParameterProfile(values={"temperature": None, "seed": None, "response_format": None}),
 }
-"""Profiles by their names: `usual` sends `max_tokens`, `temperature`, `seed` and `response_format`."""
+"""Profiles by their names: `usual` sends `max_tokens`, `temperature`, `seed` and `response_format`.
+
+`shared-schema` sends one schema for all calls of a role, so that the endpoint can cache the beginning of its prompts.
+"""
 
 
 def parse_parameters(text: str, tokens: int | None = None) -> tuple[dict[str, object], int]:
@@ -102,8 +109,8 @@ def parse_parameters(text: str, tokens: int | None = None) -> tuple[dict[str, ob
             found[name.removeprefix("no-")] = None
         else:
             raise ValueError(
-                f"parameters have {short_repr(item)}; {did_you_mean(item, PROFILES)}give NAME=VALUE, no-NAME, or a "
-                f"profile: {', '.join(PROFILES)}"
+                f"parameters have {short_repr(item)}; {did_you_mean(item, PROFILES)}give NAME=VALUE, no-NAME, "
+                f"a profile ({', '.join(PROFILES)}), or one JSON object for values with commas"
             )
     count = usual if tokens is None else tokens
     if limit != LIMITS[0]:
@@ -134,7 +141,8 @@ def check_parameters(parameters: Mapping[str, object]) -> None:
 
 def with_parameters(request: Mapping[str, Any], parameters: Mapping[str, object]) -> dict[str, Any]:
     """Returns a request with other parameters; None leaves one out."""
-    changed = {**request, **parameters}
+    given = {name: value for name, value in parameters.items() if (name, value) != ("response_format", SHARED)}
+    changed = {**request, **given}
     return {name: value for name, value in changed.items() if name in _FIXED or value is not None}
 
 

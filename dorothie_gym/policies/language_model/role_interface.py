@@ -46,6 +46,9 @@ SAY_LENGTH: Final = 160
 NOTE_LENGTH: Final = 160
 """Longest note of a model to itself [characters]."""
 
+THOUGHT_LENGTH: Final = 240
+"""Longest thought of a model before its choices [characters]."""
+
 LONGEST_YIELD: Final = 4.0
 """Time for which a role lets the other speaker finish before it speaks [s]."""
 
@@ -158,6 +161,12 @@ def system_prompt(role: Role) -> str:
 
 
 # --- Talk -------------------------------------------------------------------------------------------------------------
+
+
+def thought_field() -> WordsField:
+    """Returns the first field of an answer: room to consider the choices, of which nothing is kept."""
+    meaning = "what you consider before you choose, in brief; nobody hears or keeps it; may be empty"
+    return WordsField(name="thought", length=THOUGHT_LENGTH, meaning=meaning)
 
 
 def words_fields() -> tuple[WordsField, WordsField, ChoiceField]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.ad_wizard import AdWizardInterface
 from dorothie_gym.policies.language_model.co_wizard import CoWizardInterface
+from dorothie_gym.policies.language_model.config import QUIET_TIME, check_quiet_time
 from dorothie_gym.policies.language_model.participant import ParticipantInterface
 from dorothie_gym.policies.language_model.role_interface import Memory, RoleInterface
 from dorothie_gym.policies.observation_parser import scalar
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from dorothie_gym.session.spaces.actions import ActionDict
     from dorothie_gym.session.spaces.fields import SpaceLimits
     from dorothie_gym.session.spaces.observations import ObservationMapping
-
-QUIET_TIME: Final = 10.0
-"""Usual longest time between two turns [s]."""
 
 _INTERFACES: Final[Mapping[Role, type[RoleInterface[Any]]]] = {
     Role.PARTICIPANT: ParticipantInterface,
@@ -77,9 +75,13 @@ class RoleTurns:
         role: the role.
         limits: sizes of the spaces.
         quiet_time: longest time between two turns [s]; an answer may request a shorter one.
+
+    Raises:
+        ValueError: the time is out of its range.
     """
 
     def __init__(self, role: Role, limits: SpaceLimits, quiet_time: float = QUIET_TIME) -> None:
+        check_quiet_time(quiet_time)
         self._interface = _INTERFACES[role](limits)
         self._quiet_time = quiet_time
 

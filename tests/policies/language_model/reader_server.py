@@ -12,22 +12,25 @@ from typing import Annotated, Any
 
 import typer
 
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.language_model.role_interface import system_prompt
 from tests.policies.language_model.fake_server import FakeServer
 from tests.policies.language_model.prompt_reader import CoWizardReader
 from tests.policies.language_model.simple_readers import Interferer, guide
 
 
 def answer_by_role(request: Mapping[str, Any]) -> Mapping[str, str]:
-    """Returns the answer of the program of the role whose fields the request's schema has."""
-    fields = request["response_format"]["json_schema"]["schema"]["properties"]
-    programs: dict[str, Callable[[str], dict[str, str]]] = {
-        "drive": CoWizardReader(),
-        "guide": guide,
-        "change": Interferer(),
+    """Returns the answer to the last page by the program of the role that the system prompt states."""
+    programs: dict[Role, Callable[[str], dict[str, str]]] = {
+        Role.CO_WIZARD: CoWizardReader(),
+        Role.PARTICIPANT: guide,
+        Role.AD_WIZARD: Interferer(),
     }
-    program = next(program for field, program in programs.items() if field in fields)
-    content = request["messages"][1]["content"]
-    return program(content if isinstance(content, str) else content[0]["text"])
+    system = request["messages"][0]["content"]
+    program = next(program for role, program in programs.items() if system.startswith(system_prompt(role)))
+    contents = [message["content"] for message in request["messages"] if message["role"] == "user"]
+    texts = [content if isinstance(content, str) else content[0]["text"] for content in contents]
+    return program([text for text in texts if text.startswith("Time: ")][-1])
 
 
 def main(port: Annotated[int, typer.Option(help="port on the loopback interface")] = 8011) -> None:

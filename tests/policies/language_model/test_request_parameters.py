@@ -13,8 +13,10 @@ import pytest
 from dorothie_gym.errors import EndpointError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import Fault, LanguageModelConfig, ModelUsage, parse_parameters
+from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField
 from dorothie_gym.policies.language_model.cassette import Cassette
 from dorothie_gym.policies.language_model.chat_endpoint import Tokens
+from dorothie_gym.policies.language_model.event_stream import joined_completion
 from dorothie_gym.policies.language_model.language_model import LanguageModel
 from dorothie_gym.session.config import EnvConfig
 from tests.policies.language_model.fake_server import FakeServer, serving
@@ -61,6 +63,20 @@ def test_request_has_the_parameters_of_the_text(server: FakeServer, text: str, e
     assert sent == expected
     again, _ = parse_parameters(json.dumps(config.record().get("parameters", {})))
     assert dict(config.parameters) == again  # as `command_of` writes them
+
+
+def test_schema_that_is_shared_by_all_calls_lists_no_choices_of_the_moment(server: FakeServer) -> None:
+    fields = (
+        ChoiceField(name="drive", labels=("left", "right"), meaning="the way", listed="one of those in the page"),
+        ChoiceField(name="again", labels=("10", "1"), meaning="the time"),
+    )
+    prompt = replace(PROMPT, schema=AnswerSchema(name="way", fields=fields))
+    for text in ("reasoning,shared-schema", "response_format=shared", "no-seed"):
+        LanguageModel(config_of(server, text)).ask(prompt)
+    shared, again, exact = (each["response_format"]["json_schema"]["schema"] for each in server.requests)
+    assert shared == again and "enum" not in shared["properties"]["drive"]
+    assert shared["properties"]["drive"]["description"] == "the way: one of those in the page"
+    assert shared["properties"]["again"] == exact["properties"]["again"] and exact["properties"]["drive"]["enum"]
 
 
 def test_profile_without_a_schema_sends_none(server: FakeServer) -> None:
@@ -154,6 +170,14 @@ def test_endpoint_that_only_streams_is_read(server: FakeServer, kind: str) -> No
         reply = model.ask(replace(PROMPT, seed=seed))
         assert (reply.answer, reply.tokens) == (RIGHT, Tokens(100, 7))
     assert reply.refused == (("stream",) if kind == "streams only" else ())
+
+
+def test_separators_of_unicode_do_not_end_the_line_of_an_event() -> None:
+    parts = [{"choices": [{"delta": {"content": words}}]} for words in ("Turn\u2028left, ", "then\u0085right.")]
+    lines = [f"data:{json.dumps(part, ensure_ascii=False)}" for part in parts]
+    for end in ("\n\n", "\r\n\r\n", "\r\r"):
+        (choice,) = joined_completion(end.join([": hello", *lines, "data: [DONE]", ""]))["choices"]
+        assert choice["message"]["content"] == "Turn\u2028left, then\u0085right."
 
 
 @pytest.mark.parametrize(
