@@ -196,7 +196,7 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     if words[place] in _BEFORE_ORDERS and place + 1 < len(words) and found is None:
         found = breaks.starts.longest(words, place + 1)  # "that's grand, just let me hop out"
         found = found if found is not None and found.kind in _BEFORE_ORDERS[words[place]] else None
-    if (found is None and not _ends_in_tag(words, place)) or _is_noun_or_infinitive(words, place):
+    if (found is None and not _ends_in_tag(words, place)) or _is_no_clause(words, place):
         return False
     before = words[place - 1]
     joined = before in breaks.joining and (found is None or before not in _ENDS.get(found.kind, ()))
@@ -215,8 +215,10 @@ def _begins_clause(words: Sequence[str], begin: int, place: int) -> bool:
     return not (words[place] in _PERSONAL and before in breaks.antecedents)
 
 
-def _is_noun_or_infinitive(words: Sequence[str], place: int) -> bool:
-    """Returns whether a verb's form is none: "make a left turn at the corner", "let this one go by"."""
+def _is_no_clause(words: Sequence[str], place: int) -> bool:
+    """Returns whether a verb begins no clause: "a left turn at the corner", "let this one go by", "Beal it is"."""
+    if list(words[place:]) == ["it", "is"]:
+        return True
     noun = words[place] == "turn" and words[place - 1] in ("left", "right", "u")
     return noun or (words[place] in _PASSING and not _LETTING.isdisjoint(words[max(place - 5, 0) : place]))
 

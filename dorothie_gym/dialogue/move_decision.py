@@ -71,6 +71,9 @@ _NEWS_OF_TASKS: Final = frozenset({GoalStatus.COMPLETE, GoalStatus.PENDING})
 _FEELING: Final = (["love"], ["like"], ["hate"], ["adore"])
 """Verbs of small talk of the first person."""
 
+_CHARGING: Final = (["never"], ["always"], ["keep"], ["don't"])
+"""Words behind "you" of a complaint about the car."""
+
 _ALERTS: Final = ("tell me when", "tell us when", "let me know when", "let us know when")
 _ANSWERED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that yes and no answer."""
@@ -123,6 +126,7 @@ _REPAIRING: Final = frozenset(
 """Words of which a correction has one; others need not be tried."""
 _PERHAPS: Final = ("perhaps ", "maybe ", "possibly ")
 _NO_DOING: Final = ("no turning", "no more", "no stopping", "no parking", "no u turn", "no overtaking", "no speeding")
+_FORBIDDEN_LATER: Final = (["do", "not"], ["don't"], ["please", "don't"], ["never"])
 _FORBIDDING: Final = frozenset({"never", "don't", "dont", "please"})
 _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
@@ -181,7 +185,7 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
         return short
     if after is DialogueMove.CHECK and insists(parsed):
         return DialogueMove.CLARIFY  # "first right, I told you"
-    if after in _ANSWERED and parsed.masked.startswith("not ") and parsed.parse is not None and parsed.plan:
+    if after in _ANSWERED and parsed.masked.startswith("not ") and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N  # "not the second, the third"
     if after not in _ANSWERED and _forbids(parsed, move):
         return DialogueMove.INSTRUCT
@@ -225,6 +229,10 @@ def _stated(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: Dia
     if after in _ANSWERED and denied and move is not DialogueMove.REPLY_U:
         return DialogueMove.REPLY_N
     words = words[2:] if words[1:2] == [","] and words[0] in _SIGHS else words
+    if move is DialogueMove.IRRELEVANT and words[:1] == ["you"] and words[1:2] in _CHARGING:
+        return DialogueMove.EXPLAIN  # "you never listen"
+    if words[1:3] == ["used", "to"] and not (parsed.landmarks or parsed.streets or parsed.actions or parsed.turns):
+        return DialogueMove.IRRELEVANT if move is DialogueMove.EXPLAIN else move
     if words[:1] == ["i"] and words[1:2] in _FEELING and not parsed.values and words[2:3] != ["to"]:
         return DialogueMove.IRRELEVANT if move is DialogueMove.EXPLAIN else move
     stated = set(parse.moods) == {ClauseMood.STATEMENT} and not any(
@@ -346,6 +354,8 @@ def in_context(
 def belong_together(head: str, rest: str) -> bool:
     """Returns whether the words before and after a comma are one span: a condition and its order, or a correction."""
     first, second = read_plan(head), read_plan(rest)
+    if split_words(head)[-2:] in _FORBIDDEN_LATER and second.plan.steps:
+        return True  # "do not, whatever happens, go faster than thirty"
     if (first.conditional and not first.described) or (second.conditional and not second.described):
         return True  # "if the road is blocked, take Murfin"
     if _SIDE_ONLY.fullmatch(rest.strip(" .,!?").lower()) and not first.plan.steps:

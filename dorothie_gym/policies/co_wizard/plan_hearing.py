@@ -164,7 +164,7 @@ def _is_kept(state: CoWizardState, heard: HeardUtterance, acts: Sequence[Dialogu
         return False  # "the Ikea, over on Beal" names a destination
     if _is_guided(state) and len(steps) == 1 and _guides(steps[0]):
         return False
-    if not _is_guided(state) and any(step.action is StepAction.STOP and step.distance is not None for step in steps):
+    if not _is_guided(state) and any(_needs_count(step, classified=heard.classified) for step in steps):
         return True
     if sum(step.action in _DRIVING for step in steps) > 1 or any(_has_to_wait(step) for step in steps):
         return True
@@ -172,6 +172,14 @@ def _is_kept(state: CoWizardState, heard: HeardUtterance, acts: Sequence[Dialogu
         return True
     under_way = bool(state.plan.steps) or state.intentions.directive is not None
     return under_way and steps[0].action in _DRIVING and _GOES_ON.match(heard.words.text) is not None
+
+
+def _needs_count(step: PlanStep, *, classified: bool) -> bool:
+    """Returns whether a step is due behind a distance, or at an opportunity of its own side that has to be counted."""
+    if step.action is StepAction.STOP and step.distance is not None:
+        return True
+    counted = step.action is StepAction.TURN and step.direction is not None and (step.ordinal or 1) > 1
+    return classified and counted
 
 
 def _adds_errand(state: CoWizardState, heard: HeardUtterance) -> bool:

@@ -37,8 +37,12 @@ def propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: n
 
 
 def go_on_unanswered(state: CoWizardState, choice: Choice) -> None:
-    """Takes the way that turns least, and says so: the participant has left several questions unanswered."""
-    way = min(choice.exits, key=lambda way: abs(way.angle))
+    """Takes the way that turns least, and says so: the participant has left several questions unanswered.
+
+    A way onto a street that the participant wants to be kept off is taken only where there is no other.
+    """
+    kept_off = {lane for lane, _ in state.route.kept_off}
+    way = min(choice.exits, key=lambda way: (way.lane in kept_off, abs(way.angle)))
     direction = direction_of(way)
     state.intentions = state.intentions.turning(Directive(direction=direction, junction=choice.junction))
     action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN

@@ -4,6 +4,7 @@ import pytest
 
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from tests.policies.co_wizard.rides import Ride
 
 
@@ -25,3 +26,27 @@ def test_an_order_that_is_not_understood_is_not_met_by_silence() -> None:
     ride.said.clear()
     ride.say("please tidy up the boot", seconds=5.0)
     assert ride.said
+
+
+def test_a_turn_that_was_ordered_comes_before_what_follows_it() -> None:
+    ride = Ride(4)
+    ride.say("turn left", seconds=4.0)
+    ride.say("and then stop, please", seconds=2.0)
+    assert [step.action for step in ride.state.plan.steps] == ["turn", "stop"]
+
+
+def test_a_turn_that_is_counted_is_kept_as_a_plan() -> None:
+    ride = Ride(4)
+    ride.say("take the second left", seconds=4.0)
+    ride.say("hang on, it's the third, third left", seconds=4.0)
+    (kept,) = ride.state.plan.steps
+    assert (kept.direction, kept.ordinal) == ("left", 3)
+
+
+def test_a_corrected_change_of_speed_undoes_the_other_one() -> None:
+    ride = Ride(4)
+    ride.run(6.0)
+    before = CoWizardView.read(ride.observations["co_wizard"], ride.env.town).cruise
+    ride.say("go faster", seconds=5.0)
+    ride.say("sorry, I meant slower", seconds=5.0)
+    assert CoWizardView.read(ride.observations["co_wizard"], ride.env.town).cruise < before - 3.0
