@@ -60,7 +60,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over
+from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over, says_missed
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import COMMON
@@ -363,7 +363,7 @@ def _statement(
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
         sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None
-        state.say(sign_of_hearing("seen" if sees else "told"))
+        state.say(sign_of_hearing("sorry" if says_missed(words) else "seen" if sees else "told"))
 
 
 def _reply(

@@ -24,6 +24,7 @@ _IN_PASSING: Final = re.compile(
     r"|nearly there|almost there|getting close|all day|losing my patience|taking forever|wasting time"
     r"|let me (see|check)|my (map|list))\b"
 )
+_MISSED: Final = re.compile(r"\b(too far|gone past|went past|drove past|passed it|missed it)\b")
 IN_SIGHT: Final = frozenset(
     {Predicate.WEATHER, Predicate.CROWDED, Predicate.SEES, Predicate.BLOCKED, Predicate.VISIBILITY, Predicate.LIGHTS_ON}
 )
@@ -49,6 +50,11 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
     if praises and rng.random() < _ANSWERED:
         state.say(sign_of_hearing("praise"))
     return praises
+
+
+def says_missed(words: ParsedText) -> bool:
+    """Returns whether a statement says that the car has driven past the place."""
+    return _MISSED.search(words.text.lower()) is not None
 
 
 def is_called_dark(words: ParsedText) -> bool:
