@@ -24,7 +24,7 @@ from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, Slot, SlotValue
+from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, LandmarkName, Slot, SlotValue
 from dorothie_gym.ontology.spellings import parse_move, parse_role, parse_slot
 from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
 
@@ -295,7 +295,9 @@ def _fields(where: str, phrase: Phrase) -> tuple[frozenset[Slot], frozenset[str]
 def _labels(where: str, slot: Slot, wanted: str) -> frozenset[str]:
     values: tuple[SlotValue, ...] = SLOT_VALUES[slot]
     known = {value.label for value in values}
-    labels = frozenset(known - _NAMELESS if wanted == "named" else wanted.split(","))
+    named = known - _NAMELESS
+    sets = {"named": named, "place": named - {LandmarkName.PERSON.label}}
+    labels = frozenset(sets[wanted] if wanted in sets else wanted.split(","))
     if not labels <= known:
         raise PhraseFileError(f"{where}: {slot.label} has no values {sorted(labels - known)}")
     return labels

@@ -31,6 +31,7 @@ class _Reactions:
     negative: frozenset[str]
     praises: re.Pattern[str]
     in_passing: re.Pattern[str]
+    says_missed: re.Pattern[str]
 
 
 @functools.cache
@@ -45,6 +46,7 @@ def _reactions() -> _Reactions:
         negative=word_set(_FILE, data, "negative"),
         praises=_pattern(data, "praises"),
         in_passing=_pattern(data, "in_passing"),
+        says_missed=_pattern(data, "says_missed"),
     )
 
 
@@ -98,3 +100,8 @@ def is_praise(text: str) -> bool:
 def is_in_passing(text: str) -> bool:
     """Returns whether a remark about the trip needs no answer: "that took a while"."""
     return _reactions().in_passing.search(text.lower()) is not None
+
+
+def says_missed(text: str) -> bool:
+    """Returns whether a statement says that the car has driven past the place: "you've gone past it"."""
+    return _reactions().says_missed.search(text.lower()) is not None

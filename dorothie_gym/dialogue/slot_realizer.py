@@ -277,14 +277,13 @@ class SlotRealizer:
             return self.pick(lexicon.forms(value, "here"))
         forms = lexicon.phrases[value]
         paraphrased = _COLLOQUIAL * (2 if style.register is _SLANGY else 1)
-        name = self._of_person(value) or self.pick(
-            forms["also" if "also" in forms and self.random() < paraphrased else "say"]
-        )
+        of_person = self._of_person(value)
+        name = of_person or self.pick(forms["also" if "also" in forms and self.random() < paraphrased else "say"])
         if not self._of_rider and name.startswith("my "):
             name = f"your {name[3:]}"
         if not named and value is scene.landmark and self.random() < style.chattiness * _DEIXIS:
             name = f"{name} {self.pick(lexicon.deixis)}"
-        if style.repairs and value.label not in _NAMELESS and self.random() < style.repairs:
+        if style.repairs and not of_person and value.label not in _NAMELESS and self.random() < style.repairs:
             wrong = self.pick(SLOT_VALUES[value.slot][1:-2])
             if wrong is not value and wrong.label not in _NAMELESS:
                 name = f"{self.pick(lexicon.phrases[wrong]['say'])}, {self.pick(lexicon.repairs)} {name}"

@@ -48,3 +48,9 @@ def test_hesitant_speakers_say_what_fluent_ones_say():
     assert not any(
         set(fluent(text).lower().strip(".?").replace(",", "").split()) & set(FILLED_PAUSES) for text in texts
     )
+
+
+def test_no_pause_parts_a_title_from_its_name():
+    rng = np.random.default_rng(2)
+    texts = [hesitating("next is Mrs. Tamm's house, on Division", "er", rng.random) for _ in range(200)]
+    assert not any("Mrs.," in text for text in texts)

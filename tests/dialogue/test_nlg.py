@@ -254,7 +254,9 @@ def test_verbs_agree_with_plural_objects(move):
         texts.append(word_act(act, Role.CO_WIZARD, rng))
     about_tracks = [text for text in texts if "tracks" in text]
     assert len(about_tracks) > 10
-    assert not any(re.search(r"tracks (is|was|has|blocks)\b|\bthere's some\b|\bis some\b", text) for text in about_tracks)
+    assert not any(
+        re.search(r"tracks (is|was|has|blocks)\b|\bthere's some\b|\bis some\b", text) for text in about_tracks
+    )
 
 
 def test_long_spans_keep_what_they_say():

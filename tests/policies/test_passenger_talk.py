@@ -77,7 +77,12 @@ def test_person_is_no_it(topic):
 
 @pytest.mark.parametrize(
     ("person", "named"),
-    [("Lin", "Lin"), ("Uncle Sandro", "Uncle Sandro"), ("Rosa's brother Nilo", "Nilo"), ("Ayumi's mother", None)],
+    [
+        ("Lin", "Lin"),
+        ("Uncle Sandro", "Uncle Sandro"),
+        ("Rosa's brother Nilo", "Nilo"),
+        ("Ayumi's mother", "Ayumi's mother"),
+    ],
 )
 def test_name_that_follows_pick_up(person, named):
     assert _passenger(Purpose(text="Pick up somebody", action="pick up somebody", person=person)) == named

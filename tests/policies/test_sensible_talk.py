@@ -51,6 +51,23 @@ def test_second_okay_and_second_plan_are_left_out():
     assert [item.act.move for item in said] == [M.CONFIRM, M.EXPLAIN]
 
 
+def test_what_is_known_is_said_once():
+    house = LandmarkName.HOUSE
+    knows = intend(F.AFFIRMATIVE_ANSWER, Proposition.of(Predicate.KNOWS, place=house), elided=("place",))
+    way = intend(F.INFORM, Proposition.of(Predicate.HAS_ROUTE, place=house), elided=("place",))
+    heard = intend(F.POSITIVE_FEEDBACK, Proposition.of(Predicate.GOAL, place=house))
+    taken = intend(F.ACCEPT, Proposition.of(Predicate.GOAL, place=house, street=StreetName.UPLAND))
+    said = in_one_breath([knows, heard, taken, way])
+    assert [item.act for item in said] == [knows.act, taken.act]
+
+
+def test_street_is_not_taken_on_where_the_place_is_unknown():
+    unknown = Proposition.of(Predicate.TASK, place=LandmarkName.PERSON, status=GoalStatus.UNKNOWN)
+    street = intend(F.ACCEPT, Proposition.of(Predicate.WILL, street=StreetName.UPLAND))
+    lost = intend(F.INFORM, unknown)
+    assert [item.act for item in in_one_breath([lost, street])] == [lost.act]
+
+
 def test_order_leaves_only_answers_of_what_was_to_be_said():
     state, _ = start()
     yes = intend(F.AFFIRMATIVE_ANSWER, Proposition.of(Predicate.LOCALISED))

@@ -106,6 +106,11 @@ def test_every_errand_of_the_shipped_storyboards_is_read():
                 assert not set(words(" ".join(parts(found)))) - set(words(text)), text
 
 
+@pytest.mark.parametrize("text", ["Visit Mrs. Adeyemi at her house", "Read the letter to Mrs. Adeyemi at her house"])
+def test_house_of_the_person_named_before_is_hers(text):
+    assert read_purpose(text).owner == "Mrs. Adeyemi"
+
+
 def test_the_purpose_leaves_out_the_place():
     for board in boards():
         state = TaskState(board)
@@ -232,7 +237,7 @@ def test_template_printed_in_paper_is_read():
     [
         ("Take Hanh to Emil's house", "Emil"),
         ("Pick up Biscuit at your sister's house", "my sister"),
-        ("Take Leilani to her house", None),
+        ("Take Leilani to her house", "Leilani"),
         ("Buy a lamp at Ikea for Mateo", None),
     ],
 )

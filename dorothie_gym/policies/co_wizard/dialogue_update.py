@@ -362,7 +362,7 @@ def _statement(
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
         sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None
-        state.say(sign_of_hearing("seen" if sees else "told"))
+        state.say(sign_of_hearing("sorry" if says_missed(words.text) else "seen" if sees else "told"))
 
 
 def _reply(

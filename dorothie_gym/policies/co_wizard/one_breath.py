@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING, DialogueMove, MoveGroup
-from dorothie_gym.ontology.slots import GoalStatus, Slot
+from dorothie_gym.ontology.slots import GoalStatus, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.policy import replace
 
@@ -73,6 +73,8 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     if any(said.predicate is Predicate.KNOWS for item in answers if item.act.move is _YES for said in item.meaning):
         answers = [item for item in answers if item.act.move is not DialogueMove.CHECK and not _knows_way(item)]
     answers = [item for k, item in enumerate(answers) if not _is_named_again(item, answers[k + 1 :])]
+    if any(GoalStatus.UNKNOWN in item.act.slots for item in answers):
+        answers = [item for item in answers if not _takes_street(item)]
     checked = [item.act.values(Slot.LANDMARK) for item in answers if item.act.move is DialogueMove.CHECK]
     answers = [
         item
@@ -87,6 +89,11 @@ def in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     leads = [following.joined for following in answers[1:]]
     kept = [item for k, item in enumerate(answers) if not plain[k] or (k == 0 and (all(plain) or leads[0]))]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _takes_street(item: Remark) -> bool:
+    """Returns whether a remark only takes on a street, which contradicts that the place is unknown."""
+    return item.act.move is DialogueMove.CONFIRM and all(isinstance(value, StreetName) for value in item.act.slots)
 
 
 def _knows_way(item: Remark) -> bool:

@@ -53,9 +53,6 @@ CONSENTS: Final = 0.35
 ASKS_BACK: Final = 0.3
 """Share of the announcements of the car after which an impatient passenger asks how far it is."""
 
-THANKS_FIRST: Final = 0.5
-"""Share of the arrivals for which a polite passenger thanks before saying that it is done."""
-
 
 def take_note(state: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> None:
     """Reacts to a statement of the car: with a sign of hearing, consent, a question about the way, or not at all.
@@ -151,12 +148,7 @@ def _nod(
     waiting = state.speech.first
     if waiting is not None and not waiting.urgent and not waiting.text:
         done = GoalStatus.COMPLETE in waiting.act.slots
-        if done:
-            thanks = intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="arrived"))
-            state.speech = (
-                state.speech.led_by(thanks) if rng.random() < THANKS_FIRST * state.style.thanks else state.speech
-            )
-        elif waiting.act.move in _AFTER_A_NOD and rng.random() < state.config.nods_first:
+        if waiting.act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
             state.speech = state.speech.led_by(nod)
     elif (
         not alone

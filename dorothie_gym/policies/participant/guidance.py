@@ -39,7 +39,7 @@ from dorothie_gym.policies.participant.retrying import (
     why_standing,
 )
 from dorothie_gym.policies.participant.route_steps import route_step
-from dorothie_gym.policies.participant.standstill import cannot_go_on
+from dorothie_gym.policies.participant.standstill import cannot_go_on, waits_for_road
 from dorothie_gym.policies.participant.telling_way import (
     answer_with_way,
     is_described,
@@ -244,7 +244,9 @@ def _has_just_sent_on(state: ParticipantState, view: ParticipantView) -> bool:
 def _has_told_way(
     state: ParticipantState, view: ParticipantView, key: StepKey, distance: float, rng: np.random.Generator
 ) -> bool:
-    """Returns whether the next step needs no words of its own: it was described before, or is described now."""
+    """Returns whether the next step needs no words of its own: it has to wait, was described, or is described now."""
+    if key[0] in ("turn", "on") and waits_for_road(state, view):
+        return True
     if key[0] != "turn":
         return False
     if is_described(state, view, key, distance) or needs_no_reminder(state, view, key, rng):

@@ -26,6 +26,7 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.participant.given_orders import last_given, turned_round_lately
 from dorothie_gym.policies.participant.goals import announcement
+from dorothie_gym.policies.participant.standstill import waits_for_road
 from dorothie_gym.policies.participant.stories import picks_up, purpose_of_target
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
@@ -255,7 +256,7 @@ def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.rand
 
 def _ask_why_standing(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     since, progress = state.motion.standing_since, state.route.progress
-    if since is None or view.time < state.motion.excused_until:
+    if since is None or view.time < state.motion.excused_until or waits_for_road(state, view):
         return
     if state.guidance.guiding and state.motion.standstill(view.time) < LONG_STANDSTILL:
         return  # its next instruction makes it go on
@@ -298,7 +299,7 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
         return
     waited = view.time - max(state.motion.moved_at, state.task.announced_at, state.speech.last_end)
     long = waited > config.long_stop and view.time > state.motion.excused_until
-    stands = state.motion.standing_since is not None and long
+    stands = state.motion.standing_since is not None and long and not waits_for_road(state, view)
     if not stands and not view.turning:
         return
     state.conversation = conversation.after_wondering(view.time)

@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.conversation import speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.dialogue_acts import SIGNS_OF_HEARING, DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import (
     ActionValue,
@@ -35,6 +35,7 @@ from dorothie_gym.policies.participant.proposition_truth import has_just_finishe
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
 from dorothie_gym.policies.participant.route_steps import route_step
+from dorothie_gym.policies.participant.standstill import waits_for_road
 from dorothie_gym.policies.participant.stories import story_remark
 from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
 from dorothie_gym.policies.participant.yes_no_answers import (
@@ -216,6 +217,9 @@ def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMov
     key, distance, words = step
     if key[0] == "on" and distance < state.config.stop_distance:
         return  # the stop at the place is announced next
+    if key[0] in ("turn", "on") and waits_for_road(state, view):
+        state.say_first(intend(Function.UNCERTAIN_ANSWER))  # there is no way round
+        return
     answers = move is DialogueMove.REPLY_W
     if answers and state.guidance.step == key and view.time - state.guidance.step_at < state.config.just_said:
         return  # the question was asked during the answer

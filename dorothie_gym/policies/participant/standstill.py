@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.town import LightColour
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.route_progress import light_ahead
 
@@ -17,6 +18,12 @@ LONG_RED = 10.0
 
 TURN_TIME = 4.0
 """Standstill across the lane after which a car is no longer regarded as turning [s]."""
+
+IN_THE_WAY = 40.0
+"""Distance of an obstacle that the car stands before [m]."""
+
+LONGEST_WAIT = 150.0
+"""Standstill after which the participant no longer waits for an obstacle to go [s]."""
 
 OBEYED_WITHIN = 12.0
 """Time after which a standing car that was sent on is known to be kept from it [s]."""
@@ -49,6 +56,13 @@ def cannot_go_on(state: ParticipantState, view: ParticipantView) -> bool:
     if sent_on and view.standing and view.time - state.guidance.step_at > OBEYED_WITHIN:
         return True
     return is_blocked_ahead(state, view)
+
+
+def waits_for_road(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car stands before an obstacle that the route does not avoid, so that it has to wait."""
+    if not view.standing or not is_blocked_ahead(state, view) or view.time - state.motion.moved_at > LONGEST_WAIT:
+        return False
+    return any(thing.kind is ObjectClass.STATIC and thing.distance < IN_THE_WAY for thing in view.objects)
 
 
 def is_blocked_ahead(state: ParticipantState, view: ParticipantView) -> bool:
