@@ -102,8 +102,10 @@ def ruled_command(memory: WorkingMemory, view: CoWizardView) -> int:
 class FrozenListening(LearnedCoWizard):
     """Nothing that is heard changes the memory: it keeps its initial values, and no goal is set."""
 
-    def _update(self, percept: CoWizardPercept, rows: Sequence[int], heard: HeardNumbers) -> Update:
-        return Update(values=percept.memory.values, fresh=(False,) * len(FRESH))
+    def _updates(
+        self, percepts: Sequence[CoWizardPercept], rows: Sequence[Sequence[int]], heard: HeardNumbers
+    ) -> list[Update]:
+        return [Update(values=percept.memory.values, fresh=(False,) * len(FRESH)) for percept in percepts]
 
 
 class WithoutRoute(LearnedCoWizard):
@@ -176,10 +178,14 @@ class Silent(LearnedCoWizard):
     """Nothing is said."""
 
     def play_all(
-        self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState], *, silent: bool = False
+        self,
+        observations: Sequence[ObservationMapping],
+        states: Sequence[LearnedState],
+        *,
+        silent: Sequence[bool] | None = None,
     ) -> list[LearnedDecision]:
         """Takes decisions; nothing is to be said."""
-        return super().play_all(observations, states, silent=True)
+        return super().play_all(observations, states, silent=[True] * len(states))
 
 
 ROWS: Final[dict[str, type[LearnedCoWizard]]] = {

@@ -266,6 +266,9 @@ def sessions(
         str | None, typer.Option(metavar="REV", help="Revision of the checkout to measure alternately.")
     ] = None,
     record: Annotated[bool, typer.Option("--record", help="Record the sessions.")] = False,
+    at_once: Annotated[
+        int, typer.Option("--at-once", min=1, max=1000, help="Sessions of a town played at the same time.")
+    ] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first session.")] = 5000,
     repeats: Annotated[int, typer.Option(min=1, max=99, help="Processes of each build; the median counts.")] = 3,
     picture: Picture = None,
@@ -279,7 +282,7 @@ def sessions(
         try:
             return measure(
                 town or TOWNS, co_wizards=co_wizard or CO_WIZARDS, sessions=count, seed=seed, record=record,
-                against=against, repeats=repeats, progress=progress,
+                at_once=at_once, against=against, repeats=repeats, progress=progress,
             )  # fmt: skip
         except ValueError as error:
             fail(str(error))

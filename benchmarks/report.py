@@ -320,13 +320,16 @@ def sessions_report(figures: Figures) -> Report:
         largest = ", ".join(f"{part} {number(1000.0 * value)}" for part, value in list(parts.items())[:_PARTS_SHOWN])
         notes.append(f"{row['co_wizard']}: {number(row['ours']['seconds_per_hour'])} s of processor time an hour")
         notes.append(f"largest parts of a decision [us]: {largest}")
+        if figures["at_once"] > 1:
+            notes[-2] += f", {number(row['ours']['megabytes_per_session'])} MB a session"
         if row["ratio"] is not None:
             notes[-2] += f"; {number(row['ratio'])} times the decisions per second of {figures['against']}"
     first = figures["rows"][0]
     return Report(
         title="Whole sessions with talk",
         setting=f"{_count(figures['sessions'], 'session')} in {', '.join(figures['towns'])}"
-        + (", recorded" if figures["recorded"] else ""),
+        + (", recorded" if figures["recorded"] else "")
+        + (f", {figures['at_once']} at once" if figures["at_once"] > 1 else ""),
         headline=f"{number(first['ours']['decisions_per_second'])} decisions of all roles per second of processor time",
         unit="decisions per second",
         rows=tuple(rows),

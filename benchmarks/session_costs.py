@@ -8,9 +8,11 @@ revisions have as well.
 from __future__ import annotations
 
 import functools
+import gc
 import importlib
 import inspect
 import json
+import os
 import sys
 import tempfile
 import time
@@ -28,6 +30,11 @@ from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
+
+try:
+    from dorothie_gym.evaluation.rollout.play import SessionCast, play_together
+except ImportError:  # a build that plays one session after another
+    play_together = None  # type: ignore[assignment]
 
 PARTS: Final[Mapping[str, tuple[str, ...]]] = {
     "physics": ("sim.world:World.step",),
@@ -135,7 +142,14 @@ def _module(name: str) -> Any:
 
 
 def costs(
-    towns: list[str], seeds: list[int], co_wizard: str, *, record: bool, parts: bool, max_seconds: float
+    towns: list[str],
+    seeds: list[int],
+    co_wizard: str,
+    *,
+    record: bool,
+    parts: bool,
+    max_seconds: float,
+    at_once: int = 1,
 ) -> dict[str, Any]:
     """Plays a session of each seed in each town, after one in each town that is not counted.
 
@@ -146,39 +160,73 @@ def costs(
         record: whether the sessions are recorded.
         parts: whether the time is measured by part, which takes time of its own.
         max_seconds: time limit of a session [s].
+        at_once: number of sessions of a town that are played at the same time, by builds that can.
 
     Returns:
-        Number of `decisions`, `simulated_seconds`, processor time in `seconds`; `parts` with the seconds by part, and
-        `missing` with the parts that this build does not have.
+        Number of `decisions`, `simulated_seconds`, processor time in `seconds`; `parts` with the seconds by part,
+        `missing` with the parts that this build does not have, and `megabytes` by which the process has grown for each
+        session that is played at the same time.
     """
     times = PartTimes(by_role=parts)
     missing = instrument(times) if parts else []
-    total: dict[str, Any] = {"decisions": 0, "simulated_seconds": 0.0, "seconds": 0.0}
+    total: dict[str, Any] = {"decisions": 0, "simulated_seconds": 0.0, "seconds": 0.0, "megabytes": 0.0}
+    config = EnvConfig(max_seconds=max_seconds)
+    at_once = at_once if play_together is not None else 1
     with tempfile.TemporaryDirectory() as folder:
-        for number, town in enumerate(towns):
-            engine = SessionEngine(town, config=EnvConfig(max_seconds=max_seconds))
-            for seed in (seeds[0] + WARM_UP, *seeds):
-                times.counting = seed in seeds
+        for town in towns:
+            engines = [SessionEngine(town, config=config)]
+            policies = _policies(engines[0], co_wizard, times)
+            _play(engines, policies, [seeds[0] + WARM_UP], None, times)
+            before = _resident()
+            engines += [SessionEngine(town, config=config) for _ in range(at_once - 1)]
+            times.counting = True
+            for first in range(0, len(seeds), at_once):
+                own = seeds[first : first + at_once]
                 start = time.process_time()
-                decisions = _play(engine, co_wizard, seed, Path(folder, f"{number}-{seed}") if record else None, times)
-                if times.counting:
-                    total["decisions"] += decisions
-                    total["simulated_seconds"] += engine.session.world.time
-                    total["seconds"] += time.process_time() - start
+                _play(engines, policies, own, Path(folder, f"{Path(town).name}-{first}") if record else None, times)
+                total["seconds"] += time.process_time() - start
+                played = [engine.session for engine in engines[: len(own)]]
+                total["decisions"] += sum(session.decisions for session in played)
+                total["simulated_seconds"] += sum(session.world.time for session in played)
+            times.counting = False
+            total["megabytes"] = max(total["megabytes"], (_resident() - before) / at_once)
     return {**total, "parts": dict(times.seconds) if parts else {}, "missing": missing}
 
 
-def _play(engine: SessionEngine, co_wizard: str, seed: int, folder: Path | None, times: PartTimes) -> int:
-    """Plays a session; returns the number of its decisions."""
+def _resident() -> float:
+    """Returns the resident memory of this process [MB], after a collection of garbage."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1]) if Path("/proc/self/statm").exists() else 0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def _policies(engine: SessionEngine, co_wizard: str, times: PartTimes) -> dict[Role, Any]:
+    """Returns the policies of the roles, timed by role where this is wanted."""
     policies: dict[Role, Any] = {}
     for role in AGENT_ROLES:
         policies[role] = make_policy(co_wizard if role is Role.CO_WIZARD else "scripted", role, engine.limits)
         if times.by_role:
-            step = "act" if getattr(policies[role], "is_direct", False) else "step"
-            setattr(policies[role], step, times.timed(str(role), getattr(policies[role], step)))
+            names = ("act_all", "act") if getattr(policies[role], "is_direct", False) else ("step",)
+            for name in (name for name in names if hasattr(policies[role], name)):
+                setattr(policies[role], name, times.timed(str(role), getattr(policies[role], name)))
+    return policies
+
+
+def _play(
+    engines: list[SessionEngine], policies: dict[Role, Any], seeds: list[int], folder: Path | None, times: PartTimes
+) -> None:
+    """Plays a session of each seed: one, or several at the same time."""
     with times.within(OTHER):
-        play_session(engine, policies, seed=seed, folder=folder)
-    return engine.session.decisions
+        if len(seeds) == 1:
+            play_session(engines[0], policies, seed=seeds[0], folder=folder)
+            return
+        casts = [
+            SessionCast(
+                host=engine, policies=policies, seed=seed, folder=None if folder is None else Path(f"{folder}-{seed}")
+            )
+            for engine, seed in zip(engines, seeds, strict=False)
+        ]
+        play_together(casts)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ def measure(
     seed: int = 5000,
     max_seconds: float = 900.0,
     record: bool = False,
+    at_once: int = 1,
     against: str | None = None,
     repeats: int = 3,
     progress: Progress = ignore_progress,
@@ -54,6 +55,7 @@ def measure(
         seed: seed of the first session.
         max_seconds: time limit of a session [s].
         record: whether the sessions are recorded.
+        at_once: number of sessions of a town that are played at the same time, by builds that can.
         against: revision of the checkout to be measured as well; None for none.
         repeats: number of processes of each build.
         progress: callback for the progress.
@@ -72,6 +74,7 @@ def measure(
         "seeds": list(range(seed, seed + sessions)),
         "record": record,
         "max_seconds": max_seconds,
+        "at_once": at_once,
     }
     with builds(against) as folders:
         rows = [
@@ -83,6 +86,7 @@ def measure(
         "sessions": sessions * len(towns),
         "seed": seed,
         "recorded": record,
+        "at_once": at_once,
         "against": against,
         "rows": rows,
         "repeats": repeats,
@@ -123,6 +127,7 @@ def _figures(played: Sequence[Mapping[str, Any]], measured: Mapping[str, Any]) -
         "decisions_per_second": rounded(timing.rate),
         "best": rounded(timing.best),
         "spread": timing.spread,
+        "megabytes_per_session": rounded(max(each["megabytes"] for each in played)),
         "seconds_per_hour": rounded(timing.median * played[0]["decisions"] / hours),
         "milliseconds_by_part": {part: rounded(parts[part]) for part in sorted(parts, key=lambda each: -parts[each])},
         "missing_parts": measured["missing"],

@@ -76,6 +76,7 @@ def test_report_names_both_builds() -> None:
     found: dict[str, Any] = {
         "decisions": 100, "decisions_per_second": 800.0, "best": 820.0, "spread": 0.01, "seconds_per_hour": 9.0,
         "milliseconds_by_part": {"hearing": 0.5, "physics": 0.1}, "missing_parts": [],
+        "megabytes_per_session": 1.2,
     }  # fmt: skip
     machine = {
         "processor": "P", "cores": 2, "system": "S", "python": "3", "numba": "1", "numpy": "2", "highway_env": "1",
@@ -85,6 +86,7 @@ def test_report_names_both_builds() -> None:
         "towns": ["midtown"],
         "sessions": 4,
         "recorded": False,
+        "at_once": 32,
         "against": "v1",
         "rows": rows,
         "machine": machine,
@@ -92,4 +94,12 @@ def test_report_names_both_builds() -> None:
     report = sessions_report(figures)
     assert [(each.value, each.reference) for each in report.rows] == [(800.0, False), (400.0, True)]
     assert "2 times the decisions per second of v1" in report.notes[0]
+    assert "1.2 MB a session" in report.notes[0] and "32 at once" in report.setting
     assert "hearing 500" in report.notes[1]
+
+
+@pytest.mark.long
+def test_sessions_at_once_are_those_played_one_by_one() -> None:
+    settings = {**SETTINGS, "seeds": [5000, 5001], "max_seconds": 10.0, "parts": False}
+    alone, together = run(ROOT, settings), run(ROOT, {**settings, "at_once": 2})
+    assert alone["decisions"] == together["decisions"] == 40 and together["megabytes"] > 0.0

@@ -87,15 +87,7 @@ def play_session(
     cast = SessionCast(
         host=host, policies=policies, seed=seed, folder=folder, create=create, scenario=scenario, trial=trial
     )
-    with _Play.begin(cast) as play:
-        if on_step is not None:
-            on_step(play.engine)
-        players = Players(play.policies)
-        while not play.engine.over:
-            play.step(players.decide(play.engine, play.states))
-            if on_step is not None:
-                on_step(play.engine)
-        return play.finish()
+    return _play_alone(cast, on_step)
 
 
 def play_together(casts: Sequence[SessionCast]) -> list[SessionSummary]:
@@ -115,6 +107,8 @@ def play_together(casts: Sequence[SessionCast]) -> list[SessionSummary]:
         OutputFolderError: a folder was deleted during the session.
         OSError: a folder cannot be written.
     """
+    if len(casts) == 1:
+        return [_play_alone(casts[0])]
     with ExitStack() as stack:
         plays = [stack.enter_context(_Play.begin(cast)) for cast in casts]
         players = BatchPlayers([play.policies for play in plays])
@@ -127,6 +121,19 @@ def play_together(casts: Sequence[SessionCast]) -> list[SessionSummary]:
                     summaries[number] = plays[number].finish()
                     del playing[number]
     return [summaries[number] for number in range(len(plays))]
+
+
+def _play_alone(cast: SessionCast, on_step: Callable[[SessionEngine], None] | None = None) -> SessionSummary:
+    """Plays one session, see `play_session`."""
+    with _Play.begin(cast) as play:
+        if on_step is not None:
+            on_step(play.engine)
+        players = Players(play.policies)
+        while not play.engine.over:
+            play.step(players.decide(play.engine, play.states))
+            if on_step is not None:
+                on_step(play.engine)
+        return play.finish()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import LinkType
@@ -62,41 +64,64 @@ _SIDES = {LinkType.LANE_CHANGE_LEFT: (90, "left"), LinkType.LANE_CHANGE_RIGHT: (
 # --- Choices ----------------------------------------------------------------------------------------------------------
 
 
-def drive_options(view: CoWizardView, town: Town) -> dict[str, Physical | None]:
+def drive_options(view: CoWizardView, town: Town) -> Mapping[str, Physical | None]:
     """Returns the physical actions that the mask allows, with their arguments, by their labels; "none" first."""
-    possible = view.raw["action_mask"]["physical"]
+    possible, angles = view.raw["action_mask"]["physical"], view.raw["action_mask"]["angle"]
+    turns: tuple[int, ...] = ()
+    if possible[PhysicalAction.J_TURN]:
+        turns = tuple(angle for angle in exit_angles(view) if angles[angle + STRAIGHT_ANGLE])
+    sides = tuple(
+        side
+        for side, (angle, _) in _SIDES.items()
+        if possible[PhysicalAction.LANE_SWITCH]
+        and angles[angle + STRAIGHT_ANGLE]
+        and town.neighbour(view.lane, side) is not None
+    )
+    steps = tuple(up for up in (True, False) if may_change_cruise(view.cruise, up))
+    allowed = frozenset(action for action in PhysicalAction if possible[action])
+    return _options(allowed, turns, sides, steps, view.lights)
+
+
+@lru_cache(maxsize=1024)
+def _options(
+    allowed: frozenset[PhysicalAction],
+    turns: tuple[int, ...],
+    sides: tuple[LinkType, ...],
+    steps: tuple[bool, ...],
+    lights: bool,
+) -> Mapping[str, Physical | None]:
+    """Returns the physical actions of `drive_options`.
+
+    Args:
+        allowed: actions that the mask allows with some argument.
+        turns: angles of the turns that it allows [degrees].
+        sides: sides to which the car may change lanes.
+        steps: changes of the cruise speed, up or down.
+        lights: whether the head lights are on.
+    """
+    arguments: dict[PhysicalAction, dict[str, Physical]] = {
+        PhysicalAction.J_TURN: {f"{angle}": Physical(action=PhysicalAction.J_TURN, angle=angle) for angle in turns},
+        PhysicalAction.LANE_SWITCH: {
+            _SIDES[side][1]: Physical(action=PhysicalAction.LANE_SWITCH, angle=_SIDES[side][0]) for side in sides
+        },
+        PhysicalAction.SPEED_CHANGE: {
+            "up" if up else "down": Physical(action=PhysicalAction.SPEED_CHANGE, up=up) for up in steps
+        },
+        PhysicalAction.LIGHT_CHANGE: {
+            "off" if lights else "on": Physical(action=PhysicalAction.LIGHT_CHANGE, up=not lights)
+        },
+    }
     options: dict[str, Physical | None] = {NONE: None}
     for action in PhysicalAction:
-        if possible[action]:
-            options |= {
-                f"{action.label} {argument}".strip(): order for argument, order in _orders(action, view, town).items()
-            }
-    return options
-
-
-def _orders(action: PhysicalAction, view: CoWizardView, town: Town) -> dict[str, Physical]:
-    """Returns a physical action with each argument that the mask allows, by the argument in words."""
-    angles = view.raw["action_mask"]["angle"]
-    if action is PhysicalAction.J_TURN:
-        allowed = [angle for angle in exit_angles(view) if angles[angle + STRAIGHT_ANGLE]]
-        return {f"{angle}": Physical(action=action, angle=angle) for angle in allowed}
-    if action is PhysicalAction.LANE_SWITCH:
-        return {
-            word: Physical(action=action, angle=angle)
-            for side, (angle, word) in _SIDES.items()
-            if angles[angle + STRAIGHT_ANGLE] and town.neighbour(view.lane, side) is not None
-        }
-    if action is PhysicalAction.SPEED_CHANGE:
-        steps = [up for up in (True, False) if may_change_cruise(view.cruise, up)]
-        return {"up" if up else "down": Physical(action=action, up=up) for up in steps}
-    if action is PhysicalAction.LIGHT_CHANGE:
-        return {"off" if view.lights else "on": Physical(action=action, up=not view.lights)}
-    return {"": Physical(action=action)}
+        if action in allowed:
+            for argument, order in arguments.get(action, {"": Physical(action=action)}).items():
+                options[f"{action.label} {argument}".strip()] = order
+    return MappingProxyType(options)
 
 
 def exit_angles(view: CoWizardView) -> tuple[int, ...]:
     """Returns the angles of the exits of the next junction [degrees, positive left], from left to right."""
-    rows = view.raw["exits"]
+    rows = view.raw["exits"].tolist()
     return tuple(sorted({int(row[ExitColumn.ANGLE]) for row in rows if row[ExitColumn.PRESENT] > 0}, reverse=True))
 
 

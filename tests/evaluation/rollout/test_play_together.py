@@ -11,11 +11,15 @@ import pytest
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, roll_out
 from dorothie_gym.evaluation.rollout import runner
 from dorothie_gym.evaluation.rollout.play import SessionCast, play_session, play_together
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy_loader import SCRIPTED, find_player, make_policy
+from dorothie_gym.policies.observation_parser import scalar
+from dorothie_gym.policies.policy import AnyPolicy
+from dorothie_gym.policies.policy_loader import SCRIPTED, Player, find_player, make_policy
 from dorothie_gym.policies.trivial import LaneFollowPolicy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import SpaceLimits
 
 LEARNED = {Role.PARTICIPANT: "pretrained:participant", Role.CO_WIZARD: "pretrained:co-wizard"}
 
@@ -40,7 +44,7 @@ def test_sessions_of_learned_roles_equal_those_played_alone(tmp_path: Path, obse
     ]
     summaries = play_together(casts)
     assert files_of(tmp_path / "together") == files_of(tmp_path / "alone")
-    assert [summary["decisions"] for summary in summaries] == [50, 80, 80]
+    assert [summary["seconds"] for summary in summaries] == [25.0, 40.0, 40.0]
 
 
 def test_rollout_of_a_learned_role_does_not_depend_on_the_number_at_once(
@@ -59,34 +63,28 @@ def test_rollout_of_a_learned_role_does_not_depend_on_the_number_at_once(
 
 
 class FailingPolicy(LaneFollowPolicy):
-    """Follows its lane, and fails in sessions of one town."""
+    """Follows its lane, and fails in one town."""
 
-    def act(self, observation: Mapping[str, Any], state: None) -> Any:
-        if len(observation["street_names"]) and float(observation["time"]) > 2.0 and self.fails:
+    def initial_state(self, seed: int, town: Town) -> Any:
+        return town.name
+
+    def act(self, observation: Mapping[str, Any], state: Any) -> Any:
+        if state == "millbrook" and scalar(observation, "time") > 2.0:
             raise RuntimeError("no more")
-        return super().act(observation, state)
-
-    fails = False
+        return super().act(observation, None)[0], state
 
 
 def test_session_that_fails_does_not_take_the_others_of_its_batch_along(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: list[FailingPolicy] = []
+    def make(self: object, role: Role, limits: SpaceLimits) -> AnyPolicy:
+        return FailingPolicy(limits) if role is Role.CO_WIZARD else make_policy("silent", role, limits)
 
-    def make(self: object, role: Role, limits: Any) -> Any:
-        if role is not Role.CO_WIZARD:
-            return make_policy("silent", role, limits)
-        made.append(FailingPolicy(limits))
-        made[-1].fails = limits == towns["millbrook"].limits
-        return made[-1]
-
-    towns = {town: SessionEngine(town) for town in ("brookside", "millbrook")}
-    monkeypatch.setattr(type(SCRIPTED), "make", make)
-    monkeypatch.setattr(type(SCRIPTED), "trained", property(lambda self: True))
-    cast = dict.fromkeys(AGENT_ROLES, SCRIPTED)
+    monkeypatch.setattr(Player, "make", make)
+    monkeypatch.setattr(Player, "trained", True)
+    config = EnvConfig(max_seconds=5.0)
     settings = RolloutSettings(
-        cast=cast, towns=("brookside", "millbrook"), sessions=4, config=EnvConfig(max_seconds=5.0)
+        cast=dict.fromkeys(AGENT_ROLES, SCRIPTED), towns=("brookside", "millbrook"), sessions=4, config=config
     )
     rows = roll_out(settings, tmp_path / "rollout").rows
     assert [row.error for row in rows] == [None, "RuntimeError: no more"] * 2

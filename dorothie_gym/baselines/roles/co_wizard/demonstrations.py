@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -19,17 +19,24 @@ from dorothie_gym.baselines.roles.co_wizard.decision import (
 )
 from dorothie_gym.baselines.roles.co_wizard.examples import Example, LessonInputs, correcting_example, make_example
 from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory, initial_values
-from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedDecision
+from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedDecision, LearnedState
 from dorothie_gym.baselines.roles.co_wizard.remarks import sources
 from dorothie_gym.baselines.roles.co_wizard.teacher import CALM, Lesson, Teacher
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
-from dorothie_gym.baselines.roles.learned_role.practice import TRAINED, observed, play_in_turns
+from dorothie_gym.baselines.roles.learned_role.practice import (
+    TRAINED,
+    PracticeSession,
+    observed,
+    play_in_turns,
+    play_together,
+)
 from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
 from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.co_wizard.network import CoWizardNetwork
@@ -38,9 +45,8 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.speech import Remark
     from dorothie_gym.session.recording.session import Session
     from dorothie_gym.session.session_engine import SessionEngine
-    from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
+    from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
     from dorothie_gym.session.spaces.fields import SpaceLimits
-    from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CO_WIZARD: Final = Role.CO_WIZARD
 
@@ -143,30 +149,52 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
 def practise(
     network: CoWizardNetwork,
     vocabulary: Sequence[str],
-    engine: SessionEngine,
-    seed: int,
-    on_example: OnExample,
+    sessions: Sequence[PracticeSession[Example]],
     settings: CoWizardTraining,
 ) -> None:
-    """Plays a session in which teacher and player take turns; hands on the teacher's decisions as examples.
+    """Plays sessions in which teacher and player take turns; hands on the teacher's decisions as examples.
+
+    The player decides for all sessions together.
 
     Args:
         network: network of the player.
         vocabulary: its forms of remarks.
-        engine: engine of the town.
-        seed: seed of the session.
-        on_example: receives the examples.
+        sessions: the sessions.
         settings: settings of the training.
     """
+    player = LearnedCoWizard(network, vocabulary)
+
+    def answer(questions: Sequence[Question]) -> list[LearnedDecision]:
+        return player.play_all(
+            [question.observation for question in questions],
+            [question.state for question in questions],
+            silent=[question.silent for question in questions],
+        )
+
+    play_together([_session(player, session, settings) for session in sessions], answer)
+
+
+class Question(NamedTuple):
+    """Question for the player's decision: observation, state, and whether it must stay silent."""
+
+    observation: ObservationMapping
+    state: LearnedState
+    silent: bool
+
+
+def _session(
+    player: LearnedCoWizard, session: PracticeSession[Example], settings: CoWizardTraining
+) -> Generator[Question, LearnedDecision, None]:
+    """Plays a session of practice."""
+    engine, seed = session.engine, session.seed
     engine.reset(seed=seed)
     limits = engine.limits
     others: dict[Role, AnyPolicy] = {
         Role.PARTICIPANT: ScriptedParticipant(limits, traits=TRAINED),
         Role.AD_WIZARD: ScriptedAdWizard(limits),
     }
-    player = LearnedCoWizard(network, vocabulary, limits)
-    practice = CoWizardPractice(player, engine, policy_seed(seed, CO_WIZARD), on_example, settings)
-    play_in_turns(CO_WIZARD, practice, others, engine, seed)
+    practice = CoWizardPractice(player, engine, policy_seed(seed, CO_WIZARD), session.on_example, settings)
+    yield from play_in_turns(CO_WIZARD, practice, others, engine, seed)
 
 
 class CoWizardPractice:
@@ -203,12 +231,13 @@ class CoWizardPractice:
         self._disagreements = 0
         return left
 
-    def decide(self, observation: ObservationMapping) -> ActionDict:
-        """Takes a decision: the player's where it leads, with the teacher's words unless it talks."""
-        return self._decide(observation, self._talks).encode(self._player.limits)
+    def asks(self, observation: ObservationMapping) -> Question | None:
+        """Returns the question for the player's decision where it leads."""
+        return Question(observation, self._state, not self._talks) if self._leads else None
 
-    def _decide(self, observation: ObservationMapping, talks: bool) -> CoWizardAction:
-        turn = self._player.play(observation, self._state, silent=not talks) if self._leads else None
+    def decide(self, observation: ObservationMapping, answer: LearnedDecision | None) -> CoWizardAction:
+        """Takes a decision: the player's where it leads, with the teacher's words unless it talks."""
+        turn, talks = answer, self._talks
         percept, memory, lesson = self._pupil.decide(observation, self._on_example, turn if talks else None)
         if turn is None:
             self._pupil.did(percept, memory, lesson.physical, lesson.remarks)

@@ -135,21 +135,22 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         """Chooses a typed action for each session, with one forward pass for all; see `BatchPolicy.act_all`."""
         return [(turn.action, turn.state) for turn in self.play_all(observations, states)]
 
-    def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> LearnedDecision:
-        """Takes a decision; returns all that it consists of.
+    def play_all(
+        self,
+        observations: Sequence[ObservationMapping],
+        states: Sequence[LearnedState],
+        *,
+        silent: Sequence[bool] | None = None,
+    ) -> list[LearnedDecision]:
+        """Takes a decision in each of several sessions; returns all that it consists of.
 
         Args:
-            observation: observation of the Co-Wizard, with its action mask.
-            state: state before.
-            silent: whether the Co-Wizard must stay silent.
+            observations: observations of the Co-Wizard, with its action mask, at least one.
+            states: states before.
+            silent: whether the Co-Wizard must stay silent; None for no session.
         """
-        return self.play_all([observation], [state], silent=silent)[0]
-
-    def play_all(
-        self, observations: Sequence[ObservationMapping], states: Sequence[LearnedState], *, silent: bool = False
-    ) -> list[LearnedDecision]:
-        """As `play` for several sessions, at least one."""
-        begun = [_begin(observation, state, silent) for observation, state in zip(observations, states, strict=True)]
+        must = [False] * len(states) if silent is None else silent
+        begun = [_begin(*turn) for turn in zip(observations, states, must, strict=True)]
         memories = self._listen(begun)
         offered = [
             acting_inputs(turn.percept, memory, queued=turn.queued)
@@ -169,8 +170,35 @@ class LearnedCoWizard(LearnedPolicy[LearnedState, CoWizardNetwork]):
         inputs = [listening_inputs(turn.percept, queued=turn.queued) for turn in begun]
         before = np.array([turn.percept.memory.values for turn in begun], dtype=np.int64)
         heard = self._inference.listen(InputBatch.of(inputs), before)
-        updates = _updates(begun, [own.rows for own in inputs], heard)
+        updates = self._updates([turn.percept for turn in begun], [own.rows for own in inputs], heard)
         return [remember(turn.percept, update) for turn, update in zip(begun, updates, strict=True)]
+
+    def _updates(
+        self, percepts: Sequence[CoWizardPercept], rows: Sequence[Sequence[int]], heard: HeardNumbers
+    ) -> list[Update]:
+        """Returns the most likely update of each memory.
+
+        Args:
+            percepts: perceptions (b,).
+            rows: rows of the places among which each one's goal is chosen.
+            heard: logits of all.
+        """
+        before = np.array([percept.memory.values for percept in percepts], dtype=np.int64)
+        idle = np.array([not percept.heard for percept in percepts])
+        logits = heard.values
+        logits[np.flatnonzero(idle)[:, None], _STARTS + before[idle]] += KEPT_BONUS
+        values = np.stack([logits[:, start:end].argmax(axis=1) for start, end in _SECTIONS], axis=1).tolist()
+        goals, statuses = heard.goal.argmax(axis=1).tolist(), heard.status.argmax(axis=1).tolist()
+        fresh, events = (heard.fresh > 0.0).tolist(), len(GoalEvent)
+        return [
+            Update(
+                values=tuple(values[number]),
+                fresh=tuple(fresh[number]),
+                goal=goal if goal < events else events + rows[number][goal - events],
+                status=statuses[number],
+            )
+            for number, goal in enumerate(goals)
+        ]
 
     def _command(
         self, percept: CoWizardPercept, memory: WorkingMemory, rng: np.random.Generator, scores: NDArray[np.float32]
@@ -246,32 +274,6 @@ def _begin(observation: ObservationMapping, state: LearnedState, silent: bool) -
         late = percept.memory.clock.interval / 2.0
         voice = voice.heard_other(percept.view.time, percept.latest.heard.acts, rng, late).cleared()
     return _Begun(state, percept, rng, voice, queued, silent or not voice.idle)
-
-
-def _updates(begun: Sequence[_Begun], rows: Sequence[Sequence[int]], heard: HeardNumbers) -> list[Update]:
-    """Returns the most likely update of each memory.
-
-    Args:
-        begun: decisions in progress (b,).
-        rows: rows of the places among which each one's goal is chosen.
-        heard: logits of all.
-    """
-    before = np.array([turn.percept.memory.values for turn in begun], dtype=np.int64)
-    idle = np.array([not turn.percept.heard for turn in begun])
-    logits = heard.values
-    logits[np.flatnonzero(idle)[:, None], _STARTS + before[idle]] += KEPT_BONUS
-    values = np.stack([logits[:, start:end].argmax(axis=1) for start, end in _SECTIONS], axis=1).tolist()
-    goals, statuses = heard.goal.argmax(axis=1).tolist(), heard.status.argmax(axis=1).tolist()
-    fresh, events = (heard.fresh > 0.0).tolist(), len(GoalEvent)
-    return [
-        Update(
-            values=tuple(values[number]),
-            fresh=tuple(fresh[number]),
-            goal=goal if goal < events else events + rows[number][goal - events],
-            status=statuses[number],
-        )
-        for number, goal in enumerate(goals)
-    ]
 
 
 def _finish(

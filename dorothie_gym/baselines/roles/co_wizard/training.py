@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit, OnStage
 
 CO_WIZARD: Final = LearnedRole(
-    files=FILES, examples=CoWizardExamples, loss=loss_of, follow=follow, practise=practise, branch=29
+    files=FILES, examples=CoWizardExamples, loss=loss_of, follow=follow, practise=practise, branch=29, at_once=16
 )
 """The learned Co-Wizard."""
 

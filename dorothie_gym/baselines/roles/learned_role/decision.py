@@ -152,11 +152,15 @@ class InputBatch(NamedTuple):
     @classmethod
     def of(cls, inputs: Sequence[Inputs]) -> InputBatch:
         """Returns the inputs of sessions, at least one."""
+        counts = np.array([len(each.rows) for each in inputs], dtype=np.int64)
+        used = int(counts.max())  # options beyond are 0, and need no rounding
+        options = np.zeros((len(inputs), *inputs[0].options.shape), dtype=np.float32)
+        options[:, :used] = np.stack([each.options[:used] for each in inputs]).astype(np.float16)
         return cls(
             np.stack([each.state for each in inputs]).astype(np.float16).astype(np.float32),
             np.stack([each.words for each in inputs]),
-            np.stack([each.options for each in inputs]).astype(np.float16).astype(np.float32),
-            np.array([len(each.rows) for each in inputs], dtype=np.int64),
+            options,
+            counts,
         )
 
     def tensors(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:

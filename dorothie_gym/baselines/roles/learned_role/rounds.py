@@ -128,12 +128,17 @@ class Learner(Protocol):
         """Branch of the seed from which the sessions of the practice are drawn; no rollout or corpus draws from it."""
         ...
 
-    def follower(self) -> Callable[[CorpusPlan], None]:
-        """Returns the function that writes the examples of a corpus session; it may skip a session."""
+    @property
+    def at_once(self) -> int:
+        """Largest number of sessions of practice that are played at the same time."""
         ...
 
-    def player(self, folder: Path) -> Callable[[PracticePlan], None]:
-        """Returns the function that plays a session with the model in a folder, and writes its lessons."""
+    def follower(self) -> Callable[[Sequence[CorpusPlan]], None]:
+        """Returns the function that writes the examples of corpus sessions; it may skip a session."""
+        ...
+
+    def player(self, folder: Path) -> Callable[[Sequence[PracticePlan]], None]:
+        """Returns the function that plays sessions with the model in a folder, and writes their lessons."""
         ...
 
     def fit(self, plan: FitPlan, on_stage: OnStage) -> FinishedFit:
@@ -188,7 +193,8 @@ def train_in_rounds(
                 place = out / LESSONS / f"practice-{number}"
                 practice = practice_plans([settings.seed, number], settings.sessions, learner.branch, place)
                 title = f"Practice, round {number} of {settings.rounds}"
-                gather(partial(learner.player, former), practice, workers, partial(on_stage, title))
+                report = partial(on_stage, title)
+                gather(partial(learner.player, former), practice, workers, report, at_once=learner.at_once)
                 files += [plan.file for plan in practice]
             if not (folder / "model.json").is_file():
                 done.append(learner.fit(_fit_plan(settings, number, folder, files, corpus_files, former), on_stage))
@@ -241,13 +247,19 @@ Plan = TypeVar("Plan", CorpusPlan, PracticePlan)
 
 
 def gather(
-    prepare: Callable[[], Callable[[Plan], None]],
+    prepare: Callable[[], Callable[[Sequence[Plan]], None]],
     plans: Sequence[Plan],
     workers: int,
     report: Callable[[int, int], None],
+    *,
+    at_once: int = 1,
 ) -> None:
-    """Creates the missing files of sessions."""
+    """Creates the missing files of sessions, of which several may be played at the same time."""
     missing = [plan for plan in plans if not plan.file.is_file()]
-    report(len(plans) - len(missing), len(plans))
-    for number, _ in enumerate(run_tasks(prepare, missing, workers=workers), start=len(plans) - len(missing) + 1):
-        report(number, len(plans))
+    size = max(1, min(at_once, len(missing) // workers))
+    batches = [tuple(missing[first : first + size]) for first in range(0, len(missing), size)]
+    done = len(plans) - len(missing)
+    report(done, len(plans))
+    for _ in run_tasks(prepare, batches, workers=workers):
+        done = min(done + size, len(plans))
+        report(done, len(plans))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,7 +15,7 @@ from torch import nn
 from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines.roles.learned_role.examples import ExampleBatch, forms_in
 from dorothie_gym.baselines.roles.learned_role.files import ModelFiles
-from dorothie_gym.baselines.roles.learned_role.practice import is_held_out
+from dorothie_gym.baselines.roles.learned_role.practice import PracticeSession, is_held_out
 from dorothie_gym.baselines.roles.learned_role.rounds import (
     CorpusPlan,
     FinishedFit,
@@ -48,17 +49,19 @@ class LearnedRole(Generic[Network, Batch, Example, Settings]):
         examples: class of its examples.
         loss: loss of a network in the given examples [nats].
         follow: simulates a recorded session again, and hands on the examples of the role.
-        practise: plays the session of a seed, in which a network with a vocabulary and the teacher alternate, and
-            hands on the teacher's decisions.
+        practise: plays sessions in which a network with a vocabulary and the teacher alternate, and hands on the
+            teacher's decisions.
         branch: branch of the seed from which the sessions of practice are drawn; no rollout or corpus draws from it.
+        at_once: largest number of sessions of practice that are played at the same time.
     """
 
     files: ModelFiles[Network]
     examples: type[Batch]
     loss: Callable[[Network, Batch], torch.Tensor]
     follow: Callable[[Session, Town, Callable[[Example], None]], None]
-    practise: Callable[[Network, Sequence[str], SessionEngine, int, Callable[[Example], None], Settings], None]
+    practise: Callable[[Network, Sequence[str], Sequence[PracticeSession[Example]], Settings], None]
     branch: int
+    at_once: int = 1
 
 
 def train_role(
@@ -95,13 +98,18 @@ class RoleLearner(Generic[Network, Batch, Example, Settings]):
         """Branch of the seed from which the sessions of the practice are drawn."""
         return self.role.branch
 
-    def follower(self) -> Callable[[CorpusPlan], None]:
-        """Returns the function that follows a session; those of held-out personas are left out."""
+    @property
+    def at_once(self) -> int:
+        """Largest number of sessions of practice that are played at the same time."""
+        return self.role.at_once
+
+    def follower(self) -> Callable[[Sequence[CorpusPlan]], None]:
+        """Returns the function that follows sessions; those of held-out personas are left out."""
         torch.set_num_threads(1)
         return partial(self._follow, Corpus.load(self.settings.corpus).filter(fold="train"))
 
-    def player(self, folder: Path) -> Callable[[PracticePlan], None]:
-        """Returns the function that plays a session of practice."""
+    def player(self, folder: Path) -> Callable[[Sequence[PracticePlan]], None]:
+        """Returns the function that plays sessions of practice."""
         return _PracticeSessions(self.role, folder, self.settings)
 
     def fit(self, plan: FitPlan, on_stage: OnStage) -> FinishedFit:
@@ -133,8 +141,12 @@ class RoleLearner(Generic[Network, Batch, Example, Settings]):
         )
         return FinishedFit(name=plan.folder.name, examples=len(examples), loss=loss)
 
-    def _follow(self, corpus: Corpus, plan: CorpusPlan) -> None:
-        """Writes the lessons of a session of the corpus."""
+    def _follow(self, corpus: Corpus, plans: Sequence[CorpusPlan]) -> None:
+        """Writes the lessons of sessions of the corpus."""
+        for plan in plans:
+            self._follow_one(corpus, plan)
+
+    def _follow_one(self, corpus: Corpus, plan: CorpusPlan) -> None:
         entry = corpus.entries[plan.number]
         session = entry.load()
         if is_held_out(session.header):
@@ -158,19 +170,28 @@ class _PracticeSessions(Generic[Network, Batch, Example, Settings]):
         self._role, self._settings = role, settings
         self._network, page = role.files.load(folder)
         self._vocabulary = page.vocabulary
-        self._engines: dict[tuple[str, bool], SessionEngine] = {}
+        self._engines: dict[tuple[str, bool], list[SessionEngine]] = {}
 
-    def __call__(self, plan: PracticePlan) -> None:
-        engine = self._engine(plan.town, observe_acts=plan.seed % 2 == 1)
-        found: list[Example] = []
-        self._role.practise(self._network, self._vocabulary, engine, plan.seed, found.append, self._settings)
-        _write(self._role.examples, found, plan.file)
+    def __call__(self, plans: Sequence[PracticePlan]) -> None:
+        found: list[list[Example]] = [[] for _ in plans]
+        seats: Counter[tuple[str, bool]] = Counter()
+        sessions = []
+        for plan, own in zip(plans, found, strict=True):
+            kind = plan.town, plan.seed % 2 == 1
+            engine = self._engine(*kind, seats[kind])
+            seats[kind] += 1
+            sessions.append(PracticeSession(engine=engine, seed=plan.seed, on_example=own.append))
+        self._role.practise(self._network, self._vocabulary, sessions, self._settings)
+        for plan, own in zip(plans, found, strict=True):
+            _write(self._role.examples, own, plan.file)
 
-    def _engine(self, town: str, *, observe_acts: bool) -> SessionEngine:
-        if (town, observe_acts) not in self._engines:
+    def _engine(self, town: str, observe_acts: bool, number: int) -> SessionEngine:
+        """Returns the engine of the session of a number among those of a kind that are played at the same time."""
+        engines = self._engines.setdefault((town, observe_acts), [])
+        while len(engines) <= number:
             config = EnvConfig(max_seconds=self._settings.max_seconds, observe_acts=observe_acts)
-            self._engines[town, observe_acts] = SessionEngine(town, config=config)
-        return self._engines[town, observe_acts]
+            engines.append(SessionEngine(town, config=config))
+        return engines[number]
 
 
 def _write(examples: type[Batch], found: Sequence[Any], file: Path) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
-from dorothie_gym.baselines.roles.learned_role.practice import observed, play_in_turns
+from dorothie_gym.baselines.roles.learned_role.practice import PracticeSession, observed, play_in_turns, play_together
 from dorothie_gym.baselines.roles.participant.decision import (
     ParticipantPercept,
     choosing_inputs,
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.recording.session import Session
-    from dorothie_gym.session.session_engine import SessionEngine
     from dorothie_gym.session.spaces.observations import ObservationMapping
 
 PARTICIPANT: Final = Role.PARTICIPANT
@@ -108,28 +107,32 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
 def practise(
     network: ParticipantNetwork,
     vocabulary: Sequence[str],
-    engine: SessionEngine,
-    seed: int,
-    on_example: OnExample,
+    sessions: Sequence[PracticeSession[Example]],
     settings: RoundSettings,
 ) -> None:
-    """Plays a session in which teacher and player guide the car alternately; passes the examples on.
+    """Plays sessions in which teacher and player guide the car alternately; passes the examples on.
 
     Args:
         network: network of the player.
         vocabulary: its forms of remarks.
-        engine: engine of the town.
-        seed: seed of the session.
-        on_example: receives the examples.
+        sessions: the sessions.
         settings: settings of the training.
     """
+    play_together([_session(network, vocabulary, session, settings.share) for session in sessions], list)
+
+
+def _session(
+    network: ParticipantNetwork, vocabulary: Sequence[str], session: PracticeSession[Example], share: float
+) -> Generator[None, None, None]:
+    """Plays a session of practice, in which nothing is asked."""
+    engine, seed = session.engine, session.seed
     engine.reset(seed=seed)
     limits = engine.limits
     others: dict[Role, AnyPolicy] = {Role.CO_WIZARD: ScriptedCoWizard(limits), Role.AD_WIZARD: ScriptedAdWizard(limits)}
     own = policy_seed(seed, PARTICIPANT)
     pupil = Pupil(engine.town, own, Teacher(engine.town, limits, own, AVERAGE))
-    practice = ParticipantPractice(LearnedParticipant(network, vocabulary, limits), pupil, on_example, settings.share)
-    play_in_turns(PARTICIPANT, practice, others, engine, seed)
+    practice = ParticipantPractice(LearnedParticipant(network, vocabulary, limits), pupil, session.on_example, share)
+    yield from play_in_turns(PARTICIPANT, practice, others, engine, seed)
 
 
 class ParticipantPractice:
@@ -148,7 +151,10 @@ class ParticipantPractice:
         self._leads = bool(rng.random() < self._share)
         return left
 
-    def decide(self, observation: ObservationMapping) -> ActionDict:
+    def asks(self, observation: ObservationMapping) -> None:
+        """Asks nothing: choosing and speaking follow each other within a decision."""
+
+    def decide(self, observation: ObservationMapping, answer: None) -> ActionDict:
         """Takes a decision: the player's where it leads, else the teacher's."""
         percept, memory, lesson = self._pupil.decide(observation, self._on_example)
         if self._leads:

@@ -40,7 +40,7 @@ def turns(row: str, engine: SessionEngine) -> Iterator[LearnedDecision]:
         inputs, actions = policy_inputs(engine, others), {}
         for role, policy in others.items():
             actions[str(role)], states[role] = policy.step(inputs[role], states[role])
-        turn = player.play(observed(engine, Role.CO_WIZARD), state)
+        (turn,) = player.play_all([observed(engine, Role.CO_WIZARD)], [state])
         state = turn.state
         engine.step({**actions, str(Role.CO_WIZARD): turn.action.encode(engine.limits)})
         yield turn

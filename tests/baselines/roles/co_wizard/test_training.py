@@ -6,7 +6,7 @@ import torch
 from safetensors.torch import load_file
 
 from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining
-from dorothie_gym.baselines.roles.co_wizard.features import STATE_SIZE
+from dorothie_gym.baselines.roles.co_wizard.features import STATE
 from dorothie_gym.baselines.roles.co_wizard.files import FILES
 from dorothie_gym.baselines.roles.co_wizard.training import train_co_wizard
 from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
@@ -51,7 +51,7 @@ def weights(folder):
 @pytest.mark.long
 def test_examples_have_the_lengths_that_the_network_takes(trained):
     lessons = load_file(next((trained / LESSONS).rglob("*.safetensors")))
-    assert lessons["listening"].shape[1] == STATE_SIZE + KEPT * UTTERANCE_SIZE
+    assert lessons["listening"].shape[1] == STATE.size + KEPT * UTTERANCE_SIZE
     page = json.loads((trained / "model.json").read_text())
     layout = page["layout"]
     assert (layout["state"], layout["place"], layout["command"]) == tuple(
@@ -65,7 +65,7 @@ def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_pa
         pass
 
     def stop(stage, done, total):
-        if stage.startswith("Practice") and done == 1:
+        if stage.startswith("Practice") and done:
             raise InterruptedTrainingError
 
     with pytest.raises(InterruptedTrainingError):

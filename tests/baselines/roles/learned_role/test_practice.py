@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
-from dorothie_gym.baselines.roles.learned_role.practice import is_held_out, new_remarks, observed, play_in_turns
+from dorothie_gym.baselines.roles.learned_role.practice import (
+    is_held_out,
+    new_remarks,
+    observed,
+    play_in_turns,
+    play_together,
+)
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import LaneFollowPolicy, SilentPolicy
@@ -40,13 +47,28 @@ class Turns:
         self.draws.append(float(rng.random()))
         return TURN
 
-    def decide(self, observation: dict[str, object]) -> dict[str, object]:
+    def asks(self, observation: dict[str, object]) -> int | None:
+        return self.decisions if self.decisions % 3 == 0 else None
+
+    def decide(self, observation: dict[str, object], answer: int | None) -> dict[str, object]:
         assert "action_mask" in observation
+        assert answer == (None if self.decisions % 3 else 2 * self.decisions)
         self.decisions += 1
         return ParticipantAction().encode(self.engine.limits)
 
 
 def play(seed: int) -> Turns:
+    turns, session = begun(seed)
+    play_together([session], doubled)
+    assert turns.engine.over
+    return turns
+
+
+def doubled(questions: Sequence[int]) -> list[int]:
+    return [2 * question for question in questions]
+
+
+def begun(seed: int) -> tuple[Turns, Generator[int, int, None]]:
     engine = SessionEngine("brookside", config=EnvConfig(max_seconds=10.0))
     engine.reset(seed=seed)
     others = {
@@ -54,15 +76,23 @@ def play(seed: int) -> Turns:
         Role.AD_WIZARD: SilentPolicy(Role.AD_WIZARD, engine.limits),
     }
     turns = Turns(engine, stuck_at=6)
-    play_in_turns(Role.PARTICIPANT, turns, others, engine, seed)
-    assert engine.over
-    return turns
+    return turns, play_in_turns(Role.PARTICIPANT, turns, others, engine, seed)
 
 
 def test_turn_ends_after_its_decisions_or_when_the_player_is_stuck() -> None:
     turns = play(3)
     assert turns.begun[:4] == [0, 4, 6, 10]
     assert turns.decisions > 10
+
+
+def test_sessions_that_are_played_together_are_those_played_alone() -> None:
+    together = [begun(seed) for seed in (3, 4, 5)]
+    play_together([session for _, session in together], doubled)
+    for seed, (turns, _) in zip((3, 4, 5), together, strict=True):
+        alone = play(seed)
+        assert turns.engine.over and turns.decisions == alone.decisions
+        assert (turns.begun, turns.draws) == (alone.begun, alone.draws)
+        assert turns.engine.summary() == alone.engine.summary()
 
 
 def test_draws_of_the_turns_follow_from_the_seed() -> None:
