@@ -80,7 +80,7 @@ COLOURS: Final = 256
 """Number of colours of the pictures, which keeps their files small."""
 
 SESSION_TOWN, SESSION_SEED = "brookside", 8
-"""Session on the first picture of README.md: that of `dorothie-gym run --town brookside --seed 8`."""
+"""Session on the first picture of docs/tour.md: that of `dorothie-gym run --town brookside --seed 8`."""
 
 
 def draw_first_session(path: Path) -> None:
@@ -140,7 +140,7 @@ def windscreen_frames(frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
 
 
 def draw_windscreen(path: Path) -> None:
-    """Draws the first picture of README.md: windscreen, talk and map."""
+    """Draws the first picture of docs/tour.md: windscreen, talk and map."""
     (frame,) = windscreen_frames([WINDSCREEN_FRAME])
     Image.fromarray(frame).save(path, optimize=True)
 
