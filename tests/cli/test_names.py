@@ -39,7 +39,8 @@ def test_envs_lists_every_registered_environment() -> None:
     pettingzoo.make("parallel", "dorothie_gym/DuoWizard-v0")
     listed = call("envs").stdout
     for row in rows:
-        assert row["id"] in listed and row["description"]
+        assert row["id"] in listed and row["description"] and row["make"] in listed
+    assert max(map(len, listed.splitlines())) <= 80
 
 
 def test_package_is_a_program() -> None:
