@@ -229,7 +229,7 @@ def _success(validation: Facts | None) -> str:
 
 
 def _show_towns(rows: Sequence[Facts]) -> None:
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("Town", style="bold")
     table.add_column("Fold", no_wrap=True, min_width=11)
     for title in ("Lanes", "km", "Junctions", "Streets", "Signals", "Crosswalks", "Sites"):
