@@ -1,4 +1,4 @@
-# Image of dorothie_gym from the checkout: docker build -t dorothie-gym . && docker run --rm dorothie-gym run --no-picture
+# Image of dorothie_gym from the checkout: docker build -t dorothie . && docker run --rm dorothie run --no-picture
 FROM python:3.11-slim
 
 ENV PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1 SDL_VIDEODRIVER=dummy DOROTHIE_GYM_CACHE=/var/cache/dorothie_gym

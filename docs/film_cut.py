@@ -21,6 +21,9 @@ ANNOUNCED: Final = 12.0
 DRIVEN: Final = 9.0
 """Longest time from the command of a turn to the end of the turn [s]."""
 
+TICK: Final = 35
+"""Frames after an arrival, in which the errand has its tick."""
+
 GREETING, TURN, EXCEPTION, ARRIVAL = (2.5, 4.5, 2.5, 2.5)
 """Length of each part [s]: twelve seconds together."""
 
@@ -29,7 +32,7 @@ def film_parts(session: Session) -> dict[str, range]:
     """Returns the frames of the parts of the film, by name and in the order of time.
 
     The parts are a greeting (the first utterance), a turn that is named and then driven, an exception, and the arrival
-    at a stop.
+    at a stop with the tick of its errand.
 
     Raises:
         ValueError: the session has no such part; names it.
@@ -37,10 +40,12 @@ def film_parts(session: Session) -> dict[str, range]:
     opening = session.utterances()[0]
     turn = next(_turns(session), None)
     exceptions = session.of_type(EventType.EXCEPTION)
+    last = int(session.trajectory["frame"][-1])
     arrivals = [
-        event
+        event.frame + TICK
         for event in session.of_type(EventType.SUBGOAL)
         if event.data.get("status") == GoalStatus.COMPLETE.label and event.data.get("cause") == "arrival"
+        if event.frame + TICK <= last
     ]
     for name, found in (("turn", turn), ("exception", exceptions), ("arrival", arrivals)):
         if not found:
@@ -50,9 +55,8 @@ def film_parts(session: Session) -> dict[str, range]:
         "greeting": (round(opening.end * FRAME_RATE) + 30, GREETING),
         "turn": (turn, TURN),
         "exception": (exceptions[0].frame + 50, EXCEPTION),
-        "arrival": (arrivals[-1].frame + 35, ARRIVAL),
+        "arrival": (arrivals[0], ARRIVAL),
     }
-    last = int(session.trajectory["frame"][-1])
     parts = {
         name: range(max(min(end, last) - round(length * FRAME_RATE), 1), min(end, last))
         for name, (end, length) in ends.items()
