@@ -16,22 +16,26 @@ from pathlib import Path
 import gymnasium as gym
 import matplotlib.pyplot as plt
 import numpy as np
+from gymnasium.wrappers import FilterObservation
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.monitor import Monitor
 
 import dorothie_gym
 from dorothie_gym import EnvConfig, MacroActions
 
+FIELDS = ["heard", "heard_moves", "goal", "arrived", "motion"]
+"""What the agent observes: words that were heard, and what the car does."""
+
 
 def make_env(town: str, seconds: float) -> Monitor:
-    """Returns `CoWizard-v0` with macro-actions and one normalised vector as observation."""
+    """Returns `CoWizard-v0` with macro-actions, and some fields of the observation as one normalised vector."""
     env = gym.make(
         "dorothie_gym/CoWizard-v0",
         town=town,
         config=EnvConfig(max_seconds=seconds),
         partners={"participant": "scripted:talkativeness=0..0.2", "ad_wizard": "silent"},
     )
-    return Monitor(dorothie_gym.flatten(MacroActions(env, seconds=20.0), box=True))
+    return Monitor(dorothie_gym.flatten(FilterObservation(MacroActions(env, seconds=20.0), FIELDS), box=True))
 
 
 def draw_curve(returns: Sequence[float], path: Path) -> None:
@@ -58,7 +62,7 @@ def main() -> None:
 
     env = make_env(options.town, options.seconds)
     model = MaskablePPO(
-        "MlpPolicy", env, n_steps=256, batch_size=64, gamma=0.95, ent_coef=0.01, learning_rate=1e-3,
+        "MlpPolicy", env, n_steps=512, batch_size=128, gamma=0.9, gae_lambda=0.9, ent_coef=0.02, learning_rate=1e-3,
         seed=options.seed, device="cpu",
     )  # fmt: skip
     model.learn(total_timesteps=options.steps)

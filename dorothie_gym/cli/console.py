@@ -96,8 +96,11 @@ def console(
     with reporting_errors():
         served = seats.Console([room])
     before = _folders(out)
-    serve(served.app(), listener, host)
-    _print_recorded(before, out)
+    try:
+        serve(served.app(), listener, host)
+    finally:
+        if not as_json:
+            _print_recorded(before, out)
 
 
 def _config(
