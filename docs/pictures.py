@@ -24,6 +24,7 @@ from typing import Any, Final
 
 import environment_pages
 import numpy as np
+from film_cut import film_frames
 from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
@@ -33,7 +34,7 @@ from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.evaluation.closed_loop.leaderboard import PART_TITLES
 from dorothie_gym.evaluation.closed_loop.leaderboard_chart import CHART_METRICS, ChartRow, draw_rows
 from dorothie_gym.evaluation.rollout import play_session
-from dorothie_gym.maps import fold_of, load_town
+from dorothie_gym.maps import Town, fold_of, load_town
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, LandmarkName, WeatherParameter
 from dorothie_gym.pictures import town_picture
 from dorothie_gym.pictures.camera.body_snapshots import snapshot_of
@@ -80,7 +81,7 @@ COLOURS: Final = 256
 """Number of colours of the pictures, which keeps their files small."""
 
 SESSION_TOWN, SESSION_SEED = "brookside", 8
-"""Session on the first picture of README.md: that of `dorothie-gym run --town brookside --seed 8`."""
+"""Session on the first picture of docs/tour.md: that of `dorothie-gym run --town brookside --seed 8`."""
 
 
 def draw_first_session(path: Path) -> None:
@@ -119,41 +120,47 @@ def draw_generated_towns(path: Path) -> None:
 
 WINDSCREEN_TOWN, WINDSCREEN_SEED, WINDSCREEN_SECONDS = "midtown", 7, 52.0
 WINDSCREEN_FRAME = 684
-WINDSCREEN_FILM = range(1215, 1545, 3)
-"""Frames of the film; ten in a second."""
+
+FILM_TOWN, FILM_SEED, FILM_RATE = "midtown", 7, 10
+"""Session of the film, with the frames in a second."""
 
 
-def windscreen_frames(frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
-    """Yields what `dorothie-gym film` shows of a session with dense traffic at some frames."""
-    config = EnvConfig(max_seconds=WINDSCREEN_SECONDS, world=WorldConfig(vehicles=70, pedestrians=90))
-    engine = SessionEngine(WINDSCREEN_TOWN, config=config)
+def recorded_session(town: str, seed: int, config: EnvConfig | None = None) -> tuple[Session, Town]:
+    """Returns a session of the scripted players, and its town."""
+    engine = SessionEngine(town, config=config)
     policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
     with TemporaryDirectory() as folder:
-        play_session(engine, policies, seed=WINDSCREEN_SEED, folder=Path(folder) / "session")
-        session = Session.load(Path(folder) / "session")
+        play_session(engine, policies, seed=seed, folder=Path(folder) / "session")
+        return Session.load(Path(folder) / "session"), engine.town
+
+
+def windscreen_frames(session: Session, town: Town, frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
+    """Yields what `dorothie-gym film` shows of a session at some frames."""
     renderer = SessionRenderer(RenderView.BOTH)
     width, height = renderer.windscreen or (0, 0)
-    playback = Playback(session, engine.town)
-    pictures = RecordedPictures(session, engine.town, CameraConfig(width=width, height=height))
+    playback = Playback(session, town)
+    pictures = RecordedPictures(session, town, CameraConfig(width=width, height=height))
     for frame in frames:
         yield renderer.draw(playback.scene(frame), pictures.picture(frame).rgb)
 
 
 def draw_windscreen(path: Path) -> None:
-    """Draws the first picture of README.md: windscreen, talk and map."""
-    (frame,) = windscreen_frames([WINDSCREEN_FRAME])
+    """Draws the first picture of docs/tour.md: windscreen, talk and map."""
+    config = EnvConfig(max_seconds=WINDSCREEN_SECONDS, world=WorldConfig(vehicles=70, pedestrians=90))
+    session, town = recorded_session(WINDSCREEN_TOWN, WINDSCREEN_SEED, config)
+    (frame,) = windscreen_frames(session, town, [WINDSCREEN_FRAME])
     Image.fromarray(frame).save(path, optimize=True)
 
 
 def draw_film(path: Path) -> None:
-    """Draws the film of README.md, smaller than the pictures."""
-    size = 800, 450
-    shots = [
-        Image.fromarray(frame).resize(size, Image.Resampling.LANCZOS) for frame in windscreen_frames(WINDSCREEN_FILM)
-    ]
+    """Draws the film of README.md, smaller than the pictures: twelve seconds, cut by the events of a session."""
+    session, town = recorded_session(FILM_TOWN, FILM_SEED)
+    frames = windscreen_frames(session, town, film_frames(session, FILM_RATE))
+    shots = [Image.fromarray(frame).resize((800, 450), Image.Resampling.LANCZOS) for frame in frames]
     shots[0].save(
-        path.with_suffix(".webp"), save_all=True, append_images=shots[1:], duration=100, loop=0, quality=60, method=6
-    )
+        path.with_suffix(".webp"), save_all=True, append_images=shots[1:], duration=1000 // FILM_RATE, loop=0,
+        quality=60, method=6,
+    )  # fmt: skip
 
 
 CAMERA_TOWN, CAMERA_SEED, CAMERA_LANDMARK = "midtown", 3, LandmarkName.IKEA

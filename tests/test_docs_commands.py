@@ -30,6 +30,7 @@ FOREIGN: Final = frozenset(
         "--check",  # ruff format
         "--no-deps",  # pip
         "--work",  # benchmarks/pretrained.py
+        "--rm",  # docker
         "--url",  # openenv validate
         "--model",  # inspect eval
         "--epochs",  # inspect eval

@@ -16,7 +16,7 @@ from tests.session.recording.dialogues import talk
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-LONGEST = {"ppo": 150, "trl_grpo": 100}
+LONGEST = {"ppo": 150, "rl_co_wizard": 90, "trl_grpo": 100}
 """Lines of an example; 80 where nothing else is said."""
 
 REQUIRED = {"torchrl_ppo": "torchrl", "trl_grpo": "trl"}
@@ -29,6 +29,7 @@ ARGUMENTS = {
     "own_policy": "--sessions 1 --seconds 10",
     "own_town": "--out mill_end --seconds 10",
     "ppo": "--environments 4 --rollout 16 --steps 128 --batch 32",
+    "rl_co_wizard": "--steps 32 --rollout 32 --seconds 20",
     "rl_navigation": "--steps 64 --rollout 32 --rounds 2 --episodes 1 --max-seconds 10",
     "rl_pictures": "--steps 64 --environments 2 --rollout 16 --frames 2 --rounds 2 --max-seconds 5",
     "torchrl_ppo": "--environments 2 --rollout 64 --steps 128",
@@ -41,6 +42,7 @@ PRINTED = {
     "own_policy": "steady speed",
     "own_town": "sites for landmarks",
     "ppo": "128 steps",
+    "rl_co_wizard": "mean return",
     "rl_navigation": "64 steps: success",
     "rl_pictures": "64 steps: mean return",
     "torchrl_ppo": "128 steps: mean reward",

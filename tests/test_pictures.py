@@ -89,3 +89,24 @@ def test_films_are_small_and_move(name: str, size: int) -> None:
         first = np.asarray(film.convert("RGB"), dtype=np.int16)
         film.seek(frames - 1)
         assert (np.abs(first - np.asarray(film.convert("RGB"))).max(axis=2) > 60).mean() > 0.05
+
+
+@pytest.mark.long
+def test_film_shows_a_greeting_a_turn_an_exception_and_an_arrival(pictures: ModuleType) -> None:
+    cut = sys.modules["film_cut"]
+    session, _ = pictures.recorded_session(pictures.FILM_TOWN, pictures.FILM_SEED)
+    parts, frames = cut.film_parts(session), cut.film_frames(session, pictures.FILM_RATE)
+    assert set(parts) == {"greeting", "turn", "exception", "arrival"}
+    assert len(frames) == 12 * pictures.FILM_RATE
+    rows = {int(row["frame"]): row for row in session.trajectory}
+    moving = {name: sum(rows[frame]["speed"] > 1.0 for frame in part) / len(part) for name, part in parts.items()}
+    assert moving["turn"] == 1.0 and moving["arrival"] > 0.3, "the car drives"
+    first, last = (rows[part] for part in (frames[0], frames[-1]))
+    assert np.hypot(first["x"] - last["x"], first["y"] - last["y"]) > 100.0
+    heard = {name: {u.text for u in session.utterances() if u.end * 30 <= part.stop} for name, part in parts.items()}
+    assert len({len(said) for said in heard.values()}) == 4, "the talk goes on"
+    turn = parts["turn"]
+    headings = np.unwrap([rows[turn.start]["heading"], *(rows[frame]["heading"] for frame in turn)])
+    assert np.degrees(np.ptp(headings)) > 45.0
+    with Image.open(DOCS / "film.webp") as film:
+        assert getattr(film, "n_frames", 1) == len(frames), "run python docs/pictures.py film"

@@ -95,7 +95,12 @@ def console(
         _print_links(links, out)
     with reporting_errors():
         served = seats.Console([room])
-    serve(served.app(), listener, host)
+    before = _folders(out)
+    try:
+        serve(served.app(), listener, host)
+    finally:
+        if not as_json:
+            _print_recorded(before, out)
 
 
 def _config(
@@ -155,6 +160,22 @@ def _resumed_room(
 def seat_links(room: seats.Room, host: str, port: int) -> dict[str, str]:
     """Returns the link of each seat; its secret is behind the #, which browsers do not send and servers do not log."""
     return {name: f"{address(host, port)}/seat#{seat.token}" for name, seat in room.seats.items()}
+
+
+def _folders(out: Path | None) -> set[Path]:
+    return set() if out is None or not out.is_dir() else {each for each in out.iterdir() if each.is_dir()}
+
+
+def _print_recorded(before: set[Path], out: Path | None) -> None:
+    """Prints what was recorded since the start of the server."""
+    screen = stdout()
+    recorded = sorted(_folders(out) - before)
+    if out is None or not recorded:
+        screen.print("Nothing was recorded." if out is None else f"Nothing was recorded in {out}.", soft_wrap=True)
+    interrupted = set() if out is None else set(seats.interrupted_sessions(out))
+    for folder in recorded:
+        ended = f"interrupted; --resume {folder} goes on with it" if folder in interrupted else "complete"
+        screen.print(f"Recorded: {folder} ({ended})", soft_wrap=True)
 
 
 def _print_links(links: Facts, out: Path | None) -> None:

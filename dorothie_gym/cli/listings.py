@@ -10,6 +10,7 @@ from typing import Annotated, Final
 
 import typer
 from rich.table import Table
+from rich.text import Text
 
 from dorothie_gym import maps as town_maps
 from dorothie_gym import pictures as drawing
@@ -154,15 +155,11 @@ def envs(
     if as_json:
         print_json(rows)
         return
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("Environment", style="bold", no_wrap=True)
-    table.add_column("API", no_wrap=True)
-    table.add_column("Description")
-    for row in rows:
-        table.add_row(row["id"], row["api"], row["description"])
     console = stdout()
-    console.print(table)
-    console.print(f"Make one with {rows[0]['make']}, after import dorothie_gym.", style="dim")
+    for row in rows:
+        console.print(Text.assemble((row["id"], "bold"), f"  {row['description']} ({row['api']})"))
+        console.print(f"  {row['make']}", style="dim", soft_wrap=True)
+    console.print("Import gymnasium, pettingzoo and dorothie_gym first.", style="dim")
 
 
 _DESCRIPTIONS: Final = {
@@ -232,7 +229,7 @@ def _success(validation: Facts | None) -> str:
 
 
 def _show_towns(rows: Sequence[Facts]) -> None:
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("Town", style="bold")
     table.add_column("Fold", no_wrap=True, min_width=11)
     for title in ("Lanes", "km", "Junctions", "Streets", "Signals", "Crosswalks", "Sites"):

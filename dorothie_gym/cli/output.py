@@ -138,6 +138,7 @@ def check_file(path: Path) -> None:
 # --- Video files ------------------------------------------------------------------------------------------------------
 
 _SUFFIXES = (".mp4", ".mkv", ".mov")
+_QUICKTIME = (".mp4", ".mov")
 
 
 def check_video(path: Path) -> None:
@@ -163,7 +164,7 @@ def video_writer(path: Path, frames_per_second: float, sound: Path | None = None
     """Returns a video writer of imageio: H.264, and AAC if there is sound, which every container of `_SUFFIXES` holds.
 
     Args:
-        path: file to write.
+        path: file to write. MP4 and MOV are written in fragments, so that a film that is broken off can be watched.
         frames_per_second: its frame rate.
         sound: audio file with its sound track; None for a silent video.
 
@@ -173,8 +174,11 @@ def video_writer(path: Path, frames_per_second: float, sound: Path | None = None
     import imageio.v2 as imageio
 
     track = {} if sound is None else {"audio_path": str(sound), "audio_codec": "aac"}
+    fragments = (
+        ["-movflags", "+frag_keyframe+empty_moov+default_base_moof"] if path.suffix.lower() in _QUICKTIME else []
+    )
     writer: VideoWriter = imageio.get_writer(
-        path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"], **track
+        path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast", *fragments], **track
     )
     return writer
 

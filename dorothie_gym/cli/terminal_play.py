@@ -15,7 +15,8 @@ from rich.text import Text
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.navigation.actions import NavigationAction
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.wrappers.macro_actions import MACRO_ACTIONS, MacroActions
+from dorothie_gym.tasks.catalogue import map_label
+from dorothie_gym.wrappers.macro_actions import MACRO_ACTIONS, MacroAction, MacroActions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,7 +96,7 @@ class CoWizardGame(KeyGame):
         self.keys = {key: numbers[name] for key, name in COMMANDS.items()} | {
             str(digit): number for digit, number in enumerate(goals)
         }
-        self.names = {key: actions[number].name.replace("_", " ") for key, number in self.keys.items()}
+        self.names = {key: _name_of(actions[number]) for key, number in self.keys.items()}
 
     def heard(self) -> str:
         """Returns what has ended since the last action."""
@@ -105,10 +106,14 @@ class CoWizardGame(KeyGame):
         """Returns time, speed, motion and goal."""
         motion = Motion(int(self.observation["motion"])).name.lower()
         goal = LandmarkName(int(self.observation["goal"]))
-        towards = "" if goal is LandmarkName.UNKNOWN else f", goal {goal.label}"
+        towards = "" if goal is LandmarkName.UNKNOWN else f", goal {map_label(goal)}"
         arrived = ", arrived" if self.observation["arrived"] else ""
         speed = float(self.observation["speed"][0]) * 3.6
         return f"{self.observation['time'][0]:5.1f} s  {speed:3.0f} km/h  {motion}{towards}{arrived}"
+
+
+def _name_of(action: MacroAction) -> str:
+    return action.name.replace("_", " ") if action.place is None else f"goal {map_label(action.place)}"
 
 
 class NavigationGame(KeyGame):

@@ -6,6 +6,7 @@ import hashlib
 import inspect
 import re
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -100,7 +101,8 @@ def create_policy(policy_class: type[AnyPolicy], role: Role, limits: SpaceLimits
         raise PolicyLoadError(
             f"{name} needs the arguments {', '.join(needed)}; give them defaults, or pass an object in Python"
         )
-    policy = policy_class(**{key: value for key, value in given.items() if takes_all or key in names})
+    create: Callable[..., AnyPolicy] = policy_class
+    policy = create(**{key: value for key, value in given.items() if takes_all or key in names})
     return check_fits_role(policy, role, name)
 
 

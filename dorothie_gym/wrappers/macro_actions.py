@@ -23,7 +23,7 @@ from dorothie_gym.sim.state.codes import Motion
 
 if TYPE_CHECKING:
     from dorothie_gym.envs.single_role_v0 import SingleRole
-    from dorothie_gym.session.spaces.actions import ActionMapping, StepInfo
+    from dorothie_gym.session.spaces.actions import StepInfo
     from dorothie_gym.session.spaces.observations import ObservationMapping
 
 MEMORY: Final = 60.0
@@ -122,7 +122,8 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         self._inner: SingleRole = env.unwrapped  # type: ignore[assignment]  # checked next
         if getattr(env.unwrapped, "role", None) is not Role.CO_WIZARD:
             raise ValueError("MacroActions wraps dorothie_gym/CoWizard-v0; other environments have small action spaces")
-        if "participant_slots" not in self._inner.observation_space.spaces:
+        observed = self._inner.observation_space
+        if not isinstance(observed, spaces.Dict) or "participant_slots" not in observed.spaces:
             raise ValueError("MacroActions reads dialogue acts; leave EnvConfig.observe_acts at True")
         if not seconds > 0.0:
             raise ValueError(f"seconds is {seconds}; it must be above 0")
@@ -130,7 +131,7 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         self.action_space: spaces.Space[Any] = spaces.Discrete(len(MACRO_ACTIONS))
         self.observation_space: spaces.Space[Any] = spaces.Dict(
             {
-                **self._inner.observation_space.spaces,
+                **observed.spaces,
                 "heard": spaces.Box(0.0, 1.0, (len(LABELS),), dtype=np.float32),
                 "heard_moves": spaces.Box(0.0, 1.0, (len(DialogueMove),), dtype=np.float32),
                 "goal": spaces.Discrete(len(LandmarkName)),
@@ -207,7 +208,7 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
             act = _ABOUT_GOAL[name](driver.goal)
         return driving if act is None else _with_speech(driving, act)
 
-    def _encoded(self, action: CoWizardAction) -> ActionMapping:
+    def _encoded(self, action: CoWizardAction) -> Any:  # gymnasium types the action as the wrapper's
         return action.encode(self._inner.engine.limits)
 
     def _happened(self, before: tuple[Motion, bool]) -> bool:

@@ -55,3 +55,24 @@ def test_a_link_for_each_seat_and_a_complete_record_at_the_end(tmp_path: Path) -
     session = Session.load(folder)
     assert session.complete
     assert session.header.extra["seats"] == {"participant": "open", "co_wizard": "open", "ad_wizard": "silent"}
+
+
+@pytest.mark.long
+def test_ctrl_c_states_what_was_recorded(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "dorothie_gym.cli", "console", "--port", "0", "--no-pictures"]
+    command += ["--roles", "ad_wizard=silent", "--out", str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ) as server:
+        try:
+            assert server.stdout is not None
+            links = [server.stdout.readline() for _ in range(5)]
+            address, _, token = links[1].split()[-1].partition("/seat#")
+            with sockets.connect(address.replace("http", "ws") + "/ws") as socket:
+                socket.send(json.dumps({"k": "join", "token": token}))
+                assert [json.loads(socket.recv(timeout=10))["k"] for _ in range(8)][:2] == ["hello", "frame"]
+            server.send_signal(signal.SIGINT)
+            rest = server.stdout.read()
+            server.wait(20)
+        finally:
+            server.kill()
+    (folder,) = tmp_path.iterdir()
+    assert f"Recorded: {folder} (complete)" in " ".join(rest.split())

@@ -39,7 +39,8 @@ def test_envs_lists_every_registered_environment() -> None:
     pettingzoo.make("parallel", "dorothie_gym/DuoWizard-v0")
     listed = call("envs").stdout
     for row in rows:
-        assert row["id"] in listed and row["description"]
+        assert row["id"] in listed and row["description"] and row["make"] in listed
+    assert max(map(len, listed.splitlines())) <= 80
 
 
 def test_package_is_a_program() -> None:
@@ -140,3 +141,12 @@ def test_texts_with_brackets_are_printed_as_they_are(capsys: pytest.CaptureFixtu
     stderr().print("[red]")
     shown = capsys.readouterr()
     assert "dorothie-gym[statistics]" in shown.out and "[bold]x[/]" in shown.out and "[red]" in shown.err
+
+
+@pytest.mark.parametrize("command", ["towns", "storyboards", "policies", "envs"])
+def test_listings_fit_80_columns_without_cut_words(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = call(command).stdout.splitlines()
+    prose = [line for line in lines if ": dorothie-gym " not in line]  # commands to copy
+    assert len(prose) > 3 and max(map(len, prose)) <= 80
+    assert not [line for line in lines if "…" in line]

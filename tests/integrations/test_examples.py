@@ -21,7 +21,14 @@ from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 
 PAGE = Path(__file__).parents[2] / "docs" / "integrations.md"
-LIBRARIES = {"SuperSuit": "supersuit", "RLlib": "ray.rllib", "TorchRL": "torchrl", "BenchMARL": "benchmarl"}
+LIBRARIES = {
+    "SuperSuit": "supersuit",
+    "RLlib": "ray.rllib",
+    "TorchRL": "torchrl",
+    "BenchMARL": "benchmarl",
+    "skrl": "skrl",
+    "Tianshou": "tianshou",
+}
 READERS = {"Minari in TorchRL": "torchrl", "d3rlpy": "d3rlpy"}
 
 

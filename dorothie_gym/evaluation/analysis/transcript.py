@@ -141,7 +141,9 @@ def description_of(event: Event, session: Session) -> str:
         status = f" {data['status']}" if "status" in data else ""
         return f"{data['action']}({', '.join(str(name) for name in names if name is not None)}{status})"
     if event.type is EventType.EXCEPTION:
-        more = ", ".join(f"{k} {v}" for k, v in data.items() if k != "kind" and isinstance(v, str | int | float))
+        more = ", ".join(
+            f"{k} {_number(v)}" for k, v in data.items() if k != "kind" and isinstance(v, str | int | float)
+        )
         return f"{str(data.get('kind')).replace('_', ' ')}: {more}"
     if event.type is EventType.MESSAGE:
         return f"message: “{data.get('text')}”"
@@ -184,3 +186,8 @@ def _escaped(text: object) -> str:
     for letter in "\\|*_<>`":
         clean = clean.replace(letter, f"\\{letter}")
     return clean
+
+
+def _number(value: str | float) -> str:
+    """Returns a value of an event; numbers with one decimal at most."""
+    return f"{value:.1f}".removesuffix(".0") if isinstance(value, float) else str(value)

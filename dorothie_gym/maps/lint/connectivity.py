@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,13 @@ def connectivity_faults(town: Town) -> Iterator[Fault]:
         yield _fault(town, FaultKind.UNREACHABLE, lanes, "be reached from the rest of the town")
     for lanes in _groups(onward, ~reached & ~returns):
         yield _fault(town, FaultKind.UNREACHABLE, lanes, "be reached from the rest of the town, nor left for it")
+
+
+_REMEDIES: Final = {
+    FaultKind.UNREACHABLE: "add a junction or a place to turn round that leads there (both directions of a loop need "
+    "one between them), or leave the lanes out",
+    FaultKind.NO_RETURN: "add a junction or a place to turn round behind them, or leave the lanes out",
+}
 
 
 def _name(lanes: Sequence[int]) -> str:
@@ -97,4 +104,9 @@ def _groups(onward: csr_array, members: NDArray[np.bool_]) -> Iterator[tuple[int
 def _fault(town: Town, kind: FaultKind, lanes: tuple[int, ...], what: str) -> Fault:
     first = town.lanes[lanes[0]]
     x, y = first.position(0.5 * first.length)
-    return Fault(kind=kind, lanes=lanes, position=(float(x), float(y)), message=f"{_name(lanes)} cannot {what}")
+    return Fault(
+        kind=kind,
+        lanes=lanes,
+        position=(float(x), float(y)),
+        message=f"{_name(lanes)} cannot {what}; {_REMEDIES[kind]}",
+    )

@@ -256,7 +256,7 @@ class SessionWriter:
         present = [name for name in names if _stands(self.folder / name)]
         if present and not overwrite and present != [HEADER_FILE + PART]:  # that one died before there was a session
             raise SessionError(
-                f"{self.folder}: holds a session already ({', '.join(present)}); choose another folder or overwrite it"
+                f"{self.folder}: holds a session already ({', '.join(present)}); choose another folder or remove it"
             )
         # The header is removed first: if the process dies after that, the folder holds no session with parts of two.
         for name in present:

@@ -141,9 +141,7 @@ class BoxObservations:
         """Analyses a space; raises `ValueError` if a field holds neither numbers nor text."""
         self._parts = {name: part for name, part in _parts(space).items() if not isinstance(part, spaces.Text)}
         self._bounds = {name: _bounds(name, part) for name, part in self._parts.items()}
-        self.size = sum(
-            int(part.n) if _is_one_hot(part) else len(self._bounds[name][0]) for name, part in self._parts.items()
-        )
+        self.size = sum(_one_hot_size(part) or len(self._bounds[name][0]) for name, part in self._parts.items())
 
     def vector(self, observation: Unflattened) -> NDArray[np.float32]:
         """Returns the vector of an observation (n,) float32 in [-1, 1]."""
@@ -153,7 +151,7 @@ class BoxObservations:
 
     def _scaled(self, name: str, part: AnySpace, value: object) -> NDArray[np.float64]:
         values = np.ravel(np.asarray(value, dtype=np.float64))
-        if _is_one_hot(part):
+        if isinstance(part, spaces.Discrete) and _one_hot_size(part):
             hot = np.zeros(int(part.n))
             hot[int(values[0]) - int(part.start)] = 1.0
             return hot
@@ -165,8 +163,9 @@ class BoxObservations:
         return scaled
 
 
-def _is_one_hot(part: AnySpace) -> bool:
-    return isinstance(part, spaces.Discrete) and int(part.n) <= ONE_HOT
+def _one_hot_size(part: AnySpace) -> int:
+    """Returns the number of values of a field that is one-hot; 0 for other fields."""
+    return int(part.n) if isinstance(part, spaces.Discrete) and part.n <= ONE_HOT else 0
 
 
 def _parts(space: AnySpace) -> dict[str, AnySpace]:

@@ -71,3 +71,9 @@ def test_a_page_has_a_head_and_a_table_and_no_stray_markup() -> None:
 
 def test_silence_is_a_page_too() -> None:
     assert markdown(session()).endswith("| --- | --- | --- | --- | --- |\n")
+
+
+def test_numbers_of_exceptions_have_one_decimal() -> None:
+    played = drive(exception(1.0, "spawn_vehicles", count=7, x0=2.2570158036189447, x1=52.0))
+    (line,) = transcript_lines(played)
+    assert line.text == "spawn vehicles: count 7, x0 2.3, x1 52"
