@@ -36,6 +36,9 @@ _TAKING = frozenset({
 })  # fmt: skip
 """Words behind which "this right" is a turn."""
 
+_TELLING = (["is"], ["are"], ["that's"], ["there's"], ["it's"])
+"""First words behind which a last "right" is no direction: "that's the KFC, right"."""
+
 _BESIDE = frozenset({"by", "beside", "opposite", "outside"})
 """Words in front of which "right" may be "exactly", where a side has been told."""
 
@@ -112,6 +115,9 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
             taken = (
                 before in ("this", "that", "it", "her") and words[place - 2 : place - 1] and words[place - 2] in _TAKING
             )
+            if before == "," and after in ("", "?") and _is_told(words[: place - 1]):
+                masked[place] = "#ok"  # "the KFC, right"
+                continue
             if before == "," and after in _BESIDE and not _LISTED.isdisjoint(words[:place]):
                 masked[place] = "#ok"  # "stop on the left, right by the KFC"
                 continue
@@ -124,6 +130,12 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
         elif word == "straight" and after == "away":
             masked[place] = "#ok"
     return masked
+
+
+def _is_told(words: Sequence[str]) -> bool:
+    """Returns whether words before ", right" only name a landmark, or tell or ask something."""
+    named = words[-1:] == ["#landmark"] and len(words) <= 2 and (len(words) == 1 or words[0] in ("the", "a"))
+    return named or words[:1] in _TELLING or words[:2] in (["oh", "is"], ["ah", "is"])
 
 
 def _remains(words: Sequence[str], place: int) -> bool:

@@ -258,7 +258,7 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
-    if after is None and move in _SIGNS_FIRST and (_runs_on(parsed) or parsed.masked.startswith("please do not")):
+    if after is None and move in _SIGNS_FIRST and (_runs_on(parsed) or _sends_on(parsed)):
         return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
     commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
     if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
@@ -307,6 +307,12 @@ def _runs_on(parsed: ParsedText) -> bool:
     """Returns whether no comma stands behind the yes with which an order begins."""
     words = split_words(parsed.text)
     return len(words) > 3 and words[0] in OPENING_YES and words[1] != ","
+
+
+def _sends_on(parsed: ParsedText) -> bool:
+    """Returns whether words that begin like a sign order something: "please do not stop", "okay, off we go again"."""
+    goes = len(parsed.plan) == 1 and parsed.plan.steps[0].action is StepAction.GO and len(parsed.masked.split()) > 4
+    return goes or parsed.masked.startswith("please do not")
 
 
 def _forbids(parsed: ParsedText, move: DialogueMove) -> bool:

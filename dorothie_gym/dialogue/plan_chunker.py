@@ -94,6 +94,7 @@ _IN_VIEW: Final = (
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
 _LEAVING: Final = frozenset({*_WORDY, "until", "till", "til"})
 """First words of a relation to an object that leaves: "wait until that truck's gone"."""
+_COMING: Final = frozenset({"if", "when", "once", "as", "soon"})
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _INFINITIVES: Final = frozenset(
@@ -261,6 +262,9 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
     def _item(self, match: Match, place: int) -> int:
         """Adds the item of a phrase; returns the token behind it."""
         end = place + match.length
+        if match.kind == "accept" and self.words[place] == "follow" and self._has_place(end - 1):
+            self.items.append(ActionItem("follow", place, place + 1))  # "follow that blue car"
+            return place + 1
         if match.group == "boundaries":
             self.items.append(BoundaryItem(match.kind, end))
         elif match.group == "repairs":
@@ -369,6 +373,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         if match.kind == "across":
             self.items.append(ActionItem("straight", place, end))
         self.items.append(ConditionItem(relation, found))
+        if self.words[place] in _COMING and [*self.words[behind : behind + 2]] == ["coming", "up"]:
+            behind += 2  # "if you see a bridge coming up"
         while self.word_at(behind) in _STATES and self.words[place] in _TEMPORAL:
             behind += 1
         return behind

@@ -351,6 +351,10 @@ class PlanState:
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
+        passes = frame.relation in (ConditionRelation.PAST, ConditionRelation.AFTER) and frame.at is not None
+        if frame.action is StepAction.TURN and frame.ordinal is not None and passes:
+            if frame.at == PlaceReference(ordinal=max(frame.ordinal - 1, 1)) and frame.ordinal > 1:
+                frame.relation = frame.at = None  # "past three streets, at the fourth, left"
         other, relation = _other_errand(frame), frame.relation
         if other is not None:
             frame.relation = frame.at = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.plan_items import SIDES, NounPhrase, TokenReader
+from dorothie_gym.dialogue.plan_items import SIDES, BoundaryItem, NounPhrase, RepairItem, TokenReader
 from dorothie_gym.dialogue.routes import Anaphor, PlaceReference
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 
@@ -51,13 +51,18 @@ class NounReader(TokenReader):
         if found is None and ordinal is not None and skipped == 0:
             ends = (
                 ("", ",", "?", "on", "please", "then", "and")
-                if self.word_at(start) in self.grammar.determiners
+                if self.word_at(start) in self.grammar.determiners or self._corrects()
                 else ("on",)
             )
             if self.word_at(place) in ends:
                 follows = self.word_at(place - 1) in ("next", "following")
                 return NounPhrase(None, ordinal, follows=follows, elliptical=True), place  # "not the first, the second"
         return (found, behind) if found is not None else (None, start)
+
+    def _corrects(self) -> bool:
+        """Returns whether the last item takes something back: "second left, no, third"."""
+        items = [item for item in self.items if not isinstance(item, BoundaryItem)]
+        return bool(items) and isinstance(items[-1], RepairItem)
 
     def _counts(self, place: int, behind: int) -> bool:
         """Returns whether the number between two places belongs to a noun, as in no "first the KFC" or "two lefts"."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
 from dorothie_gym.dialogue.plan_frames import (
+    FORBIDDING,
     NEEDING_PLACE,
     NEGATING,
     PASSING,
@@ -82,7 +83,7 @@ class PlaceReader(PlanState):
             if item.place is not None and item.place.ordinal is not None:
                 self._counted(item.relation, self._number_of(item.place, item.place.ordinal))
             return
-        if self._excludes(place):
+        if self._excludes(place, item.relation):
             return
         if place.reference is None and not self._describes(place):
             self.last_place = self._located(place) if item.relation is ConditionRelation.AT else place
@@ -158,8 +159,11 @@ class PlaceReader(PlanState):
             return False
         return frame.place.landmark is not None and place.landmark is None
 
-    def _excludes(self, place: PlaceReference) -> bool:
+    def _excludes(self, place: PlaceReference, relation: ConditionRelation) -> bool:
         """Returns whether a negated place is no condition: "not onto Beal, take Fuller", "not at the KFC"."""
+        if self.negation in FORBIDDING and relation is ConditionRelation.BEFORE and self.frame is None:
+            self.last_place = place  # "don't turn before Upland, turn left there"
+            return True
         if self.negation != "not" or (self.frame is not None and self.frame.action is not None and not self.fresh):
             return False
         self.negation = None
@@ -334,6 +338,8 @@ class PlaceReader(PlanState):
     def _object_of_verb(self, frame: Frame, place: PlaceReference) -> None:
         if place.reference is Anaphor.HERE or place.reference is Anaphor.THERE:
             frame.relation, frame.at = ConditionRelation.AT, place
+        elif place.reference is Anaphor.WAY_WE_CAME:
+            frame.action, frame.place = StepAction.FOLLOW, place  # "take the same way back"
         elif place.landmark is not None:
             frame.action, frame.place = StepAction.VISIT, place
         elif place.street is not None and place.object is None:
@@ -434,6 +440,9 @@ class PlaceReader(PlanState):
             self.counting = self.opportunity = True
             return
         if item.ordinal is not None and self._counts_last(item):
+            return
+        if self.negation == "not" and self.pending.ordinal is not None and item.ordinal is not None:
+            self.negation = None  # "the second, not the first"
             return
         if self.negation in REFUSING or passing:
             self.refused = Refusal(None, item.ordinal)

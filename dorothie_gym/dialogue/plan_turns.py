@@ -95,7 +95,8 @@ class TurnReader(PlanState):
     def _counts_apart(self, frame: Frame, item: TurnItem) -> bool:
         """Returns whether a direction behind a comma is that of a counted turn: "take the next one, left"."""
         counted = frame.action is StepAction.TURN and frame.direction is None and frame.ordinal is not None
-        return counted and frame.at is None and item.ordinal is None and self.joint == ","
+        passed = frame.at is None or frame.at.to_json().keys() == {"ordinal"}
+        return counted and passed and item.ordinal is None and self.joint == ","
 
     def _turns(self, frame: Frame, item: TurnItem) -> bool:
         """Returns whether a direction makes a turn, or a change of lane, of the current step."""

@@ -109,3 +109,21 @@ def test_go_ahead_alone_sends_the_car_on():
 def test_an_errand_that_is_done_already_is_complete():
     (span,) = guess_spans("we have been to the Shell already, haven't we?")
     assert "Complete" in str(span.act)
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        ("first right, no, second", [step("turn", direction="right", ordinal=2)]),
+        ("past two streets, then at the third, right", [step("turn", direction="right", ordinal=3)]),
+        ("the third, not the second", [step("turn", ordinal=3)]),
+        ("don't turn before Beal, go right there", [step("turn", AT, {"street": "Beal"}, direction="right")]),
+        ("if you see the Shell coming up, stop", [step("stop", "seen", SHELL)]),
+        ("take the same way back", [step("follow", place={"reference": "way_we_came"})]),
+        ("follow that white van", [step("follow", place={"object": "Vehicles"})]),
+        ("it could be clever to slow down", [step("speed", change="slower")]),
+        ("the Shell, right", [step("visit", place=SHELL)]),
+    ],
+)
+def test_numbers_and_places_that_refer_to_what_was_said(text, steps):
+    matches(text, *steps)

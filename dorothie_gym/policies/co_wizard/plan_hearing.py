@@ -272,8 +272,7 @@ def _take_over(
         return
     goes_on = _GOES_ON.match(text) is not None and (bool(state.plan.steps) or state.intentions.directive is not None)
     if goes_on:
-        state.plan = state.plan.continued((*_ordered_turn(state), *steps))
-        _confirm(state, steps)
+        _continue(state, steps)
         return
     possible, refused = _without_lane(state, view, steps)
     possible = _visiting(state, view, _counted_together(possible))
@@ -297,21 +296,26 @@ def _take_over(
         object_to(state, view, found[1], possible[found[0]], joined=bool(kept))
 
 
-def _ordered_turn(state: CoWizardState) -> tuple[PlanStep, ...]:
-    """Moves a turn that a single order asked for into an empty plan, as its first step: "second left", "then stop"."""
+def _continue(state: CoWizardState, steps: tuple[PlanStep, ...]) -> None:
+    """Adds steps to the plan, behind a turn that a single order has asked for: "second left", "and then stop"."""
+    ordered = _ordered_turn(state)
+    if ordered is not None:
+        state.intentions = state.intentions.directed(None)
+    state.plan = state.plan.continued(steps if ordered is None else (ordered, *steps))
+    _confirm(state, steps)
+
+
+def _ordered_turn(state: CoWizardState) -> PlanStep | None:
+    """Returns the turn that a single order has asked for, as a step; None without one, or with a plan."""
     ordered = state.intentions.directive
     if state.plan.steps or ordered is None or ordered.direction not in (Direction.LEFT, Direction.RIGHT):
-        return ()
+        return None
     street = None if ordered.street is StreetName.UNKNOWN else PlaceReference(street=ordered.street)
-    at = None if street is None else StepCondition(relation=ConditionRelation.AT, place=street)
-    state.intentions = state.intentions.directed(None)
-    return (
-        PlanStep(
-            action=StepAction.TURN,
-            direction=ordered.direction,
-            ordinal=ordered.skip + 1 if ordered.skip else None,
-            condition=at,
-        ),
+    return PlanStep(
+        action=StepAction.TURN,
+        direction=ordered.direction,
+        ordinal=ordered.skip + 1 if ordered.skip else None,
+        condition=None if street is None else StepCondition(relation=ConditionRelation.AT, place=street),
     )
 
 
@@ -453,7 +457,7 @@ def corrected_step(state: CoWizardState, heard: HeardUtterance) -> PlanStep | No
 
     A turn with another direction corrects the present turn if the words repair something: "not left, right".
     """
-    present, steps = state.plan.present, heard.words.plan.steps
+    present, steps = state.plan.present or _ordered_turn(state), heard.words.plan.steps
     if present is None or len(steps) != 1:
         return None
     if present.action is StepAction.STOP:
@@ -464,7 +468,11 @@ def corrected_step(state: CoWizardState, heard: HeardUtterance) -> PlanStep | No
     if {present.action, steps[0].action} != {StepAction.TURN}:
         return None
     repairs = any(act.move is DialogueMove.CLARIFY for act in heard.acts) or _REPAIRS.search(heard.words.text)
-    if not repairs or steps[0].direction in (None, present.direction) or _has_to_wait(steps[0]):
+    if not repairs or _has_to_wait(steps[0]):
+        return None
+    if steps[0].direction is None and steps[0].ordinal is not None and heard.classified:
+        return replace(present, ordinal=steps[0].ordinal)  # "sorry, the second"
+    if steps[0].direction in (None, present.direction):
         return None
     return replace(present, direction=steps[0].direction, ordinal=steps[0].ordinal or present.ordinal)
 
