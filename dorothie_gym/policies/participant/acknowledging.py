@@ -44,6 +44,9 @@ _VISIBLE = frozenset(
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 """Moves that may follow an acknowledgement in the same breath."""
 
+THANKS_FIRST: Final = 0.35
+"""Largest share of the arrivals for which a polite passenger thanks before saying that it is done."""
+
 _MANOEUVRES: Final = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH})
 """Actions of a car that finds its own way to which a passenger may consent."""
 
@@ -150,6 +153,9 @@ def _nod(
         done = GoalStatus.COMPLETE in waiting.act.slots
         if waiting.act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
             state.speech = state.speech.led_by(nod)
+        elif done and not state.guidance.guiding and rng.random() < THANKS_FIRST * state.style.thanks:
+            thanks = intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="arrived"))
+            state.speech = state.speech.plan_first(thanks)  # apart from the report, which is heard by itself
     elif (
         not alone
         or not state.speech.idle

@@ -202,7 +202,7 @@ class ParticipantStyle:
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(120.0, 55.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            chat=within(105.0, 45.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.15, 0.5, persona.patience, rng) * (1.0 - 0.5 * landmarks) + 0.4 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.2, 0.55, persona.talkativeness, rng) + 0.15 * landmarks,

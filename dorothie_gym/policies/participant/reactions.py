@@ -335,7 +335,9 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
     """Returns a general question: what the car knows, or how the drive is going."""
-    asked = [Proposition.of(predicate) for predicate in (Predicate.SAFE, Predicate.VISIBILITY, Predicate.RIGHT_WAY)]
+    asked = [Proposition.of(Predicate.RIGHT_WAY)]
+    if sight(view.raw) < FAR_SIGHT:
+        asked += [Proposition.of(Predicate.SAFE), Proposition.of(Predicate.VISIBILITY)]
     asked += [Proposition.of(Predicate.LOCALISED), Proposition.of(Predicate.LOCALISED, negated=True)]
     if state.task.goal is not None and not state.guidance.guiding:
         place = state.task.goal.name

@@ -86,6 +86,9 @@ _KNOWS_WAY = re.compile(
 )
 """Words by which the car says that it knows the way to its destination."""
 
+_LACKS_GOAL = re.compile(r"\b(no destination|nothing on my list|don't know where to go)\b")
+"""Words by which the car says that it was not told where to go, or has not understood it."""
+
 _LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
 """Words by which the car says that it has stopped because it does not know the way."""
 
@@ -298,6 +301,10 @@ def _answer_to_why(
     stands at the place of a previous errand.
     """
     goal, said, places, asked = state.task.goal, words.text.lower(), act.values(Slot.LANDMARK), state.speech.last
+    if goal is not None and _LACKS_GOAL.search(said):
+        state.task = state.task.after_reminding(view.time)
+        state.say_first(announcement(state, view, rng))
+        return
     if act.values(Slot.OBJECT):
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
     if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:

@@ -91,7 +91,7 @@ def test_a_long_wait_is_remarked_on_when_it_is_over(drive: Drive) -> None:
 
 
 def test_questions_about_the_trip_are_understood(drive: Drive) -> None:
-    for (question,) in trip_questions(drive.state):
+    for (question,) in trip_questions(drive.state, drive.view):
         asked = question.meaning[0].predicate
         for seed in range(8):
             text = word_acts([question.act], Role.PARTICIPANT, np.random.default_rng(seed), [question.wording])[0].text
