@@ -93,9 +93,10 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
     """Wrapper of `CoWizard-v0` with 30 actions in place of a dict of 104 entries.
 
     One action begins a command, a goal or an utterance, and lasts until something happens: the participant has spoken,
-    the car waits for a choice, stands, or has arrived, or `seconds` have passed. A goal stays set while the agent
-    speaks or continues: the car drives there by the navigator of the scripted Co-Wizard (`GoalDriver`), which reports
-    goal and plan as mental actions. Other driving commands drop the goal. The grammar words what is said.
+    the car waits for a choice, stands, or has arrived, or `seconds` have passed. An action that sets a goal is not
+    ended by what the participant says. A goal stays set while the agent speaks or continues: the car drives there by
+    the navigator of the scripted Co-Wizard (`GoalDriver`), which reports goal and plan as mental actions. Other driving
+    commands drop the goal. The grammar words what is said.
 
     The observation has four more fields, because words are observed only when they are heard:
 
@@ -165,7 +166,7 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
             reward, decisions = reward + float(gained), decisions + 1
             self._take_in(observation, info)
             over = self._driver.view.time - begun >= self._seconds - 1e-9
-            if terminated or truncated or over or self._happened(before):
+            if terminated or truncated or over or self._happened(before, heard=chosen.place is None):
                 break
             typed = self._driver.act()
         info = {**info, "action_mask": self.action_masks(), "decisions": decisions}
@@ -211,11 +212,11 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
     def _encoded(self, action: CoWizardAction) -> Any:  # gymnasium types the action as the wrapper's
         return action.encode(self._inner.engine.limits)
 
-    def _happened(self, before: tuple[Motion, bool]) -> bool:
-        """Returns whether the agent has something to react to."""
+    def _happened(self, before: tuple[Motion, bool], *, heard: bool) -> bool:
+        """Returns whether the agent has something to react to; what was said counts if `heard` is set."""
         view, driver = self._driver.view, self._driver
         motion, arrived = before
-        if view.raw["participant_text"] or (driver.arrived and not arrived):
+        if (heard and view.raw["participant_text"]) or (driver.arrived and not arrived):
             return True
         return driver.goal is None and view.motion is not motion and view.motion in (Motion.WAITING, Motion.STOPPED)
 
