@@ -1,8 +1,8 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
 from .curriculum import AgentTask as AgentTask
+from .curriculum import CurriculumStage as CurriculumStage
 from .curriculum import Split as Split
-from .curriculum import Stage as Stage
 from .curriculum import tasks as tasks
 from .page_changes import merged_page as merged_page
 from .text_session import PageStyle as PageStyle

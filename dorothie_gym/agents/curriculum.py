@@ -34,7 +34,7 @@ class Split(enum.StrEnum):
     TEST = "test"
 
 
-class Stage(enum.StrEnum):
+class CurriculumStage(enum.StrEnum):
     """Stages of the curriculum, from the easiest."""
 
     STREET = "street"
@@ -68,17 +68,17 @@ class StageSettings:
     tier: str | None = None
 
 
-STAGES: Final[Mapping[Stage, StageSettings]] = MappingProxyType(
+STAGES: Final[Mapping[CurriculumStage, StageSettings]] = MappingProxyType(
     {
-        Stage.STREET: StageSettings(
+        CurriculumStage.STREET: StageSettings(
             config=EnvConfig(max_seconds=60.0, stops=_TWO_STOPS, world=_EMPTY), partners=_QUIET
         ),
-        Stage.PAIR: StageSettings(config=EnvConfig(max_seconds=300.0, stops=_TWO_STOPS), partners=_QUIET),
-        Stage.QUIET: StageSettings(partners=_QUIET),
-        Stage.SESSION: StageSettings(),
-        Stage.STANDARD: StageSettings(tier="standard"),
-        Stage.EARS: StageSettings(tier="ears"),
-        Stage.ROUGH: StageSettings(tier="rough"),
+        CurriculumStage.PAIR: StageSettings(config=EnvConfig(max_seconds=300.0, stops=_TWO_STOPS), partners=_QUIET),
+        CurriculumStage.QUIET: StageSettings(partners=_QUIET),
+        CurriculumStage.SESSION: StageSettings(),
+        CurriculumStage.STANDARD: StageSettings(tier="standard"),
+        CurriculumStage.EARS: StageSettings(tier="ears"),
+        CurriculumStage.ROUGH: StageSettings(tier="rough"),
     }
 )
 """Settings of each stage."""
@@ -95,7 +95,7 @@ class AgentTask:
         reference: score that the rule program of the tests reaches from the pages, in [0, 1].
     """
 
-    stage: Stage
+    stage: CurriculumStage
     town: str
     seed: int
     reference: float = 0.0
@@ -128,7 +128,7 @@ class AgentTask:
         )
 
 
-def tasks(split: Split | str, stage: Stage | str | None = None) -> tuple[AgentTask, ...]:
+def tasks(split: Split | str, stage: CurriculumStage | str | None = None) -> tuple[AgentTask, ...]:
     """Returns the tasks of a split, from the easiest stage to the hardest.
 
     Args:
@@ -140,8 +140,8 @@ def tasks(split: Split | str, stage: Stage | str | None = None) -> tuple[AgentTa
     """
     if split not in list(Split):
         raise ValueError(f"split is {short_repr(split)}; it must be one of {', '.join(Split)}")
-    if stage is not None and stage not in list(Stage):
-        raise ValueError(f"stage is {short_repr(stage)}; it must be one of {', '.join(Stage)}")
+    if stage is not None and stage not in list(CurriculumStage):
+        raise ValueError(f"stage is {short_repr(stage)}; it must be one of {', '.join(CurriculumStage)}")
     return tuple(task for task in _stored()[Split(split)] if stage is None or task.stage == stage)
 
 
@@ -151,7 +151,7 @@ def _stored() -> Mapping[Split, tuple[AgentTask, ...]]:
     return {
         split: tuple(
             AgentTask(stage=stage, town=town, seed=seed, reference=reference)
-            for stage in Stage
+            for stage in CurriculumStage
             for town, seed, reference in page[split].get(stage, ())
         )
         for split in Split

@@ -277,12 +277,7 @@ class Players:
         self._observers = _observers(self._direct)
 
     def decide(self, session: ObservedSession, states: MutableMapping[Role, Any]) -> dict[str, AnyAction]:
-        """Returns the actions of the policies at the current decision, by agent, for the engine of the session.
-
-        Args:
-            session: session in progress.
-            states: state of each policy, which is replaced by the next one.
-        """
+        """Returns the actions at the current decision of a session, by agent; replaces the state of each policy."""
         return self.choose(self.inputs(session), states)
 
     def inputs(self, session: ObservedSession) -> dict[Role, ObservationMapping]:

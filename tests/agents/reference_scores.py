@@ -15,7 +15,7 @@ from typing import Annotated, Final
 
 import typer
 
-from dorothie_gym.agents.curriculum import AgentTask, Split, Stage
+from dorothie_gym.agents.curriculum import AgentTask, CurriculumStage, Split
 from dorothie_gym.maps.generated.specification import FIRST_TEST_SEED, TownSize, TownSpecification
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from tests.agents.players import play, reader_of
@@ -30,8 +30,9 @@ FIRST_SEED: Final = {Split.TRAIN: 10_000, Split.TEST: 900_000}
 """Seed from which on the sessions of a split are chosen."""
 
 COUNTS: Final = {
-    Stage.STREET: (12, 4), Stage.PAIR: (10, 2), Stage.QUIET: (4, 2), Stage.SESSION: (4, 2),
-    Stage.STANDARD: (2, 2), Stage.EARS: (2, 2), Stage.ROUGH: (2, 2),
+    CurriculumStage.STREET: (12, 4), CurriculumStage.PAIR: (10, 2), CurriculumStage.QUIET: (4, 2),
+    CurriculumStage.SESSION: (4, 2),
+    CurriculumStage.STANDARD: (2, 2), CurriculumStage.EARS: (2, 2), CurriculumStage.ROUGH: (2, 2),
 }  # fmt: skip
 """Numbers of tasks for training and for test."""
 
@@ -41,7 +42,7 @@ STREET_WAY: Final = 200.0
 PAIR_WAY: Final = 400.0
 """Longest way to the first of two errands [m]."""
 
-LEAST: Final = {Stage.STREET: 0.4, Stage.PAIR: 1.0}
+LEAST: Final = {CurriculumStage.STREET: 0.4, CurriculumStage.PAIR: 1.0}
 """Score that the rule program must reach, by stage: one errand of two, or a success."""
 
 
@@ -57,15 +58,15 @@ def suits(task: AgentTask) -> bool:
     mark = live.task.storyboard.landmarks[live.task.landmark_of(first)]
     cost.aim((mark.lane, mark.station))
     way = cost.from_place(car.lane, car.station)
-    if task.stage is Stage.PAIR:
+    if task.stage is CurriculumStage.PAIR:
         return way <= PAIR_WAY
     return way <= STREET_WAY and town.lanes[car.lane].street == town.lanes[mark.lane].street
 
 
-def candidates(split: Split, stage: Stage, index: int) -> Iterator[AgentTask]:
+def candidates(split: Split, stage: CurriculumStage, index: int) -> Iterator[AgentTask]:
     """The tasks of one town and stage that suit, by seed."""
     town = TOWNS[split][index]
-    seed = FIRST_SEED[split] + 1000 * list(Stage).index(stage) + 10_000 * index
+    seed = FIRST_SEED[split] + 1000 * list(CurriculumStage).index(stage) + 10_000 * index
     while True:
         task = AgentTask(stage=stage, town=town, seed=seed)
         if suits(task):
@@ -73,7 +74,7 @@ def candidates(split: Split, stage: Stage, index: int) -> Iterator[AgentTask]:
         seed += 1
 
 
-def measured(split: Split, stage: Stage, count: int) -> Iterator[AgentTask]:
+def measured(split: Split, stage: CurriculumStage, count: int) -> Iterator[AgentTask]:
     """The tasks of a stage with their scores; towns take turns."""
     streams = [candidates(split, stage, index) for index in range(len(TOWNS[split]))]
     found = 0

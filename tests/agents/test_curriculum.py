@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.agents import AgentTask, Split, Stage, TextSession, tasks
+from dorothie_gym.agents import AgentTask, CurriculumStage, Split, TextSession, tasks
 from dorothie_gym.agents.curriculum import STAGES
 from dorothie_gym.maps.folds import TownFold, fold_of
 from tests.agents.players import Idler, play, reader_of, score
@@ -14,8 +14,8 @@ from tests.agents.reference_scores import COUNTS, TOWNS, suits
 def test_each_split_has_all_stages_in_order_and_names_are_distinct() -> None:
     for number, split in enumerate(Split):
         found = tasks(split)
-        assert list(dict.fromkeys(task.stage for task in found)) == list(Stage)
-        for stage in Stage:
+        assert list(dict.fromkeys(task.stage for task in found)) == list(CurriculumStage)
+        for stage in CurriculumStage:
             assert len(tasks(split, stage)) == COUNTS[stage][number]
     names = [task.name for split in Split for task in tasks(split)]
     assert len(set(names)) == len(names)
@@ -34,7 +34,7 @@ def test_training_and_test_share_neither_towns_nor_seeds() -> None:
 def test_references_are_scores_and_the_first_stages_can_be_done() -> None:
     for task in (*tasks("train"), *tasks("test")):
         assert 0.0 <= task.reference <= 1.0
-        assert task.reference >= {Stage.STREET: 0.4, Stage.PAIR: 1.0}.get(task.stage, 0.0)
+        assert task.reference >= {CurriculumStage.STREET: 0.4, CurriculumStage.PAIR: 1.0}.get(task.stage, 0.0)
 
 
 @pytest.mark.parametrize("split", Split)
@@ -73,4 +73,4 @@ def test_wrong_arguments_are_refused(arguments: tuple[str, ...], words: str) -> 
 @pytest.mark.parametrize("name", ["role", "town", "config", "partners", "tier"])
 def test_settings_that_a_task_gives_cannot_be_changed(name: str) -> None:
     with pytest.raises(ValueError, match=f"{name} is given by the task"):
-        AgentTask(stage=Stage.STREET, town="brookside", seed=1).session(**{name: None})
+        AgentTask(stage=CurriculumStage.STREET, town="brookside", seed=1).session(**{name: None})

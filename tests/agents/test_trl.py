@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.agents import Outcome, tasks
-from dorothie_gym.agents.curriculum import AgentTask, Stage
+from dorothie_gym.agents.curriculum import AgentTask, CurriculumStage
 from dorothie_gym.agents.trl.environment import DorothieEnvironment, rows
 from dorothie_gym.errors import AgentSessionError
 from tests.agents.players import Answerer, play, reader_of
@@ -98,7 +98,7 @@ def test_wrong_rows_are_refused(changed: dict[str, object], words: str) -> None:
 def test_rows_of_a_group_give_equal_sessions_and_have_the_seed() -> None:
     row = rows("train", "street")[0]
     assert {name: row[name] for name in ROW} == ROW and row["reference"] == STREET.reference
-    assert AgentTask(stage=Stage(row["stage"]), town=row["town"], seed=row["seed"]).name == STREET.name
+    assert AgentTask(stage=CurriculumStage(row["stage"]), town=row["town"], seed=row["seed"]).name == STREET.name
     first, second = DorothieEnvironment(), DorothieEnvironment()
     assert first.reset(**row) == second.reset(**row)
     assert first.wait(20.0) == second.wait(20.0)

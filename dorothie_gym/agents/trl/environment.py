@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from dorothie_gym.agents.curriculum import AgentTask, Split, Stage, tasks
+from dorothie_gym.agents.curriculum import AgentTask, CurriculumStage, Split, tasks
 from dorothie_gym.errors import AgentSessionError
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.role_interface import system_prompt
@@ -49,7 +49,7 @@ class DorothieEnvironment:
         """
         key = stage, town
         if key not in self._sessions:
-            self._sessions = {key: AgentTask(stage=Stage(stage), town=town, seed=seed).session()}
+            self._sessions = {key: AgentTask(stage=CurriculumStage(stage), town=town, seed=seed).session()}
         self._session = self._sessions[key]
         return self._shown(self._session.reset(seed))
 
@@ -124,7 +124,7 @@ class DorothieEnvironment:
         return self._session
 
 
-def rows(split: Split | str, stage: Stage | str | None = None) -> list[dict[str, Any]]:
+def rows(split: Split | str, stage: CurriculumStage | str | None = None) -> list[dict[str, Any]]:
     """Returns the rows of a dataset for `GRPOTrainer`: prompt, seed, town, stage, and the reference score.
 
     Args:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import verifiers.v1 as vf
 from pydantic import Field
 
-from dorothie_gym.agents.curriculum import AgentTask, Split, Stage, tasks
+from dorothie_gym.agents.curriculum import AgentTask, CurriculumStage, Split, tasks
 from dorothie_gym.policies.language_model.chat_endpoint import httpx_module
 
 _SESSION: Final = "session"
@@ -19,7 +19,7 @@ _SESSION: Final = "session"
 class DorothieData(vf.TaskData):
     """A task of the curriculum; fields as those of `AgentTask`."""
 
-    stage: Stage
+    stage: CurriculumStage
     town: str
     seed: int
     reference: float
@@ -44,7 +44,7 @@ class DorothieConfig(vf.TasksetConfig):
     """Settings of the taskset: the split ("train" or "test"), and one stage of it; all stages without."""
 
     split: Split = Split.TRAIN
-    stage: Stage | None = None
+    stage: CurriculumStage | None = None
 
 
 class DorothieTaskset(vf.Taskset[DorothieTask, DorothieConfig]):

@@ -11,7 +11,7 @@ from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.arriving import about_to_arrive
-from dorothie_gym.policies.participant.yes_no_answers import addition, checked
+from dorothie_gym.policies.participant.short_answers import addition, checked
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:

@@ -35,16 +35,14 @@ from dorothie_gym.policies.participant.proposition_truth import has_just_finishe
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
 from dorothie_gym.policies.participant.route_steps import route_step
+from dorothie_gym.policies.participant.short_answers import addition, checked, denied
 from dorothie_gym.policies.participant.standstill import waits_for_road
 from dorothie_gym.policies.participant.stories import story_remark
 from dorothie_gym.policies.participant.telling_way import answer_with_way, take_up_confirmation
 from dorothie_gym.policies.participant.yes_no_answers import (
-    addition,
     answer_yes_no,
     check,
-    checked,
     correct_arrival,
-    denied,
     deny_arrival,
     deny_other_place,
     go_first,

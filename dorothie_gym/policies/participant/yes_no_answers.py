@@ -18,10 +18,9 @@ from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, route_length, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
-from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.proposition_truth import LEFT_TO_THE_CAR, has_just_finished, is_elsewhere
 from dorothie_gym.policies.participant.repairs import ask_back, name_step_or_place
-from dorothie_gym.policies.participant.stories import story_remark
+from dorothie_gym.policies.participant.short_answers import addition, checked, denied, short
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
@@ -63,30 +62,7 @@ def check(
         state.set_guiding(False)  # the car knows the place
         state.task = state.task.after_announcement(view.time)
     wanted = checked(state, act, words)
-    state.say_first(_short(Function.CONFIRM, wanted), *addition(state, view, rng))
-
-
-def checked(state: ParticipantState, act: DialogueAct, words: ParsedText) -> Proposition:
-    """Returns the subject of a check or proposal of the car: a destination, an action, or the current destination."""
-    place = act_builders.first_name(act.values(Slot.LANDMARK))
-    street = next((value for value in act.values(Slot.STREET) if isinstance(value, StreetName)), None)
-    wanted = next((value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue)), None)
-    if place is not None:
-        return act_builders.destination(place, street)
-    if wanted is not None or street is not None:
-        return act_builders.action(wanted, words if wanted is not None else None, street=street)
-    goal = state.task.goal
-    return act_builders.destination(None if goal is None else goal.name)
-
-
-def _short(function: Function, content: Proposition) -> Remark:
-    """Returns an answer without explicit content: "yes", "that's it"."""
-    return intend(function, content, elided=act_builders.arguments_of(content))
-
-
-def denied(content: Proposition) -> Remark:
-    """Returns the answer that the content of a question is wrong or not wanted: "no"."""
-    return _short(Function.NEGATIVE_ANSWER, content.opposite)
+    state.say_first(short(Function.CONFIRM, wanted), *addition(state, view, rng))
 
 
 def _fits(
@@ -107,15 +83,6 @@ def _fits(
     if wanted is Direction.STRAIGHT:
         return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
     return bool(actions & meant) and (wanted is None or words.direction is wanted)
-
-
-def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns, with some probability, a hint or reason to add to an answer."""
-    if rng.random() >= state.style.reasons:
-        return ()
-    if state.guidance.guiding or not is_in_mind(state, view) or rng.random() < 0.5:
-        return hint(state, view, rng)
-    return tuple(item for item in story_remark(state, view, rng) if item.wording.topic != "reason")
 
 
 def _refuse_with_step(
@@ -141,7 +108,7 @@ def answer_yes_no(
     offered = _offered_subgoal(state, view, landmarks)
     if _asks_about_finished(state, view, act, words):
         there = Proposition.of(Predicate.ARRIVED, place=state.task.finished[0])
-        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, there))
+        state.say_first(short(Function.AFFIRMATIVE_ANSWER, there))
     elif offered is not None:
         _answer_offer(state, view, offered)
     elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
@@ -149,19 +116,19 @@ def answer_yes_no(
     elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
         sight = Proposition.of(Predicate.SEES, object=objects[0])
-        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, sight) if seen else denied(sight))
+        state.say_first(short(Function.AFFIRMATIVE_ANSWER, sight) if seen else denied(sight))
     elif landmarks and state.task.goal is not None:
         if state.task.goal.name in landmarks and is_elsewhere(state, view):
             deny_arrival(state)
         elif state.task.goal.name in landmarks:
-            state.say_first(_short(Function.AFFIRMATIVE_ANSWER, words.asked or checked(state, act, words)))
+            state.say_first(short(Function.AFFIRMATIVE_ANSWER, words.asked or checked(state, act, words)))
         else:
             again = announcement(state, view, rng)
             state.say_first(denied(words.asked or checked(state, act, words)), replace(again, joined=True))
     elif set(act.values(Slot.ACTION)) & _WAYS:
         state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
-    elif not act.slots and is_just_short(state, view):
+    elif not act.slots and is_justshort(state, view):
         correct_arrival(state, view, words.asked)
     elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
         deny_arrival(state)
@@ -173,8 +140,8 @@ def answer_yes_no(
         if asked is None:
             ask_back(state, view, words, rng)
             return
-        unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
-        yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
+        unsure = (short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
+        yes = short(Function.AFFIRMATIVE_ANSWER, asked)
         state.say_first(*unsure, yes, *(() if unsure else addition(state, view, rng)))
 
 
@@ -208,7 +175,7 @@ def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenS
     left = progress.left(view.station) if progress is not None else math.inf
     if landmark is not None and route_length(state, view, landmark) < left:
         switch_target(state, view, offered, landmark)
-        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, act_builders.destination(landmark.name)))
+        state.say_first(short(Function.AFFIRMATIVE_ANSWER, act_builders.destination(landmark.name)))
         return
     state.say_first(denied(act_builders.destination(None if landmark is None else landmark.name)), go_first(goal.name))
 
@@ -228,7 +195,7 @@ def _answer_street(state: ParticipantState, view: ParticipantView, act: Dialogue
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     named = {street for item in state.speech.said for street in item.act.values(Slot.STREET)}
     if own is None or not {own, *named}.isdisjoint(act.values(Slot.STREET)):
-        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, proposed))
+        state.say_first(short(Function.AFFIRMATIVE_ANSWER, proposed))
         return
     over = act_builders.action(None, street=own)
     state.say_first(denied(proposed), intend(Function.REQUEST, over, wording=Wording(topic="detour"), joined=True))
@@ -248,14 +215,14 @@ def _answer_proposal(
     if step is not None:
         note_step(state, view, step[0])
     proposed = checked(state, act, words)
-    first = (_short(Function.UNCERTAIN_ANSWER, proposed),) if rng.random() < state.config.unsure else ()
-    state.say_first(*first, _short(Function.AFFIRMATIVE_ANSWER, proposed), *addition(state, view, rng))
+    first = (short(Function.UNCERTAIN_ANSWER, proposed),) if rng.random() < state.config.unsure else ()
+    state.say_first(*first, short(Function.AFFIRMATIVE_ANSWER, proposed), *addition(state, view, rng))
 
 
 # --- arrivals ---------------------------------------------------------------------------------------------------------
 
 
-def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
+def is_justshort(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether the car stands just before the target that it is guided to."""
     progress = state.route.progress
     if not state.guidance.guiding or not view.standing or progress is None:
