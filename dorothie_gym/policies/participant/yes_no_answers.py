@@ -128,7 +128,7 @@ def answer_yes_no(
     elif set(act.values(Slot.ACTION)) & _WAYS:
         state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
-    elif not act.slots and is_justshort(state, view):
+    elif not act.slots and is_just_short(state, view):
         correct_arrival(state, view, words.asked)
     elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
         deny_arrival(state)
@@ -222,7 +222,7 @@ def _answer_proposal(
 # --- arrivals ---------------------------------------------------------------------------------------------------------
 
 
-def is_justshort(state: ParticipantState, view: ParticipantView) -> bool:
+def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether the car stands just before the target that it is guided to."""
     progress = state.route.progress
     if not state.guidance.guiding or not view.standing or progress is None:
