@@ -1,7 +1,7 @@
 """Trains a Co-Wizard with MaskablePPO on macro-actions, and draws its learning curve.
 
 The agent hears what the participant says (dialogue acts), and chooses among 30 actions: set a goal, drive, speak, ask.
-Sessions of 180 s in the village of brookside with a quiet participant have about 15 actions each. Training takes about
+Sessions of 180 s in the village of brookside with a quiet participant have about 8 actions each. Training takes about
 seven minutes on one core. Needs the extra `baselines`.
 
     python examples/rl_co_wizard.py --steps 8000 --out co_wizard.zip
