@@ -72,7 +72,7 @@ CoWizard = Annotated[
     typer.Option(
         metavar="NAME|FILE",
         help="Policy of the Co-Wizard: scripted (also with traits), silent, random, lane-follow, "
-        "pretrained:maskable-ppo (see `policies`), llm:MODEL, or the folder of a learned policy.",
+        "pretrained:maskable-ppo, always-asks (see `policies`), llm:MODEL, or the folder of a learned policy.",
         autocompletion=complete_policy("co_wizard"),
     ),
 ]
