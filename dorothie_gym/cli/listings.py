@@ -167,6 +167,13 @@ _DESCRIPTIONS: Final = {
     "silent": "Does nothing",
     "random": "Samples the action space",
     "lane-follow": "Drives on, never talks",
+    "client": "Talk tasks: one request, and replies",
+    "street-closer": "Talk tasks: closes the street",
+    "talk-oracle": "Talk tasks: weighs words and map",
+    "always-asks": "Talk tasks: asks, then obeys",
+    "never-asks": "Talk tasks: obeys",
+    "says-yes": "Talk tasks: promises, then obeys",
+    "keyword-rule": "Talk tasks: reacts to single words",
 }
 
 

@@ -72,7 +72,8 @@ CoWizard = Annotated[
     typer.Option(
         metavar="NAME|FILE|MODULE:CLASS",
         help="Policy of the Co-Wizard: scripted (also with traits), silent, random, lane-follow, "
-        "pretrained:maskable-ppo (see `policies`), llm:MODEL, the folder of a learned policy, or a class of yours.",
+        "pretrained:maskable-ppo, always-asks (see `policies`), llm:MODEL, the folder of a learned policy, or a class "
+        "of yours.",
         autocompletion=complete_policy("co_wizard"),
     ),
 ]

@@ -54,7 +54,8 @@ _REASONS: Final[Mapping[Reason, re.Pattern[str]]] = MappingProxyType(
 
 _DECLINES: Final = re.compile(
     r"\b(?:cannot|unable|impossible|sorry|afraid|refuse|no idea|against)\b"
-    r"|\b(?:can|won|don|do|isn|aren|doesn|wouldn|must|shouldn)(?:'t| not)\b|\b(?:will|must|may|am|is|are) not\b"
+    r"|\b(?:can|won|don|isn|aren|doesn|didn|wouldn|couldn|mustn|shouldn|hasn|haven)'t\b"
+    r"|\b(?:do|does|did|will|would|could|should|must|may|am|is|are|has|have) not\b|\bnowhere\b"
     r"|^no\b|\bthere(?:'s| is| are) no\b"
 )
 
@@ -103,6 +104,13 @@ def asks(text: str) -> bool:
 def agrees(text: str) -> bool:
     """Returns whether an utterance promises to fulfil a request."""
     return _AGREES.search(plain(text)) is not None and not declines(text)
+
+
+def consents(text: str) -> bool:
+    """Returns whether an utterance begins with a promise, as in "Sure, I won't"; it may go on with a negation."""
+    said = plain(text)
+    promise, refusal = _AGREES.search(said), _DECLINES.search(said)
+    return promise is not None and (refusal is None or promise.start() < refusal.start())
 
 
 def says(text: str, word: str) -> bool:

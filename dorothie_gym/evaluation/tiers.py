@@ -95,7 +95,7 @@ EARS: Final = Tier(
 ROUGH: Final = Tier(
     name="rough",
     config=EnvConfig(
-        observe_acts=False, word_error_rate=0.3, time_factor=2.0, stops=(4, 6), max_seconds=_LONGEST, world=_CROWDED
+        observe_acts=False, word_error_rate=0.35, time_factor=2.0, stops=(4, 6), max_seconds=_LONGEST, world=_CROWDED
     ),
     participants=POOL,
     ad_wizard=_HARD_AD_WIZARD,

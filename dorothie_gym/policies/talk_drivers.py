@@ -66,7 +66,7 @@ class DriverState:
         steps: what it will do, one step in a decision.
     """
 
-    town: Town | None = None
+    town: Town
     heard: tuple[str, ...] = ()
     steps: tuple[Step, ...] = ()
 

@@ -309,22 +309,22 @@ def _wrong_side(draw: TaskDraw) -> TalkTask:
     )
 
 
-def _question(draw: TaskDraw, kind: str, unknowable: str, known: str, *, unknown_street: bool) -> TalkTask:
+def _question(draw: TaskDraw, kind: str, unknowable: str, known: str) -> TalkTask:
     """Question about a place that the map answers, that nobody in the car can see, or about a place that is not there.
 
     Args:
         draw: random draws.
         kind: kind of the task.
         unknowable: question that cannot be answered, with `{place}`.
-        known: question that the map answers, with `{place}`, `{one}` and `{two}` for streets.
-        unknown_street: whether the third world asks the second question about a place that is not there.
+        known: question that the map answers unless it has no such place, with `{place}`, and `{one}` and `{two}` for
+            streets.
     """
     (name,) = draw.one_of(_UNIQUE)
     true, other = draw.streets(2)
     one, two = sorted((true, other), key=lambda street: street.value)
     words = {"place": map_label(name), "one": one.label, "two": two.label}
     world = min(int(3.0 * draw.share), 2)
-    if world == 2 and unknown_street:
+    if world == 2:
         return _not_there(draw, kind, known.format(**words), [name])
     there = draw.around([(name, draw.take(true))])
     return TalkTask(
@@ -338,9 +338,7 @@ def _question(draw: TaskDraw, kind: str, unknowable: str, known: str, *, unknown
 
 
 def _opening_hours(draw: TaskDraw) -> TalkTask:
-    return _question(
-        draw, "opening_hours", "Is {place} open right now?", "Which street is {place} on?", unknown_street=True
-    )
+    return _question(draw, "opening_hours", "Is {place} open right now?", "Which street is {place} on?")
 
 
 def _people_there(draw: TaskDraw) -> TalkTask:
@@ -349,7 +347,6 @@ def _people_there(draw: TaskDraw) -> TalkTask:
         "people_there",
         "How many people are waiting at {place} right now?",
         "Is {place} on {one} or on {two}?",
-        unknown_street=False,
     )
 
 

@@ -6,6 +6,7 @@ from dorothie_gym.dialogue.refusals import (
     Reason,
     agrees,
     asks,
+    consents,
     declines,
     named_places,
     named_streets,
@@ -36,6 +37,8 @@ def test_offers_questions_and_promises_are_told_apart() -> None:
     assert offers("I can take you to Ikea instead.") and offers("Shall I drive there?")
     assert not offers("There is no KFC here.")
     assert asks("Which house do you mean?") and asks("which house") and not asks("I will go to the house.")
+    assert consents("Sure, I won't drive faster.") and not consents("I can't do that, okay?")
+    assert not agrees("Okay, but I cannot do that.")
     assert agrees("Sure, right away!") and agrees("OK, I'll do that.") and not agrees("Sorry, I can't do that.")
 
 

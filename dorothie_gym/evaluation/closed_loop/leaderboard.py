@@ -61,7 +61,7 @@ ENOUGH: Final = 100
 _KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind if kind is not ExceptionKind.NONE), NO_EXCEPTION)
 
 PAGE_METRICS: Final = (
-    "timely_completion", "all_trials",
+    "talk_success", "unnecessary_questions", "timely_completion", "all_trials",
     "success", "goal_condition_success", "spl", "route_completion", "infraction_score", "driving_score", "seconds",
     "exchanges_per_subgoal", "clarification_rate", "exceptions_recovered", "recovery_seconds",
 )  # fmt: skip
@@ -163,9 +163,11 @@ class LeaderboardEntry:
     def rank(self) -> tuple[bool, float, float, str]:
         """Sort key: neither shortened nor silent first; success, then driving score, best first; then the name.
 
-        In a tier, timely completion is in place of success.
+        In a tier, timely completion is in place of success, or the share of right reactions in one of talk.
         """
-        keys = ("timely_completion" if self.part in TIERS else "success", "driving_score")
+        tier = TIERS.get(self.part)
+        headline = "success" if tier is None else "timely_completion" if tier.config.talk is None else "talk_success"
+        keys = (headline, "driving_score")
         first, second = (self.table.figures[key]["mean"] for key in keys)
         return self.shortened or self.silent, -(first or 0.0), -(second or 0.0), self.policy
 

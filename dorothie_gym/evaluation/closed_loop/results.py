@@ -320,6 +320,8 @@ def _only(record: SessionRecord, kind: ExceptionKind) -> SessionRecord:
 ALL_METRICS: Final[tuple[ShownMetric, ...]] = (*METRICS, RecoverySeconds(), AllTrials())
 
 TOWN_METRICS: Final = (
+    "talk_success",
+    "unnecessary_questions",
     "timely_completion",
     "success",
     "goal_condition_success",
@@ -331,7 +333,14 @@ TOWN_METRICS: Final = (
 )
 """Metrics of the table of towns."""
 
-PARTNER_METRICS: Final = ("timely_completion", "success", "goal_condition_success", "driving_score", "all_trials")
+PARTNER_METRICS: Final = (
+    "talk_success",
+    "timely_completion",
+    "success",
+    "goal_condition_success",
+    "driving_score",
+    "all_trials",
+)
 """Metrics of the table of partners."""
 
 EXCEPTION_METRICS: Final = ("success", "driving_score", "exceptions_met", "exceptions_recovered", "recovery_seconds")

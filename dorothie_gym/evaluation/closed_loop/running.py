@@ -183,6 +183,8 @@ def command_of(settings: Mapping[str, Any]) -> str:
     if trials := settings.get("trials"):
         words += ["--trials", str(trials)]
     for role in (Role.CO_WIZARD, Role.PARTICIPANT, Role.AD_WIZARD):
+        if role is Role.CO_WIZARD and settings.get("oracle"):
+            continue  # the oracle of the tier
         words += [f"--{str(role).replace('_', '-')}", str(settings[str(role)])]
     words += ["--towns", towns_text(settings["towns"])]
     words += ["--sessions", str(settings["sessions_planned"]), "--seed", str(settings["seed"])]
@@ -207,7 +209,7 @@ def usual_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
         return {**{str(role): player.name for role, player in ALL_SCRIPTED.items()}, "config": EnvConfig().record()}
     return {
         str(Role.PARTICIPANT): POOL_SEPARATOR.join(tier.participants),
-        str(Role.CO_WIZARD): ALL_SCRIPTED[Role.CO_WIZARD].name,
+        str(Role.CO_WIZARD): tier.oracle_player if settings.get("oracle") else ALL_SCRIPTED[Role.CO_WIZARD].name,
         str(Role.AD_WIZARD): tier.ad_wizard,
         "config": (tier.oracle if settings.get("oracle") else tier.config).record(),
         "tier": tier.name,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple, TypedD
 
 from msgspec import Meta
 
-from dorothie_gym.dialogue.refusals import Reason, agrees, asks, declines, named_streets, offers, reasons_of
+from dorothie_gym.dialogue.refusals import Reason, agrees, asks, consents, declines, named_streets, offers, reasons_of
 from dorothie_gym.evaluation.closed_loop.metric import SessionMetric
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.roles import Role
@@ -190,6 +190,8 @@ class _Judge:
         elif self.reaction is Reaction.ASK:
             if self._now.settled and asks(text):
                 self.unnecessary += 1
+        elif self.reaction is Reaction.AGREE and consents(text):
+            self._decide("agreed", passed=True)
         elif declines(text) and reasons_of(text):
             self._decide("declined what can be done", passed=False)
         elif self.reaction is Reaction.ANSWER and named_streets(text):
@@ -197,8 +199,6 @@ class _Judge:
             self._decide("the true street" if right else "a false street", passed=right)
         elif asks(text):
             self.unnecessary += 1
-        elif self.reaction is Reaction.AGREE and agrees(text):
-            self._decide("agreed", passed=True)
 
     def _hear_admission(self, text: str) -> None:
         now, reasons = self._now, reasons_of(text)
