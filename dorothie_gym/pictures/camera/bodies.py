@@ -64,7 +64,8 @@ def copy_body(
 
     Without room for the whole body nothing is written, and all of its triangles count.
     """
-    first, last = ranges[body.model, 0], ranges[body.model, 1]
+    first: int = ranges[body.model, 0]
+    last: int = ranges[body.model, 1]
     if count + last - first > target.corners.shape[0]:
         return count + last - first
     for row in range(first, last):
