@@ -362,6 +362,8 @@ def belong_together(head: str, rest: str) -> bool:
     first, second = read_plan(head), read_plan(rest)
     if split_words(head)[-2:] in _FORBIDDEN_LATER and second.plan.steps:
         return True  # "do not, whatever happens, go faster than thirty"
+    if split_words(head)[:1] == ["not"] and first.turned and not first.plan.steps and second.plan.steps:
+        return True  # "not this one, the one after"
     if (first.conditional and not first.described) or (second.conditional and not second.described):
         return True  # "if the road is blocked, take Murfin"
     if _SIDE_ONLY.fullmatch(rest.strip(" .,!?").lower()) and not first.plan.steps:
