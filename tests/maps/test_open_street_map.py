@@ -105,7 +105,7 @@ def test_missing_file_and_missing_program_are_named(tmp_path: Path, monkeypatch:
     (tmp_path / "district.osm").write_text(district().text(), encoding="utf-8")
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(TownError, match=r"dorothie-gym\[sumo\]"):
+    with pytest.raises(TownError, match=r"pip install .*\[sumo\]"):
         convert_street_map(tmp_path / "district.osm", tmp_path / "town.xodr")
 
 

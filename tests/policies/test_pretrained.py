@@ -27,6 +27,7 @@ from dorothie_gym.policies import (
     pretrained_folder,
     pretrained_names,
 )
+from dorothie_gym.policies.policy_loader import TALK_POLICIES
 from dorothie_gym.policies.pretrained import names_for
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces import SpaceLimits
@@ -184,7 +185,8 @@ def test_damaged_card_is_an_error_of_one_line(damage: str, tmp_path: Path, monke
 
 def test_policies_are_listed_with_size_training_and_validation() -> None:
     rows = {row["name"]: row for row in json.loads(call("policies", "--json").stdout)}
-    assert set(rows) == {"scripted", "silent", "random", "lane-follow", *NAMES}
+    of_talk_tasks = {name for names in TALK_POLICIES.values() for name in names}
+    assert set(rows) == {"scripted", "silent", "random", "lane-follow", *of_talk_tasks, *NAMES}
     assert rows["scripted"]["roles"] == ["participant", "co_wizard", "ad_wizard"]
     shown = call("policies").stdout
     for name in NAMES:
