@@ -38,7 +38,7 @@ def test_named_player_makes_its_policy() -> None:
 def test_policy_of_another_role_raises_error_with_known_names() -> None:
     with pytest.raises(
         PolicyLoadError,
-        match=r"participant: there is no policy 'lane-follow'.*scripted, silent, random, client, pretrained:participant$",
+        match=r"there is no policy 'lane-follow'.*scripted, silent, random, client, pretrained:participant$",
     ):
         find_player("lane-follow", Role.PARTICIPANT)
 
