@@ -57,7 +57,10 @@ def digests(cache: Path, **variables: str) -> dict[str, dict[str, str]]:
 @pytest.mark.long
 @pytest.mark.timeout(1800)  # machine code for any processor is compiled once
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings name abilities of x86-64")
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if "NUMBA_CPU_NAME" in SETTINGS[name] else name for name in SETTINGS],
+)
 def test_all_sessions_are_equal(name: str, tmp_path: Path) -> None:
     kept = frozen()["parts"]
     found = digests(tmp_path / "cache", **SETTINGS[name])
