@@ -9,6 +9,9 @@ from dorothie_gym.maps import load_town, mirrored, town_names
 from dorothie_gym.testing.playing import Decision, play_scripted
 
 OTHER = {"left": "right", "right": "left"}
+SIDE = re.compile(
+    r"(?<![Aa]ll )\b(left|right)\b(?!\?| (?:now|away|here|there))"
+)  # but "all right", "right now", "right?"
 
 
 def _words(decision: Decision) -> list[str]:
@@ -26,8 +29,8 @@ def test_the_talk_of_a_mirrored_session_names_the_other_side() -> None:
         ]
         for one in (town, mirrored(town))
     ]
-    assert any(re.search("left|right", words) for words in talks[0])
-    assert talks[1] == [re.sub("left|right", lambda side: OTHER[side[0]], words) for words in talks[0]]
+    assert any(SIDE.search(words) for words in talks[0])
+    assert talks[1] == [SIDE.sub(lambda side: OTHER[side[1]], words) for words in talks[0]]
 
 
 @pytest.mark.long
