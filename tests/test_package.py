@@ -101,11 +101,15 @@ def test_distributions_contain_the_shipped_models(target: str, tmp_path: Path) -
         with zipfile.ZipFile(built) as archive:
             roots = {name.partition("/")[0].partition("-")[0] for name in archive.namelist()}
             assert roots == {"dorothie_gym", "dorothie_sessions.py"}  # the latter is the plugin of verifiers
-            contents = {name: archive.read(name) for name in archive.namelist() if "/data/pretrained/" in name}
+            names = [*archive.namelist(), "dorothie_gym/agents/verifiers/plugin.py"]  # is there as dorothie_sessions.py
+            contents = {name: archive.read(name) for name in names if "/data/pretrained/" in name}
     else:
         with tarfile.open(built) as archive:
+            names = [name.partition("/")[2] for name in archive.getnames()]
             members = [member for member in archive.getmembers() if "/data/pretrained/" in member.name]
             contents = {member.name: archive.extractfile(member).read() for member in members}  # type: ignore[union-attr]  # files
+    modules = {path.relative_to(root).as_posix() for path in (root / "dorothie_gym").rglob("*.py")}
+    assert modules <= set(names)  # also of the folders that links of the root lead to
     shipped = root / "dorothie_gym" / "policies" / "data" / "pretrained"
     files = [path for path in shipped.rglob("*") if path.is_file()]
     assert len(files) == len(contents) >= 12

@@ -78,8 +78,8 @@ def test_description_on_an_index_page_has_no_broken_links_and_pictures() -> None
 
 def test_source_distribution_has_docs_benchmarks_and_examples() -> None:
     project = tomllib.loads((README.parent / "pyproject.toml").read_text(encoding="utf-8"))
-    included = project["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
-    assert {"/docs", "/benchmarks", "/examples", "/tests"} <= set(included)
+    included = project["tool"]["hatch"]["build"]["targets"]["sdist"]["only-include"]
+    assert {"docs", "benchmarks", "examples", "tests"} <= set(included)
     assert project["project"]["urls"]
 
 
