@@ -112,9 +112,12 @@ def talk_task_of(session: Session, town: Town) -> TalkTask | None:
         RolloutError: the header names an unknown family.
     """
     header = session.header
+    named = header.config.get("talk")
+    if named is None or header.seed is None:
+        return None
     with raising(RolloutError):
-        family = checked(header.config.get("talk"), TalkFamily | None, f"{session.name}: header, config.talk")
-    if family is None or header.seed is None or header.storyboard not in KINDS[family]:
+        family = checked(named, TalkFamily, f"{session.name}: header, config.talk")
+    if header.storyboard not in KINDS[family]:
         return None
     names = tuple(parse_street(name) for name in header.street_names)
     return draw_talk_task(town, names, family, header.seed)
