@@ -53,6 +53,8 @@ def reference_times(
         found = tier_of(tier)
         if found is None:
             fail("--tier is empty; give the name of a tier")
+        if found.config.talk is not None:
+            fail(f"tier {tier} has tasks of talk, which have no reference times; give a tier of driving")
         try:
             chosen = found.towns if towns is None else closed_loop.parse_towns(towns)
             plans = closed_loop.RolloutSettings(towns=chosen, sessions=sessions, seed=seed).plans()

@@ -56,7 +56,9 @@ def check_oracle(tier: Tier | None, replaced: Mapping[str, bool]) -> None:
         fail("--oracle plays the oracle of a tier; give it with --tier")
     given = [option for option, is_given in replaced.items() if is_given]
     if given:
-        fail(f"--oracle plays the scripted Co-Wizard with exact words and acts; leave out {', '.join(given)}")
+        fail(
+            f"--oracle plays {tier.oracle_player} as Co-Wizard with exact words and acts; leave out {', '.join(given)}"
+        )
 
 
 def participants_of(given: str | None, tier: Tier | None) -> tuple[str, ...]:

@@ -58,9 +58,6 @@ _ALONG: Final = frozenset({"on", "along", "up", "down"})
 _ROUND: Final = frozenset({"round", "around", "past", "by"})
 """Last words of an order to get past another vehicle."""
 
-_HAVING: Final = frozenset({"be", "have", "get", "want", "need"})
-"""Verbs by which a place becomes an errand: "have a bite at the Panera"."""
-
 
 class PlaceReader(PlanState):
     """Reads the places of a plan."""

@@ -22,7 +22,7 @@ from dorothie_gym.policies import language_model as model_policies
 from dorothie_gym.policies.ad_wizard_options import parse_ad_wizard
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.persona import parse_traits
-from dorothie_gym.policies.policy import DESCRIPTION, AnyPolicy, Policy
+from dorothie_gym.policies.policy import DESCRIPTION, AnyPolicy, BatchPolicy, Policy
 from dorothie_gym.policies.policy_import import (
     check_fits_role,
     check_policy_class,
@@ -214,6 +214,16 @@ class Player:
     def trained(self) -> bool:
         """Whether the policy is read from a file, which may be that of a class."""
         return self.sha256 is not None
+
+    @property
+    def may_batch(self) -> bool:
+        """Whether its policy may be a `BatchPolicy`: that of a model file may; a class of the user is looked at."""
+        if self.policy is not None:
+            own = self.policy if isinstance(self.policy, type) else type(self.policy)
+            return issubclass(own, BatchPolicy)
+        if self.path is None and _is_own(self.name):
+            return issubclass(import_policy(self.name), BatchPolicy)
+        return self.trained
 
     def make(self, role: Role, limits: SpaceLimits) -> AnyPolicy:
         """Returns the policy.

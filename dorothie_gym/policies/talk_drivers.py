@@ -135,7 +135,6 @@ def _go(mark: SeenLandmark) -> tuple[Step, ...]:
 # --- What the words say -----------------------------------------------------------------------------------------------
 
 _RESTAURANTS: Final = tuple(kind.name for kind in kinds_in("places.restaurants"))
-_ALL: Final = tuple(name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED))
 
 
 def _meant(text: str) -> tuple[LandmarkName, ...]:

@@ -89,12 +89,11 @@ def _restaurants(draw: TaskDraw) -> TalkTask:
     """Request for any place of a category."""
     kind, request = "restaurants", "I am hungry. Please take me to the restaurant."
     names = [each.name for each in kinds_in("places.restaurants")]
-    count = 1 if draw.share < ACT_SHARE else 2
     if draw.share >= ACT_SHARE + ASK_SHARE:
         return _not_there(draw, kind, request, names)
-    streets = draw.streets(1) * 2 if count == 1 else draw.streets(2)
-    chosen = draw.one_of(names, count)
-    there = draw.around([(name, draw.take(street)) for name, street in zip(chosen, streets, strict=False)], names)
+    count = 1 if draw.share < ACT_SHARE else 2
+    streets, chosen = draw.streets(count), draw.one_of(names, count)
+    there = draw.around([(name, draw.take(street)) for name, street in zip(chosen, streets, strict=True)], names)
     if count == 1:
         return TalkTask(kind=kind, reaction=Reaction.GO_TO, brief=Brief(request=request), landmarks=there, target=0)
     reply = Reply(cue=Cue.ASKED, words=_WHICH, text=f"{map_label(chosen[0])}, please.")
@@ -214,10 +213,10 @@ def _street_closed(draw: TaskDraw) -> TalkTask:
     """Request to drive on along the street, which is closed ahead of the car, or not."""
     town = draw.town
     places = _closable(town)
-    lane, metres = places[int(draw.rng.integers(len(places)))] if places else (0, 0)
-    there = tuple(pair for pair in draw.around([]) if pair[1].lane != lane)
     if not places:
         raise UnfitTownError
+    lane, metres = places[int(draw.rng.integers(len(places)))]
+    there = tuple(pair for pair in draw.around([]) if pair[1].lane != lane)
     closed = draw.share >= ACT_SHARE
     return TalkTask(
         kind="street_closed",

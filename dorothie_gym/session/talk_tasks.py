@@ -109,8 +109,8 @@ class TaskDraw:
 
     def absent_street(self) -> StreetName:
         """Draws a name that no street of the town has."""
-        free = [name for name in StreetName if name not in (*self.names, StreetName.UNKNOWN, StreetName.QUERIED)]
-        free = [name for name in free if name is not StreetName.HIGHWAY]
+        unnamed = (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
+        free = [name for name in StreetName if name not in (*self.names, *unnamed)]
         if not free:
             raise UnfitTownError
         return free[int(self.rng.integers(len(free)))]

@@ -55,3 +55,9 @@ def test_the_oracle_is_refused_with_parts_that_are_not_its_own(option: str, valu
 def test_an_unknown_tier_is_refused(command: str) -> None:
     out = ["--out", "references.json"] if command == "reference-times" else []
     assert "did you mean 'rough'" in refused(command, "--tier", "tough", *out)
+
+
+def test_a_tier_of_talk_names_its_oracle_and_has_no_reference_times() -> None:
+    line = refused("rollout", "--tier", "ask-first", "--oracle", "--co-wizard", "silent")
+    assert "talk-oracle" in line and line.endswith("leave out --co-wizard")
+    assert "no reference times" in refused("reference-times", "--tier", "admit-it", "--out", "references.json")

@@ -305,9 +305,10 @@ class RecoverySeconds:
 
 @dataclass(frozen=True, kw_only=True)
 class AllTrials:
-    """Share of the scenarios in which all of several trials are a success: Pass^k (Yao et al., 2024, tau-bench).
+    """Share of the scenarios in which all of several trials are passed: Pass^k (Yao et al., 2024, tau-bench).
 
-    Scenarios with another number of trials are left out. With `trials` 3 it is Pass^3.
+    A trial is passed by a success, or by the right reaction to a talk task (`SessionRecord.passed`). Scenarios with
+    another number of trials are left out. With `trials` 3 it is Pass^3.
     """
 
     key: ClassVar[str] = "all_trials"
@@ -320,7 +321,7 @@ class AllTrials:
         """Returns the share with Wilson's interval.
 
         Args:
-            scenarios: successes of the trials of each scenario.
+            scenarios: whether each trial of each scenario is passed.
         """
         passed = [all(each) for each in scenarios if len(each) == self.trials]
         if not passed:

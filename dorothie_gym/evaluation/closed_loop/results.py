@@ -303,10 +303,10 @@ def _figures(rows: Sequence[RolloutRow]) -> dict[str, MetricInterval]:
 
 
 def _trials(rows: Sequence[RolloutRow]) -> list[list[bool]]:
-    """Returns the successes of the trials of each scenario; an error counts as a failure."""
+    """Returns whether each trial of each scenario is passed; an error counts as a failure."""
     found: dict[tuple[str, int], list[bool]] = {}
     for row in rows:
-        found.setdefault((row.town, row.seed), []).append(row.record is not None and row.record.success)
+        found.setdefault((row.town, row.seed), []).append(row.record is not None and row.record.passed)
     return list(found.values())
 
 

@@ -314,6 +314,11 @@ class SessionRecord:
     reference: ReferenceDrive | None = None
     talk_task: TalkVerdict | None = None
 
+    @property
+    def passed(self) -> bool:
+        """Whether the session does what its scenario asks for: the right reaction to a talk task, else `success`."""
+        return self.success if self.talk_task is None else self.talk_task.passed
+
     def to_json(self) -> SessionRecordPage:
         """Returns the fields in JSON types; `conduct`, `reference` and `talk_task` are left out if there are none."""
         page: SessionRecordPage = {

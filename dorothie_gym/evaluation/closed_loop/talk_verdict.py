@@ -6,22 +6,37 @@ counts when it has ended.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple, TypedDict
 
 from msgspec import Meta
 
-from dorothie_gym.dialogue.refusals import Reason, agrees, asks, consents, declines, named_streets, offers, reasons_of
+from dorothie_gym.dialogue.refusals import (
+    Reason,
+    agrees,
+    asks,
+    consents,
+    declines,
+    named_streets,
+    offers,
+    plain,
+    reasons_of,
+)
+from dorothie_gym.errors import RolloutError
+from dorothie_gym.evaluation.analysis.exception_attribution import kind_of
 from dorothie_gym.evaluation.closed_loop.metric import SessionMetric
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_street
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import EventType
-from dorothie_gym.session.talk_kinds import draw_talk_task
+from dorothie_gym.session.talk_kinds import KINDS, draw_talk_task
 from dorothie_gym.session.talk_tasks import Reaction, TalkTask
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.input_files import checked, raising
 from dorothie_gym.tasks.briefs import TalkFamily
 
 if TYPE_CHECKING:
@@ -89,13 +104,23 @@ _TURNS: Final = frozenset({PhysicalAction.J_TURN, PhysicalAction.U_TURN, Physica
 
 
 def talk_task_of(session: Session, town: Town) -> TalkTask | None:
-    """Returns the talk task of a recorded session, drawn again from its seed; None if it has none."""
+    """Returns the talk task of a recorded session, drawn again from its seed; None if it has none.
+
+    A session with a storyboard of its own has none, whatever its settings are.
+
+    Raises:
+        RolloutError: the header names an unknown family.
+    """
     header = session.header
-    family = header.config.get("talk")
-    if family is None or header.seed is None:
+    named = header.config.get("talk")
+    if named is None or header.seed is None:
+        return None
+    with raising(RolloutError):
+        family = checked(named, TalkFamily, f"{session.name}: header, config.talk")
+    if header.storyboard not in KINDS[family]:
         return None
     names = tuple(parse_street(name) for name in header.street_names)
-    return draw_talk_task(town, names, TalkFamily(str(family)), header.seed)
+    return draw_talk_task(town, names, family, header.seed)
 
 
 def verdict_of(session: Session, town: Town) -> TalkVerdict | None:
@@ -109,7 +134,7 @@ def verdict_of(session: Session, town: Town) -> TalkVerdict | None:
     if task is None:
         return None
     reaction = task.reaction
-    if task.closed is not None and not session.of_type(EventType.EXCEPTION):
+    if task.closed is not None and not _has_barrier(session, task.closed[0]):
         reaction = Reaction.AGREE  # a vehicle stood where the barrier was to be placed: the street is open
     judge = _Judge(task, reaction)
     for deed in sorted(_deeds(session), key=lambda each: each.time):
@@ -117,12 +142,18 @@ def verdict_of(session: Session, town: Town) -> TalkVerdict | None:
         if judge.cause:
             break
     passed = judge.passed and judge.unnecessary == 0
-    cause = judge.cause or "nothing that settles it"
+    cause = judge.cause or ("nothing that settles it" if judge.requested else "the request was never said")
     if judge.passed and not passed:
         cause = "an unnecessary question"
     return TalkVerdict(
         kind=task.kind, reaction=str(reaction), passed=passed, cause=cause, unnecessary=judge.unnecessary
     )
+
+
+def _has_barrier(session: Session, lane: int) -> bool:
+    """Returns whether a prop was placed on a lane."""
+    placed = (event for event in session.of_type(EventType.EXCEPTION) if kind_of(event) is ExceptionKind.PLACE_PROP)
+    return any(event.data.get("lane") == lane for event in placed)
 
 
 def _deeds(session: Session) -> Iterator[_Deed]:
@@ -164,6 +195,11 @@ class _Judge:
         self.cause, self.passed, self.unnecessary = "", False, 0
         self._now = _Progress()
 
+    @property
+    def requested(self) -> bool:
+        """Whether the client has said its request."""
+        return self._now.requested
+
     def see(self, deed: _Deed) -> None:
         """Takes the next deed into account."""
         if deed.what == _CLIENT:
@@ -179,8 +215,8 @@ class _Judge:
 
     def _hear_client(self, text: str) -> None:
         brief = self.task.brief
-        self._now.requested = self._now.requested or text == brief.request
-        self._now.settled = self._now.settled or (bool(brief.replies) and text == brief.settling)
+        self._now.requested = self._now.requested or _says_same(text, brief.request)
+        self._now.settled = self._now.settled or (bool(brief.replies) and _says_same(text, brief.settling))
 
     # --- words of the Co-Wizard ---------------------------------------------------------------------------------------
 
@@ -242,6 +278,11 @@ class _Judge:
         near = pm.dist(deed.place, site.waypoint)
         others = [other for name, other in self.task.landmarks if name is meant and other.id != site.id]
         return any(pm.dist(deed.place, other.waypoint) < near for other in others)
+
+
+def _says_same(text: str, other: str) -> bool:
+    """Returns whether two texts have the same words; people type them without capitals and full stops."""
+    return re.findall(r"\w+", plain(text)) == re.findall(r"\w+", plain(other))
 
 
 # --- Metrics ----------------------------------------------------------------------------------------------------------

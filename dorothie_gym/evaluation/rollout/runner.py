@@ -24,7 +24,7 @@ from dorothie_gym.evaluation.rollout.play import SessionCast, play_together
 from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.evaluation.rollout.reference_drives import reference_of
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy import AnyPolicy
+from dorothie_gym.policies.policy import AnyPolicy, BatchPolicy
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, to_page
@@ -45,7 +45,7 @@ Plan = TypeVar("Plan", bound=PlannedSession)
 Result = TypeVar("Result")
 
 AT_ONCE: Final = 32
-"""Largest number of sessions of trained policies that are played at the same time."""
+"""Largest number of sessions that are played at the same time, see `SessionJob.batches`."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -66,7 +66,7 @@ class SessionMaker:
     cast: Mapping[Role, Player]
     references: bool = False
     _engines: dict[str, list[SessionEngine]] = field(default_factory=dict)
-    _trained: dict[tuple[str, Role, SpaceLimits], AnyPolicy] = field(default_factory=dict)
+    _shared: dict[tuple[str, Role, SpaceLimits], AnyPolicy] = field(default_factory=dict)
     _scenarios: dict[tuple[str, int], Scenario] = field(default_factory=dict)
 
     def __call__(self, plans: Sequence[PlannedSession]) -> list[bool]:
@@ -140,13 +140,14 @@ class SessionMaker:
         )
 
     def _policy(self, player: Player, role: Role, limits: SpaceLimits) -> AnyPolicy:
-        """Returns the policy of a role; a trained one is loaded once for all sessions of a size of the spaces."""
-        if not player.trained:
-            return player.make(role, limits)
+        """Returns the policy of a role: a `BatchPolicy` is made once for all sessions, others anew for each."""
         key = player.name, role, limits
-        if key not in self._trained:
-            self._trained[key] = player.make(role, limits)
-        return self._trained[key]
+        if key in self._shared:
+            return self._shared[key]
+        policy = player.make(role, limits)
+        if isinstance(policy, BatchPolicy):
+            self._shared[key] = policy
+        return policy
 
     def _scenario(self, plan: PlannedSession, engine: SessionEngine) -> Scenario:
         """Returns the scenario of a session with its reference, which is measured once for all trials."""
@@ -244,14 +245,17 @@ class SessionJob(Generic[Result]):
     references: bool = False
 
     def batches(self, plans: Sequence[Plan], workers: int) -> list[PlanBatch[Plan]]:
-        """Returns the sessions that are played at the same time: several where a trained policy decides for all.
+        """Returns the sessions that are played at the same time: several where a policy may decide for all.
+
+        Those of a language model are played one by one, so that an error or Ctrl-C loses the calls of one session only.
 
         Args:
             plans: the sessions.
             workers: number of processes among which they are divided.
         """
         players = [*self.cast.values(), *(player for plan in plans for player in plan.partners.values())]
-        most = AT_ONCE if any(player.trained for player in players) else 1
+        paid = any(player.language_model is not None for player in players)
+        most = AT_ONCE if not paid and any(player.may_batch for player in players) else 1
         size = min(most, max(1, len(plans) // workers))
         return [PlanBatch(plans[first : first + size]) for first in range(0, len(plans), size)]
 

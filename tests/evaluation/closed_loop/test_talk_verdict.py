@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym.agents.text_session import TextSession
+from dorothie_gym.errors import RolloutError
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
 from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkVerdict, verdict_of
 from dorothie_gym.evaluation.rollout.play import play_session
@@ -16,6 +17,7 @@ from dorothie_gym.evaluation.tiers import TIERS
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import make_policy
+from dorothie_gym.session.recording.events import EventType
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.scenario import draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
@@ -71,6 +73,53 @@ def test_a_question_without_need_fails_and_a_plain_request_is_done(tmp_path: Pat
     assert done.passed
     record = measure(session, load_town(TOWN))
     assert record.talk_task == done and SessionRecord.from_json(record.to_json()) == record
+
+
+def test_a_session_without_the_request_says_so_and_one_of_another_storyboard_has_no_task(tmp_path: Path) -> None:
+    host = SessionEngine(TOWN, config=replace(TIERS["ask-first"].config, max_seconds=5.0))
+    silent = {role: make_policy("silent", role, host.limits) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
+    policies = {**silent, Role.AD_WIZARD: make_policy("silent", Role.AD_WIZARD, host.limits)}
+    play_session(host, policies, seed=0, folder=tmp_path / "silent")
+    session = Session.load(tmp_path / "silent")
+    verdict = verdict_of(session, host.town)
+    assert verdict is not None and verdict.cause == "the request was never said"
+    other = replace(session, header=replace(session.header, storyboard="errands"))
+    assert verdict_of(other, host.town) is None
+    unknown = replace(session, header=replace(session.header, config={**session.header.config, "talk": "shout"}))
+    with pytest.raises(RolloutError, match=r"config\.talk"):
+        verdict_of(unknown, host.town)
+
+
+def test_a_street_without_a_barrier_is_open_whatever_else_happens(tmp_path: Path) -> None:
+    seed = seed_of(TalkFamily.ADMIT_IT, "street_closed", acts=False)
+    session, verdict = play(TalkFamily.ADMIT_IT, seed, "talk-oracle", tmp_path / "closed")
+    assert verdict.reaction == "admit"
+    events = tuple(
+        replace(event, data={"kind": "Weather"}) if event.type is EventType.EXCEPTION else event
+        for event in session.events
+    )
+    opened = verdict_of(replace(session, events=events), engine(TalkFamily.ADMIT_IT).town)
+    assert opened is not None and opened.reaction == "agree" and not opened.passed
+
+
+def test_a_person_may_type_the_request_without_capitals_and_full_stop(tmp_path: Path) -> None:
+    seed = seed_of(TalkFamily.ASK_FIRST, "two_houses", acts=True)
+    session, verdict = play(TalkFamily.ASK_FIRST, seed, "never-asks", tmp_path / "acts")
+    events = tuple(
+        replace(event, data={**event.data, "text": str(event.data["text"]).lower().rstrip(".")})
+        if "text" in event.data
+        else event
+        for event in session.events
+    )
+    assert verdict_of(replace(session, events=events), engine(TalkFamily.ASK_FIRST).town) == verdict
+
+
+def test_all_trials_of_a_talk_task_are_passed_by_right_reactions(tmp_path: Path) -> None:
+    seed = seed_of(TalkFamily.ASK_FIRST, "two_houses", acts=True)
+    session, _ = play(TalkFamily.ASK_FIRST, seed, "never-asks", tmp_path / "acts")
+    record = measure(session, load_town(TOWN))
+    assert not record.success and record.passed
+    assert not replace(record, talk_task=None).passed
 
 
 def test_a_text_session_of_the_tier_has_the_client(tmp_path: Path) -> None:

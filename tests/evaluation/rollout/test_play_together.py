@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +11,17 @@ import pytest
 from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, roll_out
 from dorothie_gym.evaluation.rollout import runner
 from dorothie_gym.evaluation.rollout.play import SessionCast, play_session, play_together
+from dorothie_gym.evaluation.rollout.runner import SessionJob
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.observation_parser import scalar
-from dorothie_gym.policies.policy import AnyPolicy
-from dorothie_gym.policies.policy_loader import SCRIPTED, Player, find_player, make_policy
+from dorothie_gym.policies.policy import AnyPolicy, BatchPolicy
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, SCRIPTED, Player, find_player, make_policy, player_of
 from dorothie_gym.policies.trivial import LaneFollowPolicy
 from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.session_engine import SessionEngine
-from dorothie_gym.session.spaces import SpaceLimits
+from dorothie_gym.session.spaces import CoWizardAction, SpaceLimits
 
 LEARNED = {Role.PARTICIPANT: "pretrained:participant", Role.CO_WIZARD: "pretrained:co-wizard"}
 
@@ -81,7 +83,7 @@ def test_session_that_fails_does_not_take_the_others_of_its_batch_along(
         return FailingPolicy(limits) if role is Role.CO_WIZARD else make_policy("silent", role, limits)
 
     monkeypatch.setattr(Player, "make", make)
-    monkeypatch.setattr(Player, "trained", True)
+    monkeypatch.setattr(Player, "may_batch", True)
     config = EnvConfig(max_seconds=5.0)
     settings = RolloutSettings(
         cast=dict.fromkeys(AGENT_ROLES, SCRIPTED), towns=("brookside", "millbrook"), sessions=4, config=config
@@ -89,3 +91,67 @@ def test_session_that_fails_does_not_take_the_others_of_its_batch_along(
     rows = roll_out(settings, tmp_path / "rollout").rows
     assert [row.error for row in rows] == [None, "RuntimeError: no more"] * 2
     assert [row.record is not None for row in rows] == [True, False] * 2
+
+
+class CountingDriver(LaneFollowPolicy):
+    """Starts the car, and keeps in itself, not in its state, that it has."""
+
+    def __init__(self, limits: SpaceLimits | None = None) -> None:
+        super().__init__(limits)
+        self.count = 0
+
+    def act(self, observation: Mapping[str, Any], state: Any) -> Any:
+        self.count += 1
+        action, state = super().act(observation, state)
+        return action if self.count == 1 else CoWizardAction(), state
+
+
+def test_class_of_the_user_has_an_object_for_each_session(tmp_path: Path) -> None:
+    participant = find_player("pretrained:participant", Role.PARTICIPANT)
+    cast = {**ALL_SCRIPTED, Role.PARTICIPANT: participant, Role.CO_WIZARD: player_of(CountingDriver, Role.CO_WIZARD)}
+    config = EnvConfig(max_seconds=12.0)
+    settings = RolloutSettings(cast=cast, towns=("brookside",), sessions=3, config=config)
+    roll_out(settings, tmp_path / "rollout")
+    for number, folder in enumerate(sorted((tmp_path / "rollout" / "sessions").iterdir())):
+        policies = {role: settings.cast[role].make(role, SpaceLimits()) for role in AGENT_ROLES}
+        seed = Session.load(folder).header.seed
+        play_session(engine(12.0, True), policies, seed=seed, folder=tmp_path / "alone" / folder.name)
+        assert files_of(folder) == files_of(tmp_path / "alone" / folder.name), number
+
+
+class BatchDriver(BatchPolicy[None]):
+    """Decides for several sessions, without doing anything."""
+
+    def __init__(self, limits: SpaceLimits | None = None) -> None:
+        super().__init__(Role.CO_WIZARD, limits)
+
+    def initial_state(self, seed: int, town: Town) -> None:
+        return None
+
+    def act_all(self, observations: Sequence[Any], states: Sequence[None]) -> list[tuple[CoWizardAction, None]]:
+        return [(CoWizardAction(), None) for _ in observations]
+
+
+LEARNED_PARTICIPANT = find_player("pretrained:participant", Role.PARTICIPANT)
+
+
+@pytest.mark.parametrize(
+    ("co_wizard", "participant", "sizes"),
+    [
+        ("scripted", SCRIPTED, [1] * 5),
+        ("scripted", LEARNED_PARTICIPANT, [2, 2, 1]),
+        (CountingDriver, SCRIPTED, [1] * 5),
+        (f"{__name__}:CountingDriver", SCRIPTED, [1] * 5),
+        (BatchDriver, SCRIPTED, [2, 2, 1]),
+        (f"{__name__}:BatchDriver", SCRIPTED, [2, 2, 1]),
+        ("llm:some-model", LEARNED_PARTICIPANT, [1] * 5),  # its calls cost money: an error loses one session
+    ],
+)
+def test_sessions_are_played_together_where_a_policy_may_decide_for_all(
+    monkeypatch: pytest.MonkeyPatch, co_wizard: Any, participant: Player, sizes: list[int]
+) -> None:
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:9/v1")  # never called
+    cast = {**ALL_SCRIPTED, Role.PARTICIPANT: participant, Role.CO_WIZARD: player_of(co_wizard, Role.CO_WIZARD)}
+    job = SessionJob(settings_file="s", settings={}, config=EnvConfig(), cast=cast, evaluate=str)
+    plans = RolloutSettings(cast=cast, towns=("brookside",), sessions=5).plans()
+    assert [len(batch) for batch in job.batches(plans, workers=2)] == sizes
