@@ -179,7 +179,7 @@ def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[n
     for k in range(len(rows)):
         vehicle = vehicles[rows[k]]
         vehicle.x, vehicle.y, vehicle.heading, vehicle.speed = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
-        vehicle.cos, vehicle.sin = pm.cos(vehicle.heading), pm.sin(vehicle.heading)
+        vehicle.sin, vehicle.cos = pm.sincos(vehicle.heading)
         update_lane(town, vehicle)
         intact = intact and not vehicle.crashed
     _meet(town, world, dt, intact)

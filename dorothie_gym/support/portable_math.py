@@ -39,6 +39,7 @@ __all__ = [
     "log10",
     "power",
     "sin",
+    "sincos",
     "tan",
 ]
 
@@ -106,17 +107,36 @@ def _cosine_near_zero(x: float, rest: float) -> float:
 
 
 @portable
-def _wave(x: float, quarters: float) -> float:
-    """Returns sin(x + quarters pi / 2)."""
+def _reduce(x: float) -> tuple[float, float, float]:
+    """Returns the nearest number of quarter turns of an angle [rad], and the rest in two parts, the larger first."""
     if not abs(x) <= LARGEST_ANGLE:
-        if x - x != 0.0:
-            return math.nan
-        x %= _TWO_PI
+        x = math.nan if x - x != 0.0 else x % _TWO_PI
     turns = (x * _QUARTERS_PER_RADIAN + _ROUND) - _ROUND
     near = (x - turns * _QUARTER_1) - turns * _QUARTER_2  # a double, with `rest`
     rest = ((x - turns * _QUARTER_1) - near) - turns * _QUARTER_2
     reduced = near - turns * _QUARTER_3
-    rest += (near - reduced) - turns * _QUARTER_3
+    return turns, reduced, rest + ((near - reduced) - turns * _QUARTER_3)
+
+
+@portable
+def sincos(x: float) -> tuple[float, float]:
+    """Returns the sine and the cosine of an angle [rad], equal to those of `sin` and `cos`."""
+    turns, reduced, rest = _reduce(x)
+    if turns != turns:
+        return math.nan, math.nan
+    quadrant = int(turns) & 3
+    sine, cosine = _sine_near_zero(reduced, rest), _cosine_near_zero(reduced, rest)
+    if quadrant & 1:
+        sine, cosine = cosine, -sine
+    return (-sine, -cosine) if quadrant & 2 else (sine, cosine)
+
+
+@portable
+def _wave(x: float, quarters: float) -> float:
+    """Returns sin(x + quarters pi / 2)."""
+    turns, reduced, rest = _reduce(x)
+    if turns != turns:
+        return math.nan
     quadrant = int(turns + quarters) & 3
     value = _cosine_near_zero(reduced, rest) if quadrant & 1 else _sine_near_zero(reduced, rest)
     return -value if quadrant & 2 else value
@@ -137,7 +157,8 @@ def cos(x: float) -> float:
 @portable
 def tan(x: float) -> float:
     """Returns the tangent of an angle [rad], within 3 units in the last place."""
-    return _wave(x, 0) / _wave(x, 1)
+    sine, cosine = sincos(x)
+    return sine / cosine
 
 
 @portable

@@ -43,6 +43,18 @@ def test_directions_and_lengths_agree_with_the_c_library() -> None:
         assert pm.dist((x, y, 1.0), (0.0, 0.0, 1.0)) == pm.hypot(x, y)
 
 
+@compiled
+def _together(x: float) -> tuple[float, float]:
+    return pm.sincos(x)
+
+
+def test_sine_and_cosine_together_equal_those_alone() -> None:
+    for x in (*ANGLES.tolist(), 0.0, -0.0, 3e7, -3e7, math.inf, -math.inf, math.nan):
+        alone = (pm.sin(x), pm.cos(x))
+        assert repr(pm.sincos(x)) == repr(alone), x
+        assert repr(tuple(float(each) for each in _together(x))) == repr(alone), x
+
+
 def test_signed_zeros_and_infinities_have_the_directions_of_the_standard() -> None:
     edges = (0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan)
     for y in edges:

@@ -233,7 +233,7 @@ def put_on_lane(town: TownArrays, vehicle: VehicleRecord, number: int, station: 
     heading = value_near(points, lane, lane.first, 3, station)
     vehicle.lane = number
     keep_side(town, vehicle, lane)
-    vehicle.cos, vehicle.sin = pm.cos(heading), pm.sin(heading)
+    vehicle.sin, vehicle.cos = pm.sincos(heading)
     vehicle.x = value_near(points, lane, lane.first, 0, station) - vehicle.to_right * vehicle.sin
     vehicle.y = value_near(points, lane, lane.first, 1, station) + vehicle.to_right * vehicle.cos
     vehicle.height = value_near(points, lane, lane.first, 4, station)

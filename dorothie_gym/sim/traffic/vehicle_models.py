@@ -260,7 +260,7 @@ def move(vehicle: VehicleRecord, dt: float) -> None:
         vehicle.x += speed * (vehicle.cos * straight - vehicle.sin * slip) * dt
         vehicle.y += speed * (vehicle.sin * straight + vehicle.cos * slip) * dt
         vehicle.heading += speed * slip / (vehicle.length / 2.0) * dt
-        vehicle.cos, vehicle.sin = pm.cos(vehicle.heading), pm.sin(vehicle.heading)
+        vehicle.sin, vehicle.cos = pm.sincos(vehicle.heading)
         vehicle.odometer += abs(speed) * dt
     vehicle.speed = speed + acceleration * dt
 
