@@ -107,20 +107,41 @@ def play_together(casts: Sequence[SessionCast]) -> list[SessionSummary]:
         OutputFolderError: a folder was deleted during the session.
         OSError: a folder cannot be written.
     """
+    summaries = dict(play_as_they_end(casts))
+    return [summaries[number] for number in range(len(casts))]
+
+
+def play_as_they_end(casts: Sequence[SessionCast]) -> Iterator[tuple[int, SessionSummary]]:
+    """Plays several sessions at the same time, as `play_together`, and yields each when it ends.
+
+    Args:
+        casts: the sessions, each with a host of its own.
+
+    Yields:
+        Index of a session in `casts`, and its summary; its files are complete.
+
+    Raises:
+        ValueError: a role has no policy.
+        SessionError: a folder holds a session already.
+        OutputFolderError: a folder was deleted during the session.
+        OSError: a folder cannot be written.
+    """
     if len(casts) == 1:
-        return [_play_alone(casts[0])]
+        yield 0, _play_alone(casts[0])
+        return
     with ExitStack() as stack:
-        plays = [stack.enter_context(_Play.begin(cast)) for cast in casts]
+        files = [stack.enter_context(ExitStack()) for _ in casts]
+        plays = [own.enter_context(_Play.begin(cast)) for own, cast in zip(files, casts, strict=True)]
         players = BatchPlayers([play.policies for play in plays])
         playing = {number: (play.engine, play.states) for number, play in enumerate(plays)}
-        summaries: dict[int, SessionSummary] = {}
         while playing:
             for number, actions in players.decide(playing).items():
                 plays[number].step(actions)
                 if plays[number].engine.over:
-                    summaries[number] = plays[number].finish()
+                    summary = plays[number].finish()
+                    files[number].close()
                     del playing[number]
-    return [summaries[number] for number in range(len(plays))]
+                    yield number, summary
 
 
 def _play_alone(cast: SessionCast, on_step: Callable[[SessionEngine], None] | None = None) -> SessionSummary:

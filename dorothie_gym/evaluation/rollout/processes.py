@@ -12,11 +12,12 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from dorothie_gym.errors import EndpointError, ProcessError
 from dorothie_gym.support.interruption import starting_process
@@ -42,11 +43,29 @@ def run_tasks(
         ProcessError: a task failed in another process, or its process died.
         OSError: a file cannot be read or written.
     """
+    yield from run_series(_OneResult(prepare), tasks, workers=workers)
+
+
+def run_series(
+    prepare: Callable[[], Callable[[Task], Iterable[Result]]], tasks: Iterable[Task], *, workers: int
+) -> Iterator[Result]:
+    """Runs tasks with several results each, as `run_tasks`, and yields each result as soon as its task has it.
+
+    Args:
+        prepare: called once in each process; returns the function that runs a task. It must be picklable.
+        tasks: tasks to run.
+        workers: number of processes; 1 runs the tasks in the calling process.
+
+    Raises:
+        EndpointError: the endpoint of a language model rejects the calls of a task.
+        ProcessError: a task failed in another process, or its process died.
+        OSError: a file cannot be read or written.
+    """
     waiting = list(reversed(list(tasks)))
     if workers == 1:
         work = prepare()
         while waiting:
-            yield work(waiting.pop())
+            yield from work(waiting.pop())
         return
     pool: list[_Worker[Task, Result]] = []
     try:
@@ -58,25 +77,37 @@ def run_tasks(
         while busy:
             for connection in [found for found in wait(list(busy)) if isinstance(found, Connection)]:
                 worker = busy[connection]
-                result = worker.result()
-                if waiting:
+                results = worker.results()
+                if results:
+                    yield from results
+                elif waiting:
                     worker.submit(waiting.pop())
                 else:
                     del busy[connection]
-                yield result
     finally:
         for worker in pool:
             worker.kill()
+
+
+@dataclass(frozen=True)
+class _OneResult(Generic[Task, Result]):
+    """Makes a function with one result into one with a series of results."""
+
+    prepare: Callable[[], Callable[[Task], Result]]
+
+    def __call__(self) -> Callable[[Task], tuple[Result]]:
+        work = self.prepare()
+        return lambda task: (work(task),)
 
 
 class _Worker(Generic[Task, Result]):
     """Process that runs one task after another.
 
     Attributes:
-        connection: readable when the task is done or the process is dead.
+        connection: readable when the task has a result or is done, or the process is dead.
     """
 
-    def __init__(self, prepare: Callable[[], Callable[[Task], Result]]) -> None:
+    def __init__(self, prepare: Callable[[], Callable[[Task], Iterable[Result]]]) -> None:
         context = get_context("spawn")  # a fork would copy the threads and locks of the caller
         self.connection, theirs = context.Pipe()
         self._process: BaseProcess = context.Process(target=_serve, args=(theirs, prepare), daemon=True)
@@ -91,17 +122,18 @@ class _Worker(Generic[Task, Result]):
         except BrokenPipeError:
             self._raise_death()
 
-    def result(self) -> Result:
+    def results(self) -> Sequence[Result]:
+        """Returns the next result of the task; none if the task is done."""
         try:
-            done, result = self.connection.recv()
+            message, result = self.connection.recv()
         except (EOFError, ConnectionResetError):
             self._raise_death()
-        if not done:
+        if message == _FAILED:
             if isinstance(result, OSError | EndpointError):
                 raise result
             raise ProcessError(f"{self._task}: {result}")
         found: Result = result
-        return found
+        return (found,) if message == _RESULT else ()
 
     def kill(self) -> None:
         self._process.kill()
@@ -113,29 +145,38 @@ class _Worker(Generic[Task, Result]):
         raise ProcessError(f"{self._task}: the worker process died with code {self._process.exitcode}")
 
 
-def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result]]) -> None:
+_RESULT: Final = "result"
+_DONE: Final = "done"
+_FAILED: Final = "failed"
+
+
+def _serve(connection: Connection, prepare: Callable[[], Callable[[Any], Iterable[Any]]]) -> None:
     """Runs the tasks of a connection until it is closed; the main function of a worker process."""
     exit_with_parent()
-    work: Callable[[Task], Result] | None = None
+    work: Callable[[Any], Iterable[Any]] | None = None
     while True:
         try:
             task = connection.recv()
         except (EOFError, ConnectionResetError):
             return
-        answer: tuple[bool, Result | str | OSError | EndpointError]
         try:
             work = work or prepare()
-            answer = True, work(task)
+            for result in work(task):
+                connection.send((_RESULT, result))
+            connection.send((_DONE, None))
         except EndpointError as error:
-            answer = False, error
+            connection.send((_FAILED, error))
         except Exception as error:  # any error is reported to the caller
-            if isinstance(error, OSError) and error.filename is not None:
-                answer = False, OSError(error.errno, error.strerror, str(error.filename))
-            else:
-                where = traceback.extract_tb(error.__traceback__)[-1]
-                place = f"{os.path.basename(where.filename)}, line {where.lineno}"
-                answer = False, f"{type(error).__name__}: {error} ({place})"
-        connection.send(answer)
+            connection.send((_FAILED, _portable(error)))
+
+
+def _portable(error: Exception) -> str | OSError:
+    """Returns an error in a form that travels through a pipe: one of the files as it is, others as text."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return OSError(error.errno, error.strerror, str(error.filename))
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{os.path.basename(where.filename)}, line {where.lineno}"
+    return f"{type(error).__name__}: {error} ({place})"
 
 
 # --- One process ------------------------------------------------------------------------------------------------------

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Final, Generic, TypeVar
 from dorothie_gym.errors import EndpointError, InputFileError, OutputFolderError, ProcessError, SessionError
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
-from dorothie_gym.evaluation.rollout.play import SessionCast, play_together
-from dorothie_gym.evaluation.rollout.processes import run_tasks
+from dorothie_gym.evaluation.rollout.play import SessionCast, play_as_they_end
+from dorothie_gym.evaluation.rollout.processes import run_series
 from dorothie_gym.evaluation.rollout.reference_drives import reference_of
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, BatchPolicy
@@ -69,35 +69,39 @@ class SessionMaker:
     _shared: dict[tuple[str, Role, SpaceLimits], AnyPolicy] = field(default_factory=dict)
     _scenarios: dict[tuple[str, int], Scenario] = field(default_factory=dict)
 
-    def __call__(self, plans: Sequence[PlannedSession]) -> list[bool]:
-        """Plays sessions at the same time, unless their folders are finished.
+    def play(self, plans: Sequence[Plan]) -> Iterator[tuple[Plan, bool]]:
+        """Plays sessions at the same time, unless their folders are finished; each is in its folder when it is yielded.
 
         Args:
             plans: the sessions.
 
-        Returns:
-            Whether each session is new.
+        Yields:
+            A session, and whether it is new: first those found finished, then the others as they end.
 
         Raises:
             SessionError: a folder contains other files.
             OSError: a folder cannot be written, or was deleted.
             ValueError: a policy cannot be made, or its action is malformed; policies may raise other errors.
         """
-        new = [plan for plan in plans if not self._is_finished(plan)]
+        new = []
+        for plan in plans:
+            if self._is_finished(plan):
+                yield plan, False
+            else:
+                new.append(plan)
         seats: Counter[str] = Counter()
         casts = []
         for plan in new:
             casts.append(self._cast(plan, self._engine(plan.town, seats[plan.town])))
             seats[plan.town] += 1
         try:
-            play_together(casts)
+            for number, _ in play_as_they_end(casts):
+                self._publish(new[number])
+                yield new[number], True
         except Exception:
             for plan in new:
                 shutil.rmtree(self._part(plan), ignore_errors=True)  # a session may be played again by itself
             raise
-        for plan in new:
-            self._publish(plan)
-        return [plan in new for plan in plans]
 
     def _is_finished(self, plan: PlannedSession) -> bool:
         """Returns whether a session is in its folder; raises `SessionError` if another one or other files are."""
@@ -302,8 +306,7 @@ def run_sessions(
         if ray is not None:
             yield from run_on_ray(prepare, plans, root, address=ray)
             return
-        for outcomes in run_tasks(partial(_BatchTask, root, prepare), job.batches(plans, workers), workers=workers):
-            yield from outcomes
+        yield from run_series(partial(_BatchTask, root, prepare), job.batches(plans, workers), workers=workers)
 
     def outcomes() -> Generator[SessionOutcome[Plan, Result], None, None]:
         nonlocal spent
@@ -331,7 +334,7 @@ class _SessionTask(Generic[Result]):
     def __call__(self, plan: Plan) -> SessionOutcome[Plan, Result]:
         begun = time.process_time()
         try:
-            (played,) = self._maker([plan])
+            ((_, played),) = self._maker.play([plan])
         except _ERRORS_OF_RUN:
             raise
         except Exception as error:
@@ -341,18 +344,24 @@ class _SessionTask(Generic[Result]):
             return SessionOutcome(plan=plan, error=text, played=True, cpu_seconds=time.process_time() - begun)
         return self._outcome(plan, played, time.process_time() - begun)
 
-    def together(self, plans: Sequence[Plan]) -> list[SessionOutcome[Plan, Result]]:
-        """Plays sessions at the same time; where one of them fails, they are played one by one."""
-        begun = time.process_time()
-        try:
-            played = self._maker(plans)
-        except _ERRORS_OF_RUN:
-            raise
-        except Exception:
-            _LOG.debug("one of %d sessions failed; they are played one by one", len(plans), exc_info=True)
-            return [self(plan) for plan in plans]
-        seconds = (time.process_time() - begun) / len(plans)
-        return [self._outcome(plan, new, seconds) for plan, new in zip(plans, played, strict=True)]
+    def together(self, plans: Sequence[Plan]) -> Iterator[SessionOutcome[Plan, Result]]:
+        """Plays sessions at the same time; where one of them fails, those that have not ended are played one by one.
+
+        The processor time of a session is that since the one that ended before it.
+        """
+        left, begun, sessions = list(plans), time.process_time(), self._maker.play(plans)
+        while left:
+            try:
+                plan, new = next(sessions)
+            except _ERRORS_OF_RUN:
+                raise
+            except Exception:
+                _LOG.debug("one of %d sessions failed; they are played one by one", len(left), exc_info=True)
+                yield from map(self, left)
+                return
+            left.remove(plan)
+            yield self._outcome(plan, new, time.process_time() - begun)
+            begun = time.process_time()
 
     def _outcome(self, plan: Plan, played: bool, seconds: float) -> SessionOutcome[Plan, Result]:
         """Evaluates a finished session; playing it took a processor time [s], if it is new."""
@@ -370,8 +379,8 @@ class _BatchTask(Generic[Result]):
     def __init__(self, root: Path, prepare: Callable[[Path], _SessionTask[Result]]) -> None:
         self._task = prepare(root)
 
-    def __call__(self, plans: PlanBatch[Plan]) -> list[SessionOutcome[Plan, Result]]:
-        return [self._task(plans[0])] if len(plans) == 1 else self._task.together(plans)
+    def __call__(self, plans: PlanBatch[Plan]) -> Iterator[SessionOutcome[Plan, Result]]:
+        return iter((self._task(plans[0]),)) if len(plans) == 1 else self._task.together(plans)
 
 
 class PlanBatch(tuple[Plan, ...]):

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, roll_out
+from dorothie_gym.evaluation.closed_loop.running import RolloutPlan, RolloutSettings, roll_out
 from dorothie_gym.evaluation.rollout import runner
-from dorothie_gym.evaluation.rollout.play import SessionCast, play_session, play_together
-from dorothie_gym.evaluation.rollout.runner import SessionJob
+from dorothie_gym.evaluation.rollout.play import SessionCast, play_as_they_end, play_session, play_together
+from dorothie_gym.evaluation.rollout.runner import SessionJob, run_sessions
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.observation_parser import scalar
@@ -19,7 +19,8 @@ from dorothie_gym.policies.policy import AnyPolicy, BatchPolicy
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, SCRIPTED, Player, find_player, make_policy, player_of
 from dorothie_gym.policies.trivial import LaneFollowPolicy
 from dorothie_gym.session.config import EnvConfig
-from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.recording.files import SessionState
+from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import CoWizardAction, SpaceLimits
 
@@ -47,6 +48,51 @@ def test_sessions_of_learned_roles_equal_those_played_alone(tmp_path: Path, obse
     summaries = play_together(casts)
     assert files_of(tmp_path / "together") == files_of(tmp_path / "alone")
     assert [summary["seconds"] for summary in summaries] == [25.0, 40.0, 40.0]
+
+
+def test_session_is_complete_when_it_ends_though_others_go_on(tmp_path: Path) -> None:
+    engines = [engine(seconds, True) for seconds in (12.0, 6.0)]
+    policies = {role: make_policy("silent", role, engines[0].limits) for role in AGENT_ROLES}
+    casts = [
+        SessionCast(host=own, policies=policies, seed=number, folder=tmp_path / str(number))
+        for number, own in enumerate(engines)
+    ]
+    ended = play_as_they_end(casts)
+    number, summary = next(ended)
+    assert (number, summary["seconds"]) == (1, 6.0)
+    assert [session_state(tmp_path / str(each)) for each in (0, 1)] == [
+        SessionState.PARTIAL,
+        SessionState.FINISHED,
+    ]
+    assert [number for number, _ in ended] == [0]
+
+
+def test_run_that_is_left_early_keeps_the_sessions_that_have_ended(tmp_path: Path) -> None:
+    cast = {**ALL_SCRIPTED, Role.CO_WIZARD: find_player("pretrained:co-wizard", Role.CO_WIZARD)}
+    job = SessionJob(
+        settings_file="settings.json",
+        settings={},
+        config=EnvConfig(max_seconds=4.0),
+        cast=cast,
+        evaluate=lambda played: played.session.header.seed,
+    )
+    plans = [RolloutPlan(number=seed, town="brookside", seed=seed) for seed in range(3)]
+    reports: list[tuple[int, int]] = []
+
+    def note(finished: int, planned: int) -> None:
+        reports.append((finished, planned))
+
+    with run_sessions(job, plans, tmp_path, on_session=note) as outcomes:
+        first = next(outcomes)
+        second = next(outcomes)
+    assert [first.success, second.success] == [first.plan.seed, second.plan.seed]
+    kept = [session_state(tmp_path / plan.path) is SessionState.FINISHED for plan in plans]
+    assert kept == [plan in (first.plan, second.plan) for plan in plans]
+    assert reports == [(0, 3), (1, 3)]
+    with run_sessions(job, plans, tmp_path) as outcomes:
+        assert sorted((each.plan.seed, each.played) for each in outcomes) == [
+            (plan.seed, plan not in (first.plan, second.plan)) for plan in plans
+        ]
 
 
 def test_rollout_of_a_learned_role_does_not_depend_on_the_number_at_once(

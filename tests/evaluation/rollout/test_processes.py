@@ -6,7 +6,7 @@ import pytest
 
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation.rollout import plan_corpus
-from dorothie_gym.evaluation.rollout.processes import run_tasks
+from dorothie_gym.evaluation.rollout.processes import run_series, run_tasks
 from tests.evaluation.rollout import workshop
 
 
@@ -43,3 +43,12 @@ def test_file_that_cannot_be_written_is_an_error_of_the_system_in_every_process(
     with pytest.raises(IsADirectoryError) as caught:
         list(run_tasks(workshop.writing, [str(tmp_path)] * 2, workers=workers))
     assert caught.value.filename == str(tmp_path)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_results_of_a_task_arrive_before_it_ends(workers: int) -> None:
+    assert sorted(run_series(workshop.counting_up, [1, 0, 2], workers=workers)) == [0, 0, 1]
+    found: list[int] = []
+    with pytest.raises(ProcessError if workers > 1 else ValueError, match="three is too much"):
+        found.extend(run_series(workshop.counting_up, [3], workers=workers))
+    assert found == [0, 1, 2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 
@@ -17,6 +17,15 @@ def refusing() -> Callable[[int], int]:
         if number == 3:
             raise ValueError("three is too much")
         return number
+
+    return work
+
+
+def counting_up() -> Callable[[int], Iterator[int]]:
+    def work(number: int) -> Iterator[int]:
+        yield from range(number)
+        if number == 3:
+            raise ValueError("three is too much")
 
     return work
 
