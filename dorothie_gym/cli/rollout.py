@@ -48,6 +48,7 @@ from dorothie_gym.cli.output import (
     session_progress,
     wide_stdout,
 )
+from dorothie_gym.cli.seal import BeaconDate, BeaconText, SealFile, beacon_of, read_seal
 from dorothie_gym.cli.tier_options import TierName, check_oracle, find_pool, participants_of, tier_config, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
@@ -83,7 +84,12 @@ def rollout(
         ),
     ] = None,
     workers: Players = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, for any policies.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(min=0, show_default="0", help="Seed of the scenarios, for any policies.")
+    ] = None,
+    beacon: BeaconText = None,
+    beacon_date: BeaconDate = None,
+    seal: SealFile = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for sessions and result; a started rollout is resumed."),
@@ -129,6 +135,7 @@ def rollout(
                 "--perception": perception is not PerceptionModel.SYMBOLIC,
             }
             check_oracle(found, replaced)
+        drawn = beacon_of(beacon, beacon_date, found, {"--towns": towns is not None, "--seed": seed is not None})
         usual = tier_config(found, oracle=oracle)
         config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures, usual=usual)
         pool = participants_of(participant, found)
@@ -139,15 +146,17 @@ def rollout(
         try:
             settings = closed_loop.RolloutSettings(
                 cast=cast,
-                towns=_towns(towns, found),
+                towns=_towns(towns, found) if drawn is None else drawn.towns,
                 sessions=sessions,
-                seed=seed,
+                seed=(seed or 0) if drawn is None else drawn.seed,
                 config=config,
                 pool=find_pool(pool, cast[Role.PARTICIPANT], asked),
                 trials=trials,
                 tier=tier,
                 oracle=oracle,
                 references=config.talk is None and (found is not None or trials > 1),
+                beacon=drawn,
+                seal=read_seal(seal, beacon=drawn, oracle=oracle),
             )
         except ValueError as error:
             fail(str(error))

@@ -53,8 +53,9 @@ def submit(
 ) -> None:
     """Check a rollout for the leaderboard, and write its submission with hashes; exit code 1 if there are faults.
 
-    Towns, seeds and settings must be those of the leaderboard. Every session is drawn and played again from its seed
-    by the scripted partners, with the recorded actions of the Co-Wizard, or by its policy if the package has it.
+    Towns, seeds and settings must be those of the leaderboard, of a tier, or of the beacon of a sealed test, whose seal
+    must be older. Every session is drawn and played again from its seed by the partners of these conditions, with the
+    recorded actions of the Co-Wizard, or by its policy if the package has it.
     What nothing can check is listed as claimed.
     """
     if sample != ALL and not (sample.isdecimal() and 1 <= int(sample) <= 10**6):
@@ -90,7 +91,7 @@ def submit(
 
 
 def _check(folder: Path, sample: int | None, seed: int | None, workers: int | None, *, quiet: bool) -> SubmissionCheck:
-    from dorothie_gym.evaluation.closed_loop import submission
+    from dorothie_gym.evaluation.closed_loop import protocol, submission
 
     try:
         compile_first(pictures=False)
@@ -99,7 +100,7 @@ def _check(folder: Path, sample: int | None, seed: int | None, workers: int | No
                 folder,
                 sample=sample,
                 seed=seed,
-                protocol=submission.PROTOCOL,
+                protocol=protocol.PROTOCOL,
                 workers=workers or available_processors(),
                 on_session=on_session,
             )

@@ -75,6 +75,13 @@ def reference_of(town: Town, scenario: Scenario) -> ReferenceDrive:
     return measure_drive(town, scenario) if stored is None else stored
 
 
+def scenario_with_reference(engine: SessionEngine, seed: int) -> Scenario:
+    """Returns the scenario that an engine draws from a seed, with its reference (`reference_of`)."""
+    town = engine.town_of(seed)
+    drawn = draw_scenario(town, engine.template, seed, engine.config.stops, engine.config.talk)
+    return replace(drawn, reference=reference_of(town, drawn))
+
+
 def measure_drive(town: Town, scenario: Scenario) -> ReferenceDrive:
     """Plays the reference drive of a scenario; see `reference_of`."""
     engine = SessionEngine(town, config=REFERENCE_CONFIG)
