@@ -19,6 +19,7 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
+from dorothie_gym.cli.tier_options import References, read_references
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.session import recording
@@ -27,6 +28,7 @@ from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop.submission import SubmissionCheck
+    from dorothie_gym.session.scenario import ReferenceDrive
 
 
 FAULTY = 1
@@ -48,6 +50,7 @@ def submit(
         Path | None,
         typer.Option(metavar="FILE.json", help="Compare this submission with the folder instead of writing one."),
     ] = None,
+    references: References = None,
     workers: Players = None,
     as_json: AsJson = False,
 ) -> None:
@@ -65,7 +68,8 @@ def submit(
     with reporting_errors():
         from dorothie_gym.evaluation.closed_loop import submission
 
-        found = _check(folder, None if sample == ALL else int(sample), seed, workers, quiet=as_json)
+        drives = read_references(references)
+        found = _check(folder, None if sample == ALL else int(sample), seed, workers, drives, quiet=as_json)
         faults = found.faults
         if found.submission is not None and check is not None:
             faults = submission.differences_from(check, found.submission)
@@ -90,7 +94,15 @@ def submit(
         raise typer.Exit(FAULTY)
 
 
-def _check(folder: Path, sample: int | None, seed: int | None, workers: int | None, *, quiet: bool) -> SubmissionCheck:
+def _check(
+    folder: Path,
+    sample: int | None,
+    seed: int | None,
+    workers: int | None,
+    drives: dict[str, ReferenceDrive],
+    *,
+    quiet: bool,
+) -> SubmissionCheck:
     from dorothie_gym.evaluation.closed_loop import protocol, submission
 
     try:
@@ -103,6 +115,7 @@ def _check(folder: Path, sample: int | None, seed: int | None, workers: int | No
                 protocol=protocol.PROTOCOL,
                 workers=workers or available_processors(),
                 on_session=on_session,
+                drives=drives,
             )
     except KeyboardInterrupt:
         exit_interrupted("Interrupted; nothing was written.")

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, AnyPlayer, Player,
 from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recording.files import safe_name, to_page
 from dorothie_gym.support.files import write_atomically
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.scenario import ReferenceDrive
 
 SESSIONS_FOLDER: Final = "sessions"
 """Folder of the sessions within the folder of a rollout, for replay."""
@@ -329,6 +332,7 @@ def roll_out(
     workers: int = 1,
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
+    drives: Mapping[str, ReferenceDrive] | None = None,
 ) -> RolloutResult:
     """Plays the sessions of a rollout, measures them, and writes the result into the folder.
 
@@ -342,6 +346,7 @@ def roll_out(
         workers: number of processes; more than one needs an importable main module of the caller.
         ray: address of a Ray cluster that replaces the workers; see `dorothie_gym.evaluation.rollout.on_ray`.
         on_session: called with the numbers of finished and of planned sessions, first with 0 and after each session.
+        drives: references that were measured before, by `reference_drives.drive_key`; others are measured now.
 
     Raises:
         ValueError: there are no workers.
@@ -362,6 +367,7 @@ def roll_out(
         writes_cost=True,
         references=settings.references,
         extra=settings.header_extra,
+        drives=drives or {},
     )
     with run_sessions(job, settings.plans(), root, workers=workers, ray=ray, on_session=on_session) as outcomes:
         try:

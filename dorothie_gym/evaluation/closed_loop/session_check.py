@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
     from dorothie_gym.policies.policy_loader import Player
     from dorothie_gym.session.recording.header import SessionHeader
-    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.session.scenario import ReferenceDrive, Scenario
 
 _FILES: Final = frozenset({HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE})
 """Files of every session of a rollout."""
@@ -92,11 +92,18 @@ class SessionChecker:
         root: folder of the rollout.
         settings: settings of the protocol.
         cast: players that are played again, beside those of the pool. The other roles take their recorded actions.
+        drives: references that the receiver has measured, by `reference_drives.drive_key`; others are measured now.
     """
 
-    def __init__(self, root: Path, settings: RolloutSettings, cast: Mapping[Role, Player]) -> None:
+    def __init__(
+        self,
+        root: Path,
+        settings: RolloutSettings,
+        cast: Mapping[Role, Player],
+        drives: Mapping[str, ReferenceDrive],
+    ) -> None:
         self._root, self._config, self._cast = root, settings.config, dict(cast)
-        self._references, self._extra = settings.references, settings.header_extra
+        self._references, self._extra, self._drives = settings.references, settings.header_extra, drives
         self._engines: dict[str, SessionEngine] = {}
         self._policies: dict[tuple[str, Role, str], AnyPolicy] = {}
         self._scenarios: dict[tuple[str, int], Scenario] = {}
@@ -195,7 +202,7 @@ class SessionChecker:
             return None
         key = plan.town, plan.seed
         if key not in self._scenarios:
-            self._scenarios[key] = scenario_with_reference(self._engine(plan.town), plan.seed)
+            self._scenarios[key] = scenario_with_reference(self._engine(plan.town), plan.seed, self._drives)
         return self._scenarios[key]
 
     def _check_header(self, plan: RolloutPlan, session: Session) -> None:

@@ -42,6 +42,7 @@ from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.policy_loader import Player
+    from dorothie_gym.session.scenario import ReferenceDrive
     from dorothie_gym.support.files import JsonValue
 
 FORMAT: Final = "dorothie_gym-submission"
@@ -88,6 +89,7 @@ def check_submission(
     protocol: LeaderboardProtocol = PROTOCOL,
     workers: int = 1,
     on_session: Callable[[int, int], None] | None = None,
+    drives: Mapping[str, ReferenceDrive] | None = None,
 ) -> SubmissionCheck:
     """Checks the folder of a rollout, and makes its submission.
 
@@ -100,6 +102,7 @@ def check_submission(
         workers: number of processes; more than one needs an importable main module of the caller.
         on_session: called with the numbers of checks done and planned: one for each session, and one more for each
             of a sample.
+        drives: references that the receiver has measured, by `reference_drives.drive_key`; others are measured now.
 
     Raises:
         RolloutError: there is no rollout, its files are damaged, or `sample` is below 1.
@@ -118,7 +121,8 @@ def check_submission(
         return SubmissionCheck(faults=tuple(faults), submission=None, resimulated=(), sessions=protocol.sessions)
     wanted = protocol.settings(settings)
     plans, cast = wanted.plans(), _cast(settings, wanted)
-    check = _SessionsCheck(partial(SessionChecker, root, wanted, cast), result, plans, workers, on_session)
+    prepare = partial(SessionChecker, root, wanted, cast, drives or {})
+    check = _SessionsCheck(prepare, result, plans, workers, on_session)
     faults += _missing_and_surplus(root, result, plans)
     drawn_by = None
     if sample is None or sample >= len(plans):

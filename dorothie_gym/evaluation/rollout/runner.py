@@ -29,7 +29,7 @@ from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, to_page
 from dorothie_gym.session.recording.session import Session, session_state
-from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.scenario import ReferenceDrive, Scenario
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.files import write_atomically
@@ -60,6 +60,7 @@ class SessionMaker:
         cast: player of each role.
         references: whether scenarios get their reference drives (`reference_drives`).
         extra: further fields of `SessionHeader.extra`.
+        drives: references that were measured before, by `reference_drives.drive_key`.
     """
 
     root: Path
@@ -67,6 +68,7 @@ class SessionMaker:
     cast: Mapping[Role, Player]
     references: bool = False
     extra: Mapping[str, object] = field(default_factory=dict)
+    drives: Mapping[str, ReferenceDrive] = field(default_factory=dict)
     _engines: dict[str, list[SessionEngine]] = field(default_factory=dict)
     _shared: dict[tuple[str, Role, SpaceLimits], AnyPolicy] = field(default_factory=dict)
     _scenarios: dict[tuple[str, int], Scenario] = field(default_factory=dict)
@@ -156,7 +158,7 @@ class SessionMaker:
         """Returns the scenario of a session with its reference, which is measured once for all trials."""
         key = plan.town, plan.seed
         if key not in self._scenarios:
-            self._scenarios[key] = scenario_with_reference(engine, plan.seed)
+            self._scenarios[key] = scenario_with_reference(engine, plan.seed, self.drives)
         return self._scenarios[key]
 
     def engine(self, town: str) -> SessionEngine:
@@ -235,6 +237,7 @@ class SessionJob(Generic[Result]):
         writes_cost: whether time and workers are added up in `COST_FILE`.
         references: whether scenarios get their reference drives.
         extra: further fields of `SessionHeader.extra`.
+        drives: references that were measured before, by `reference_drives.drive_key`.
     """
 
     settings_file: str
@@ -246,6 +249,7 @@ class SessionJob(Generic[Result]):
     writes_cost: bool = False
     references: bool = False
     extra: Mapping[str, object] = field(default_factory=dict)
+    drives: Mapping[str, ReferenceDrive] = field(default_factory=dict)
 
     def batches(self, plans: Sequence[Plan], workers: int) -> list[PlanBatch[Plan]]:
         """Returns the sessions that are played at the same time: several where a policy may decide for all.
@@ -329,7 +333,7 @@ class _SessionTask(Generic[Result]):
 
     def __init__(self, root: Path, *, job: SessionJob[Result]) -> None:
         self._root, self._job = root, job
-        self._maker = SessionMaker(root, job.config, job.cast, job.references, job.extra)
+        self._maker = SessionMaker(root, job.config, job.cast, job.references, job.extra, job.drives)
 
     def __call__(self, plan: Plan) -> SessionOutcome[Plan, Result]:
         begun = time.process_time()

@@ -21,6 +21,7 @@ from dorothie_gym.evaluation.closed_loop import (
     RolloutSettings,
     leaderboard_page,
     read_entries,
+    read_result,
     read_seal,
     roll_out,
     seal_of,
@@ -28,6 +29,7 @@ from dorothie_gym.evaluation.closed_loop import (
 )
 from dorothie_gym.evaluation.closed_loop.protocol import LeaderboardProtocol
 from dorothie_gym.evaluation.closed_loop.submission import check_submission
+from dorothie_gym.evaluation.rollout import read_drives, write_drives
 from dorothie_gym.evaluation.tiers import EARS, TIERS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import find_player
@@ -270,6 +272,26 @@ def test_from_the_seal_to_the_board(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     done = run("leaderboard", out, "--out", tmp_path / "board.md")
     assert "## Tier ask-first, sealed before the test" in (tmp_path / "board.md").read_text(), done.output
+
+
+@pytest.mark.long
+def test_references_of_a_beacon_are_measured_by_a_command_and_read(tmp_path: Path) -> None:
+    file, beacon = tmp_path / "references.json", ("--beacon", "pulse 7", "--beacon-date", "2026-12-01")
+    common = ("--tier", "rough", *beacon, "--sessions", "1", "--workers", "1")
+    done = run("reference-times", *common, "--out", file)
+    assert done.exit_code == 0, done.output
+    ((key, drive),) = read_drives(file).items()
+    town, _, seed = key.split("/")
+    drawn = Beacon(text="pulse 7", date="2026-12-01")
+    (plan,) = RolloutSettings(sessions=1, towns=drawn.towns, seed=drawn.seed).plans()
+    assert (town, int(seed)) == (plan.town, plan.seed)
+    write_drives(file, {key: replace(drive, seconds=5.0)})
+    options = ("--co-wizard", "lane-follow", "--participant", "scripted", "--references", file)
+    done = run("rollout", *common, *options, "--out", tmp_path / "run")
+    assert done.exit_code == 0, done.output
+    (row,) = read_result(tmp_path / "run").rows
+    assert row.record is not None and row.record.reference is not None and row.record.reference.seconds == 5.0
+    assert "cannot be read" in run("rollout", *common, "--references", tmp_path / "none.json").stderr
 
 
 @pytest.mark.parametrize(
