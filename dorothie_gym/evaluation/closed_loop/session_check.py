@@ -263,13 +263,14 @@ class SessionChecker:
     ) -> Iterator[str]:
         """Yields differences between the row and the measures of the session."""
         try:
-            wanted = measure(session, self._engine(plan.town).town_of(plan.seed)).to_json()
+            measured = measure(session, self._engine(plan.town).town_of(plan.seed)).to_json()
         except Exception as error:  # a session that was not simulated again may contain anything
             raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
         given: Mapping[str, object] = record.to_json()
-        for name, value in wanted.items():
-            if not same_json(value, given.get(name)):
-                yield f"{name} is {given.get(name)!r}; the session has {value!r}"
+        wanted: Mapping[str, object] = measured
+        for name in {**wanted, **given}:
+            if not same_json(wanted.get(name), given.get(name)):
+                yield f"{name} is {given.get(name)!r}; the session has {wanted.get(name)!r}"
         if read_usage(self._root / plan.path) != dict(row.usage):
             yield "the usage of language models is not that recorded beside the session"
 

@@ -104,6 +104,12 @@ def test_a_seal_that_was_changed_is_refused(copy: Path) -> None:
     assert "changed after the model was sealed" in fault
 
 
+def test_an_invented_infraction_is_found(copy: Path) -> None:
+    invented = {"kind": "red_light", "seconds": 1.0, "own_fault": True}
+    edit(copy / "rollout.json", lambda page: page["rows"][0]["record"].update(infraction_events=[invented]))
+    assert "infraction_events is" in str(check_submission(copy, protocol=PROTOCOL).faults)
+
+
 def test_beacon_and_seal_need_each_other(copy: Path) -> None:
     edit_settings(copy, lambda settings: settings.pop("seal"))
     assert "nothing shows that the model was finished before" in str(check_submission(copy, protocol=PROTOCOL).faults)
