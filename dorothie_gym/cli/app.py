@@ -26,6 +26,7 @@ from dorothie_gym.cli.play import play
 from dorothie_gym.cli.reference_times import reference_times
 from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
+from dorothie_gym.cli.seal import seal
 from dorothie_gym.cli.serve import serve
 from dorothie_gym.cli.sessions import compare, film, replay
 from dorothie_gym.cli.show import show
@@ -67,6 +68,7 @@ app.command()(rollout)
 app.command("reference-times")(reference_times)
 app.command("cross-play")(cross_play)
 app.command()(leaderboard)
+app.command()(seal)
 app.command()(submit)
 app.command()(serve)
 app.command()(replay)

@@ -137,13 +137,13 @@ def _checked(
     entries: Sequence[closed_loop.LeaderboardEntry], workers: int | None, *, quiet: bool
 ) -> tuple[closed_loop.LeaderboardEntry, ...]:
     """Returns the rollouts with the outcome of their check; exits if one has faults."""
-    from dorothie_gym.evaluation.closed_loop import submission
+    from dorothie_gym.evaluation.closed_loop import protocol
 
     try:
         compile_first(pictures=False)
         with session_progress(quiet=quiet) as on_session:
             return closed_loop.checked_entries(
-                entries, submission.PROTOCOL, workers=workers or available_processors(), on_session=on_session
+                entries, protocol.PROTOCOL, workers=workers or available_processors(), on_session=on_session
             )
     except KeyboardInterrupt:
         exit_interrupted("Interrupted; no page was written.")

@@ -18,6 +18,7 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
+from dorothie_gym.cli.seal import BeaconDate, BeaconText, beacon_of
 from dorothie_gym.cli.tier_options import TierName, tier_of
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.evaluation import closed_loop
@@ -39,15 +40,20 @@ def reference_times(
         str | None,
         typer.Option(metavar="FOLD|all|NAME,...", help="Towns in place of the tier's.", autocompletion=complete_towns),
     ] = None,
-    sessions: Annotated[int, typer.Option(min=1, help="Number of scenarios in all towns together.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, as of `rollout`.")] = 0,
+    sessions: Annotated[int, typer.Option(min=1, help="Number of sessions of `rollout`, all trials counted.")] = 100,
+    seed: Annotated[
+        int | None, typer.Option(min=0, show_default="0", help="Seed of the scenarios, as of `rollout`.")
+    ] = None,
+    beacon: BeaconText = None,
+    beacon_date: BeaconDate = None,
+    trials: Annotated[int, typer.Option(min=1, help="Sessions of each scenario, as of `rollout`.")] = 1,
     workers: Players = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure the reference times of the scenarios that `rollout` plays with the same tier, towns and seed.
+    """Measure the reference times of the scenarios that `rollout` plays with the same tier, towns and seed, or beacon.
 
     The scripted participant and Co-Wizard play each scenario with exact words and acts, in the usual traffic and
-    without an Ad-Wizard.
+    without an Ad-Wizard. `rollout --references` and `submit --references` read the file.
     """
     with reporting_errors():
         found = tier_of(tier)
@@ -55,9 +61,15 @@ def reference_times(
             fail("--tier is empty; give the name of a tier")
         if found.config.talk is not None:
             fail(f"tier {tier} has tasks of talk, which have no reference times; give a tier of driving")
+        drawn = beacon_of(beacon, beacon_date, found, {"--towns": towns is not None, "--seed": seed is not None})
         try:
             chosen = found.towns if towns is None else closed_loop.parse_towns(towns)
-            plans = closed_loop.RolloutSettings(towns=chosen, sessions=sessions, seed=seed).plans()
+            plans = closed_loop.RolloutSettings(
+                towns=chosen if drawn is None else drawn.towns,
+                sessions=sessions,
+                seed=(seed or 0) if drawn is None else drawn.seed,
+                trials=trials,
+            ).plans()
         except ValueError as error:
             fail(str(error))
         known = rollouts.read_drives(out) if out.is_file() else {}
@@ -85,7 +97,7 @@ def _measure(
     quiet: bool,
 ) -> None:
     """Measures the references of scenarios that `drives` does not have; writes each as soon as it is known."""
-    tasks = [(plan.town, plan.seed) for plan in plans]
+    tasks = list(dict.fromkeys((plan.town, plan.seed) for plan in plans))
     with session_progress(quiet=quiet) as on_session:
         on_session(0, len(tasks))
         measured = rollouts.measure_drives(tasks, tier.config.stops, drives, workers=workers or available_processors())

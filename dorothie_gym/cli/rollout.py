@@ -48,7 +48,17 @@ from dorothie_gym.cli.output import (
     session_progress,
     wide_stdout,
 )
-from dorothie_gym.cli.tier_options import TierName, check_oracle, find_pool, participants_of, tier_config, tier_of
+from dorothie_gym.cli.seal import BeaconDate, BeaconText, SealFile, beacon_of, read_seal
+from dorothie_gym.cli.tier_options import (
+    References,
+    TierName,
+    check_oracle,
+    find_pool,
+    participants_of,
+    read_references,
+    tier_config,
+    tier_of,
+)
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.evaluation import closed_loop
@@ -59,6 +69,7 @@ from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.tiers import Tier
+    from dorothie_gym.session.scenario import ReferenceDrive
 
 
 def rollout(
@@ -83,7 +94,13 @@ def rollout(
         ),
     ] = None,
     workers: Players = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, for any policies.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(min=0, show_default="0", help="Seed of the scenarios, for any policies.")
+    ] = None,
+    beacon: BeaconText = None,
+    beacon_date: BeaconDate = None,
+    seal: SealFile = None,
+    references: References = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for sessions and result; a started rollout is resumed."),
@@ -129,6 +146,7 @@ def rollout(
                 "--perception": perception is not PerceptionModel.SYMBOLIC,
             }
             check_oracle(found, replaced)
+        drawn = beacon_of(beacon, beacon_date, found, {"--towns": towns is not None, "--seed": seed is not None})
         usual = tier_config(found, oracle=oracle)
         config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures, usual=usual)
         pool = participants_of(participant, found)
@@ -139,19 +157,22 @@ def rollout(
         try:
             settings = closed_loop.RolloutSettings(
                 cast=cast,
-                towns=_towns(towns, found),
+                towns=_towns(towns, found) if drawn is None else drawn.towns,
                 sessions=sessions,
-                seed=seed,
+                seed=(seed or 0) if drawn is None else drawn.seed,
                 config=config,
                 pool=find_pool(pool, cast[Role.PARTICIPANT], asked),
                 trials=trials,
                 tier=tier,
                 oracle=oracle,
                 references=config.talk is None and (found is not None or trials > 1),
+                beacon=drawn,
+                seal=read_seal(seal, beacon=drawn, oracle=oracle),
             )
         except ValueError as error:
             fail(str(error))
-        result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
+        drives = read_references(references)
+        result = _play(settings, out, workers or available_processors(), ray, drives, quiet=as_json)
     warn_of_usage(closed_loop.usage_warnings(result.usage()))
     if as_json:
         print_json(result.to_json())
@@ -170,7 +191,13 @@ def _towns(given: str | None, tier: Tier | None) -> tuple[str, ...]:
 
 
 def _play(
-    settings: closed_loop.RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool
+    settings: closed_loop.RolloutSettings,
+    out: Path | None,
+    workers: int,
+    ray: str | None,
+    drives: dict[str, ReferenceDrive],
+    *,
+    quiet: bool,
 ) -> closed_loop.RolloutResult:
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
@@ -178,7 +205,9 @@ def _play(
             pictures=settings.config.perception is PerceptionModel.CAMERA or settings.config.camera is not None
         )
         with session_progress(quiet=quiet) as on_session:
-            result = closed_loop.roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
+            result = closed_loop.roll_out(
+                settings, folder, workers=workers, ray=ray, on_session=on_session, drives=drives
+            )
     except KeyboardInterrupt:
         _exit_interrupted(folder, settings)
     except ProcessError as error:

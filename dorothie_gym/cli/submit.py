@@ -19,6 +19,7 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
+from dorothie_gym.cli.tier_options import References, read_references
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.session import recording
@@ -27,6 +28,7 @@ from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.evaluation.closed_loop.submission import SubmissionCheck
+    from dorothie_gym.session.scenario import ReferenceDrive
 
 
 FAULTY = 1
@@ -48,13 +50,15 @@ def submit(
         Path | None,
         typer.Option(metavar="FILE.json", help="Compare this submission with the folder instead of writing one."),
     ] = None,
+    references: References = None,
     workers: Players = None,
     as_json: AsJson = False,
 ) -> None:
     """Check a rollout for the leaderboard, and write its submission with hashes; exit code 1 if there are faults.
 
-    Towns, seeds and settings must be those of the leaderboard. Every session is drawn and played again from its seed
-    by the scripted partners, with the recorded actions of the Co-Wizard, or by its policy if the package has it.
+    Towns, seeds and settings must be those of the leaderboard, of a tier, or of the beacon of a sealed test, whose seal
+    must be older. Every session is drawn and played again from its seed by the partners of these conditions, with the
+    recorded actions of the Co-Wizard, or by its policy if the package has it.
     What nothing can check is listed as claimed.
     """
     if sample != ALL and not (sample.isdecimal() and 1 <= int(sample) <= 10**6):
@@ -64,7 +68,8 @@ def submit(
     with reporting_errors():
         from dorothie_gym.evaluation.closed_loop import submission
 
-        found = _check(folder, None if sample == ALL else int(sample), seed, workers, quiet=as_json)
+        drives = read_references(references)
+        found = _check(folder, None if sample == ALL else int(sample), seed, workers, drives, quiet=as_json)
         faults = found.faults
         if found.submission is not None and check is not None:
             faults = submission.differences_from(check, found.submission)
@@ -89,8 +94,16 @@ def submit(
         raise typer.Exit(FAULTY)
 
 
-def _check(folder: Path, sample: int | None, seed: int | None, workers: int | None, *, quiet: bool) -> SubmissionCheck:
-    from dorothie_gym.evaluation.closed_loop import submission
+def _check(
+    folder: Path,
+    sample: int | None,
+    seed: int | None,
+    workers: int | None,
+    drives: dict[str, ReferenceDrive],
+    *,
+    quiet: bool,
+) -> SubmissionCheck:
+    from dorothie_gym.evaluation.closed_loop import protocol, submission
 
     try:
         compile_first(pictures=False)
@@ -99,9 +112,10 @@ def _check(folder: Path, sample: int | None, seed: int | None, workers: int | No
                 folder,
                 sample=sample,
                 seed=seed,
-                protocol=submission.PROTOCOL,
+                protocol=protocol.PROTOCOL,
                 workers=workers or available_processors(),
                 on_session=on_session,
+                drives=drives,
             )
     except KeyboardInterrupt:
         exit_interrupted("Interrupted; nothing was written.")

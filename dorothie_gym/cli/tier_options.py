@@ -10,6 +10,7 @@ import typer
 
 from dorothie_gym.cli.options import find_players
 from dorothie_gym.cli.output import fail
+from dorothie_gym.evaluation.rollout import read_drives
 from dorothie_gym.evaluation.tiers import POOL_SEPARATOR, TIERS, Tier, find_tier
 from dorothie_gym.ontology.roles import Role
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from dorothie_gym import policies as players
     from dorothie_gym.cli.language_model import LanguageModelOptions
     from dorothie_gym.session.config import EnvConfig
+    from dorothie_gym.session.scenario import ReferenceDrive
 
 TierName = Annotated[
     str | None,
@@ -26,6 +28,24 @@ TierName = Annotated[
         help="Conditions of a tier of the benchmark: settings, partners and towns; other options replace its parts.",
     ),
 ]
+
+References = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.json",
+        help="References of scenarios, from `reference-times`; others are measured when they are played.",
+    ),
+]
+
+
+def read_references(file: Path | None) -> dict[str, ReferenceDrive]:
+    """Returns the references in a file, by `drive_key`; none without one. Exits if it cannot be read."""
+    if file is None:
+        return {}
+    try:
+        return read_drives(file)
+    except OSError as error:
+        fail(f"{file}: cannot be read ({error.strerror}); write it with `dorothie-gym reference-times`")
 
 
 def tier_of(name: str | None) -> Tier | None:

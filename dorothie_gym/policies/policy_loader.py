@@ -95,7 +95,7 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
         return policies.SilentPolicy(role, limits)
     if name == "random":
         return policies.RandomPolicy(role, limits)
-    if _is_own(name):
+    if is_own(name):
         return create_policy(import_policy(name), role, limits or SpaceLimits())
     if name not in policy_names(role):
         hint = did_you_mean(name, policy_names(role))
@@ -121,7 +121,7 @@ def _with_traits(given: str, role: Role, limits: SpaceLimits | None) -> AnyPolic
     return policies.ScriptedCoWizard(limits, traits=traits)
 
 
-def _is_own(name: str) -> bool:
+def is_own(name: str) -> bool:
     """Returns whether a name refers to a class of the user."""
     return is_reference(name) and not name.startswith((WITH_TRAITS, LANGUAGE_MODEL, PREFIX))
 
@@ -221,7 +221,7 @@ class Player:
         if self.policy is not None:
             own = self.policy if isinstance(self.policy, type) else type(self.policy)
             return issubclass(own, BatchPolicy)
-        if self.path is None and _is_own(self.name):
+        if self.path is None and is_own(self.name):
             return issubclass(import_policy(self.name), BatchPolicy)
         return self.trained
 
@@ -274,7 +274,7 @@ def find_player(given: str, role: Role, language_model: LanguageModelConfig | No
         return Player(name=given)
     if given.startswith(LANGUAGE_MODEL):
         return _language_model(given, role, language_model)
-    if _is_own(given) and not Path(given).exists():
+    if is_own(given) and not Path(given).exists():
         return Player(name=given, sha256=source_hash(import_policy(given)))
     if given in policy_names(role):
         return _shipped_player(given, role) if is_pretrained(given) else Player(name=given)

@@ -16,7 +16,8 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, check_submission
+from dorothie_gym.evaluation.closed_loop.protocol import LeaderboardProtocol
+from dorothie_gym.evaluation.closed_loop.submission import check_submission
 from dorothie_gym.evaluation.rollout import generate_corpus
 from dorothie_gym.session.config import EnvConfig
 from tests.portability.parts import Values, group, table_content, without_versions

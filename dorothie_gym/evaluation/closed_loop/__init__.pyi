@@ -1,5 +1,6 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
+from .beacon import Beacon as Beacon
 from .cross_play import RESULT_NAME as RESULT_NAME
 from .cross_play import CrossPlayResult as CrossPlayResult
 from .cross_play import CrossPlaySettings as CrossPlaySettings
@@ -36,6 +37,7 @@ from .metrics import TimelyCompletion as TimelyCompletion
 from .metrics import UtterancesPerSubgoal as UtterancesPerSubgoal
 from .metrics import figures_of as figures_of
 from .metrics import interval_of as interval_of
+from .protocol import usual_sessions as usual_sessions
 from .results import RESULT_FILE as RESULT_FILE
 from .results import RolloutResult as RolloutResult
 from .results import RolloutRow as RolloutRow
@@ -46,6 +48,10 @@ from .running import RolloutSettings as RolloutSettings
 from .running import command_of as command_of
 from .running import parse_towns as parse_towns
 from .running import roll_out as roll_out
+from .seal import Seal as Seal
+from .seal import read_seal as read_seal
+from .seal import seal_of as seal_of
+from .seal import write_seal as write_seal
 from .session_record import MetException as MetException
 from .session_record import SessionRecord as SessionRecord
 from .session_record import TalkRecord as TalkRecord

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from dorothie_gym.errors import PolicyLoadError, short_repr
-from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
+from dorothie_gym.evaluation.closed_loop.running import CONDITIONS, RolloutSettings
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.policy_loader import (
@@ -41,6 +41,8 @@ class Claim(enum.StrEnum):
     """Steps and time of its training."""
     USAGE = "usage"
     """Calls, tokens, latency and cost of language models."""
+    DATES = "dates of seal and beacon"
+    """Days on which a model was sealed, and on which the text of its beacon became known."""
     RUN_TIME = "run time"
     """Wall time, processor time and number of processes of the rollout."""
 
@@ -72,6 +74,7 @@ def claims_of(
         Claim.PERSONA: not played and persona,
         Claim.TRAINING: bool(settings.get("training")),
         Claim.USAGE: usage,
+        Claim.DATES: "seal" in settings,
         Claim.RUN_TIME: run_time,
     }
     return tuple(claim for claim, is_claim in there.items() if is_claim)
@@ -91,10 +94,10 @@ def shipped_player(name: str) -> Player | None:
     return None
 
 
-def can_play(player: Player) -> bool:
-    """Returns whether the libraries that a policy needs are installed."""
+def can_play(player: Player, role: Role = Role.CO_WIZARD) -> bool:
+    """Returns whether the libraries that the policy of a role needs are installed."""
     try:
-        player.make(Role.CO_WIZARD, SpaceLimits())
+        player.make(role, SpaceLimits())
     except PolicyLoadError:
         return False
     return True
@@ -119,7 +122,7 @@ def faults_of_claims(settings: Mapping[str, Any]) -> Iterator[str]:
     Args:
         settings: output of `RolloutSettings.to_json`, as read from a file.
     """
-    surplus = sorted(settings.keys() - _SETTINGS - {_LANGUAGE_MODELS})
+    surplus = sorted(settings.keys() - _SETTINGS - CONDITIONS - {_LANGUAGE_MODELS})
     yield from (f"settings, {name}: is unknown, and nothing checks it" for name in surplus)
     name = str(settings[str(Role.CO_WIZARD)])
     if not name.isprintable() or not 0 < len(name.strip()) <= _MAX_NAME or name != name.strip():

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.errors import RolloutError, printable
 from dorothie_gym.evaluation.closed_loop.claims import Claim, claims_of
+from dorothie_gym.evaluation.closed_loop.protocol import LeaderboardProtocol, part_of, sealed_part
 from dorothie_gym.evaluation.closed_loop.results import (
     ALL_METRICS,
     NO_EXCEPTION,
@@ -24,7 +25,7 @@ from dorothie_gym.evaluation.closed_loop.results import (
 )
 from dorothie_gym.evaluation.closed_loop.running import command_of, fold_of_towns, is_given, towns_text, usual_settings
 from dorothie_gym.evaluation.closed_loop.session_record import Amount
-from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, SubmissionCheck, check_submission
+from dorothie_gym.evaluation.closed_loop.submission import SubmissionCheck, check_submission
 from dorothie_gym.evaluation.closed_loop.usage import tokens_text
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
 from dorothie_gym.evaluation.tiers import TIERS
@@ -52,8 +53,9 @@ PART_TITLES: Final[Mapping[str, str]] = {
     IMPORTED: "Imported towns",
     OTHER: "Other towns",
     **{name: f"Tier {name}" for name in TIERS},
+    **{sealed_part(name): f"Tier {name}, sealed before the test" for name in TIERS},
 }
-"""Parts of the page and their titles: towns, and tiers of the benchmark."""
+"""Parts of the page and their titles: towns, tiers of the benchmark, and their sealed tests."""
 
 ENOUGH: Final = 100
 """Minimum number of sessions of a row that is compared, as in `submission.LeaderboardProtocol`."""
@@ -67,7 +69,7 @@ PAGE_METRICS: Final = (
 )  # fmt: skip
 """Keys of the metrics on the page; those that need references or trials are left out of parts without them."""
 
-_IN_TABLES: Final = (Claim.FIGURES, Claim.NAME, Claim.WEIGHTS, Claim.LANGUAGE_MODEL, Claim.PERSONA)
+_IN_TABLES: Final = (Claim.FIGURES, Claim.NAME, Claim.WEIGHTS, Claim.LANGUAGE_MODEL, Claim.PERSONA, Claim.DATES)
 """Claims in the column of the tables of figures; other claims have columns of their own, whose titles say so."""
 
 CLAIMED: Final = "claimed"
@@ -119,7 +121,9 @@ class LeaderboardEntry:
             others.append(f"perception {perception}")
         if (channel := config.get("channel")) and channel != usual["config"].get("channel"):
             others.append(f"channel {channel}")
-        if "tier" in usual and settings["towns"] != usual["towns"]:
+        if beacon := settings.get("beacon"):
+            others.append(f"beacon {beacon['text']} of {beacon['date']}")
+        elif "tier" in usual and settings["towns"] != usual["towns"]:
             others.append(f"towns {towns_text(settings['towns'])}")
         if trials := settings.get("trials"):
             others.append(f"{trials} trials")
@@ -155,7 +159,7 @@ class LeaderboardEntry:
         """Part of the page, a key of `PART_TITLES`."""
         towns, usual = self.result.settings["towns"], usual_settings(self.result.settings)
         if "tier" in usual:
-            return str(usual["tier"])
+            return str(part_of(self.result.settings))
         imported = all(split_lights(str(town))[0].lower().endswith(".xodr") for town in towns)
         return fold_of_towns(towns) or (IMPORTED if imported else OTHER)
 
@@ -165,7 +169,7 @@ class LeaderboardEntry:
 
         In a tier, timely completion is in place of success, or the share of right reactions in one of talk.
         """
-        tier = TIERS.get(self.part)
+        tier = TIERS.get(str(self.result.settings.get("tier")))
         headline = "success" if tier is None else "timely_completion" if tier.config.talk is None else "talk_success"
         keys = (headline, "driving_score")
         first, second = (self.table.figures[key]["mean"] for key in keys)
@@ -215,9 +219,9 @@ def checked_entries(
         ProcessError: a process died.
     """
     due = [entry for entry in entries if not any(protocol.faults(entry.result.settings))]
-    total, found = protocol.sessions * len(due), dict[Path, SubmissionCheck]()
+    total, done_before, found = sum(len(entry.result.rows) for entry in due), 0, dict[Path, SubmissionCheck]()
     for entry in due:
-        before = protocol.sessions * len(found)
+        before = done_before
 
         def report(done: int, _: int, before: int = before) -> None:
             if on_session is not None:
@@ -230,6 +234,7 @@ def checked_entries(
                 f"{entry.folder}: {check.faults[0]}{more}; see `dorothie-gym submit {entry.folder}`, or leave it out"
             )
         found[entry.folder] = check
+        done_before += len(entry.result.rows)
     return tuple(replace(entry, check=found.get(entry.folder)) for entry in entries)
 
 
@@ -280,7 +285,8 @@ def leaderboard_page(
         "language models, are always claims.",
     ]
     if any(entry.shortened for entry in entries):
-        usual = f"{EnvConfig().max_seconds:g} s{' or those of their tier' * any(e.part in TIERS for e in entries)}"
+        in_tiers = any(entry.result.settings.get("tier") for entry in entries)
+        usual = f"{EnvConfig().max_seconds:g} s{' or those of their tier' if in_tiers else ''}"
         lines += [
             "",
             f"Rollouts with sessions shorter than {usual} are marked and ranked after the others:",
@@ -378,6 +384,7 @@ def figures_sha256(entries: Sequence[LeaderboardEntry]) -> str:
                 "towns": towns,
                 "seed": settings["seed"],
                 "config": settings["config"],
+                **{name: settings[name] for name in ("beacon", "seal") if name in settings},
                 "rows": [{**row, "usage": None} for row in rows],
             }
         )

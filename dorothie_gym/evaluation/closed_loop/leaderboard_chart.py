@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.evaluation.closed_loop.leaderboard import IMPORTED, OTHER, PART_TITLES, LeaderboardEntry, labels_of
+from dorothie_gym.evaluation.closed_loop.protocol import sealed_part
 from dorothie_gym.evaluation.closed_loop.results import ALL_METRICS
+from dorothie_gym.evaluation.tiers import TIERS
 from dorothie_gym.pictures.chart_style import INK, dress_percent_axes, empty_figure
 from dorothie_gym.support.files import replacing
 
@@ -21,6 +23,11 @@ CHART_METRICS: Final = ("success", "goal_condition_success", "driving_score", "s
 """Metrics of the panels of the picture."""
 
 _ROW, _TOP, _BOTTOM = 0.5, 1.2, 0.6
+_TIER_COLOURS: Final = ("#4d6f9f", "#b0793a", "#b03a3a", "#6a3ab0", "#2f8f5a", "#8f2f7a")
+"""Colours of the tiers, in their order."""
+
+_SEALED: Final = frozenset(sealed_part(name) for name in TIERS)
+
 _COLOURS: Final = {
     "seen": "#2f62c4",
     "development": "#2f8f8a",
@@ -28,6 +35,8 @@ _COLOURS: Final = {
     "unseen": "#cf7f1d",
     IMPORTED: "#8a4fb0",
     OTHER: "#5f8a3a",
+    **dict(zip(TIERS, _TIER_COLOURS, strict=True)),
+    **{sealed_part(name): colour for name, colour in zip(TIERS, _TIER_COLOURS, strict=True)},
 }
 
 
@@ -105,16 +114,21 @@ def _panel(axes: Axes, rows: Sequence[ChartRow], names: Sequence[str], key: str)
         colour = _COLOURS[row.part]
         if low is not None and high is not None:
             axes.plot([100 * low, 100 * high], [at, at], color=colour, linewidth=1.4, zorder=2)
-        axes.plot([100 * mean], [at], "o", markersize=5.5, color=colour, zorder=3)
+        axes.plot([100 * mean], [at], _marker(row.part), markersize=5.5, color=colour, zorder=3)
     title = next(metric.title for metric in ALL_METRICS if metric.key == key)
     dress_percent_axes(axes, title, len(names), margin=3)
+
+
+def _marker(part: str) -> str:
+    """Returns the marker of a part: a diamond for sealed tests, which have the colour of their tier."""
+    return "D" if part in _SEALED else "o"
 
 
 def _legend(figure: Figure, parts: AbstractSet[str], height: float) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=_COLOURS[part], marker="o", label=title.lower())
+        Line2D([], [], color=_COLOURS[part], marker=_marker(part), label=title.lower())
         for part, title in PART_TITLES.items()
         if part in parts
     ]

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from dorothie_gym.errors import InputFileError, RolloutError
 from dorothie_gym.evaluation.analysis.intervals import CONFIDENCE, RESAMPLES
+from dorothie_gym.evaluation.closed_loop.beacon import BeaconPage
 from dorothie_gym.evaluation.closed_loop.metrics import (
     BOOTSTRAP_SEED,
     METRICS,
@@ -23,6 +24,7 @@ from dorothie_gym.evaluation.closed_loop.metrics import (
     ShownMetric,
     figures_of,
 )
+from dorothie_gym.evaluation.closed_loop.seal import SealPage
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, SessionRecordPage
 from dorothie_gym.evaluation.closed_loop.usage import (
     SessionUsage,
@@ -238,6 +240,8 @@ class _SettingsPage(TypedDict):
     training: NotRequired[dict[str, _TrainingPage]]
     tier: NotRequired[str]
     oracle: NotRequired[bool]
+    beacon: NotRequired[BeaconPage]
+    seal: NotRequired[SealPage]
     trials: NotRequired[Annotated[int, Meta(ge=1, lt=2**31)]]
 
 

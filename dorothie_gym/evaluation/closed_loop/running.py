@@ -7,11 +7,13 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dorothie_gym.evaluation.closed_loop.beacon import BEACON, Beacon
 from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, RolloutRow
+from dorothie_gym.evaluation.closed_loop.seal import Seal, faults_of_seal
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
 from dorothie_gym.evaluation.closed_loop.usage import SessionUsage, read_usage
 from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
@@ -26,11 +28,17 @@ from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.session.recording.files import safe_name, to_page
 from dorothie_gym.support.files import write_atomically
 
+if TYPE_CHECKING:
+    from dorothie_gym.session.scenario import ReferenceDrive
+
 SESSIONS_FOLDER: Final = "sessions"
 """Folder of the sessions within the folder of a rollout, for replay."""
 
 _ROLLOUTS: Final = 7
 """Branch of the seed; corpora draw from another, so that no policy is tested on a session that it was trained on."""
+
+CONDITIONS: Final = frozenset({"tier", "oracle", "references", "trials", "pool_sha256", "beacon", "seal"})
+"""Settings of rollouts in tiers and of sealed ones, which other rollouts do not have (`RolloutSettings.to_json`)."""
 
 _GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
     **{str(fold): towns for fold, towns in FOLD_TOWNS.items()},
@@ -85,6 +93,8 @@ class RolloutSettings:
         tier: name of the tier that gave the settings, for tables; None for other settings.
         oracle: whether they are those of the oracle of the tier, for tables.
         references: whether sessions get the reference of their scenario, see `ReferenceDrive`.
+        beacon: beacon of a sealed test, from which seed, towns and the order of the pool are drawn.
+        seal: seal of the Co-Wizard, which must be older than the beacon.
     """
 
     cast: Mapping[Role, AnyPlayer] = field(default_factory=lambda: ALL_SCRIPTED)
@@ -97,6 +107,8 @@ class RolloutSettings:
     tier: str | None = None
     oracle: bool = False
     references: bool = False
+    beacon: Beacon | None = None
+    seal: Seal | None = None
 
     def __post_init__(self) -> None:
         """Checks the fields."""
@@ -114,11 +126,30 @@ class RolloutSettings:
         if missing:
             raise ValueError(f"cast has no player for {', '.join(missing)}; each of the three roles needs a player")
         object.__setattr__(self, "cast", {role: player_of(given, role) for role, given in self.cast.items()})
+        self._check_seal()
+
+    def _check_seal(self) -> None:
+        """Raises `ValueError` if beacon, seal and the other fields do not belong together."""
+        if self.beacon is None:
+            if self.seal is not None:
+                raise ValueError("seal is given without a beacon; the scenarios of a sealed test come from a beacon")
+            return
+        if (self.towns, self.seed) != (self.beacon.towns, self.beacon.seed):
+            raise ValueError("towns and seed are not those of the beacon; take Beacon.towns and Beacon.seed")
+        if self.seal is not None:
+            fault = next(faults_of_seal(self.seal, self.beacon, self.to_json()), None)
+            if fault is not None:
+                raise ValueError(fault)
 
     @property
     def players(self) -> dict[Role, Player]:
         """Player of each role."""
         return {role: player_of(given, role) for role, given in self.cast.items()}
+
+    @property
+    def header_extra(self) -> dict[str, object]:
+        """Fields of `SessionHeader.extra` of every session: the beacon, if there is one."""
+        return {} if self.beacon is None else {BEACON: self.beacon.to_json()}
 
     def plans(self) -> tuple[RolloutPlan, ...]:
         """Returns the plans of the sessions, in order: all trials of a scenario, then those of the next one."""
@@ -135,7 +166,9 @@ class RolloutSettings:
         )
 
     def _participant_of(self, scenario: int) -> Player | None:
-        """Returns the participant of a scenario; in each town, all of the pool take turns."""
+        """Returns the participant of a scenario; in each town, all of the pool take turns, or as the beacon draws."""
+        if self.pool and self.beacon is not None:
+            return self.pool[self.beacon.turn(scenario, len(self.pool))]
         return self.pool[(scenario + scenario // len(self.towns)) % len(self.pool)] if self.pool else None
 
     def to_json(self) -> dict[str, object]:
@@ -157,6 +190,8 @@ class RolloutSettings:
             "references": self.references,
             "trials": self.trials if self.trials > 1 else None,
             "pool_sha256": [player.sha256 for player in self.pool],
+            "beacon": None if self.beacon is None else self.beacon.to_json(),
+            "seal": None if self.seal is None else self.seal.to_json(),
         }
         return {
             **names,
@@ -186,8 +221,12 @@ def command_of(settings: Mapping[str, Any]) -> str:
         if role is Role.CO_WIZARD and settings.get("oracle"):
             continue  # the oracle of the tier
         words += [f"--{str(role).replace('_', '-')}", str(settings[str(role)])]
-    words += ["--towns", towns_text(settings["towns"])]
-    words += ["--sessions", str(settings["sessions_planned"]), "--seed", str(settings["seed"])]
+    beacon, sessions = settings.get("beacon"), ["--sessions", str(settings["sessions_planned"])]
+    if beacon:
+        words += ["--beacon", str(beacon["text"]), "--beacon-date", str(beacon["date"])]
+        words += [*(["--seal", "FILE"] if settings.get("seal") else []), *sessions]
+    else:
+        words += ["--towns", towns_text(settings["towns"]), *sessions, "--seed", str(settings["seed"])]
     for option, name in (("--max-seconds", "max_seconds"), ("--word-errors", "word_error_rate")):
         if is_given(config, usual, name):
             words += [option, f"{config[name]:g}"]
@@ -293,6 +332,7 @@ def roll_out(
     workers: int = 1,
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
+    drives: Mapping[str, ReferenceDrive] | None = None,
 ) -> RolloutResult:
     """Plays the sessions of a rollout, measures them, and writes the result into the folder.
 
@@ -306,6 +346,7 @@ def roll_out(
         workers: number of processes; more than one needs an importable main module of the caller.
         ray: address of a Ray cluster that replaces the workers; see `dorothie_gym.evaluation.rollout.on_ray`.
         on_session: called with the numbers of finished and of planned sessions, first with 0 and after each session.
+        drives: references that were measured before, by `reference_drives.drive_key`; others are measured now.
 
     Raises:
         ValueError: there are no workers.
@@ -325,6 +366,8 @@ def roll_out(
         keep_errors=True,
         writes_cost=True,
         references=settings.references,
+        extra=settings.header_extra,
+        drives=drives or {},
     )
     with run_sessions(job, settings.plans(), root, workers=workers, ray=ray, on_session=on_session) as outcomes:
         try:

@@ -19,11 +19,12 @@ from dorothie_gym.evaluation.closed_loop.running import RolloutPlan
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
 from dorothie_gym.evaluation.closed_loop.task_progress import task_at_end
 from dorothie_gym.evaluation.closed_loop.usage import read_usage
-from dorothie_gym.evaluation.rollout.play import USAGE_FILE, play_session, with_personas
+from dorothie_gym.evaluation.rollout.play import USAGE_FILE, play_session, with_extra, with_personas
 from dorothie_gym.evaluation.rollout.recorded_policy import RecordedPolicy, recorded_persona
+from dorothie_gym.evaluation.rollout.reference_drives import scenario_with_reference
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed
-from dorothie_gym.session.config import ChannelKind, EnvConfig
+from dorothie_gym.session.config import ChannelKind
 from dorothie_gym.session.recording.events import EndReason, EventType
 from dorothie_gym.session.recording.files import (
     ACTIONS_FILE,
@@ -38,8 +39,10 @@ from dorothie_gym.session.recording.session import Session, session_state
 from dorothie_gym.session.session_engine import SessionEngine
 
 if TYPE_CHECKING:
+    from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
     from dorothie_gym.policies.policy_loader import Player
     from dorothie_gym.session.recording.header import SessionHeader
+    from dorothie_gym.session.scenario import ReferenceDrive, Scenario
 
 _FILES: Final = frozenset({HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE})
 """Files of every session of a rollout."""
@@ -87,14 +90,23 @@ class SessionChecker:
 
     Args:
         root: folder of the rollout.
-        config: settings of the protocol.
-        cast: players that are played again. The other roles take their recorded actions.
+        settings: settings of the protocol.
+        cast: players that are played again, beside those of the pool. The other roles take their recorded actions.
+        drives: references that the receiver has measured, by `reference_drives.drive_key`; others are measured now.
     """
 
-    def __init__(self, root: Path, config: EnvConfig, cast: Mapping[Role, Player]) -> None:
-        self._root, self._config, self._cast = root, config, dict(cast)
+    def __init__(
+        self,
+        root: Path,
+        settings: RolloutSettings,
+        cast: Mapping[Role, Player],
+        drives: Mapping[str, ReferenceDrive],
+    ) -> None:
+        self._root, self._config, self._cast = root, settings.config, dict(cast)
+        self._references, self._extra, self._drives = settings.references, settings.header_extra, drives
         self._engines: dict[str, SessionEngine] = {}
-        self._policies: dict[tuple[str, Role], AnyPolicy] = {}
+        self._policies: dict[tuple[str, Role, str], AnyPolicy] = {}
+        self._scenarios: dict[tuple[str, int], Scenario] = {}
 
     def __call__(self, task: SessionTask) -> SessionFindings:
         """Returns the findings about a session; the first kind of fault ends its check."""
@@ -109,7 +121,7 @@ class SessionChecker:
                 has_persona=any(recorded_persona(session, role) for role in AGENT_ROLES if role not in self._cast),
             )
             self._check_header(plan, session)
-            _check_end(session, self._config)
+            _check_end(session, self._engine(plan.town).session.seconds_allowed)
             if task.simulated:
                 self._play_again(plan, session)
                 found = replace(found, simulated=True)
@@ -126,6 +138,11 @@ class SessionChecker:
             raise SessionError("has no row")
         if (row.town, row.seed) != (plan.town, plan.seed):
             raise SessionError(f"its row is of {one_line(row.town)}, seed {row.seed}")
+        if row.trial != plan.trial:
+            raise SessionError(f"its row is of trial {row.trial}, not of {plan.trial}")
+        partner = None if plan.participant is None else plan.participant.name
+        if row.participant != partner:
+            raise SessionError(f"its row has the participant {short_repr(row.participant)}, not {partner}")
         if row.record is None:
             if session_state(self._root / plan.path) is SessionState.FINISHED:
                 raise SessionError("its row has an error, but the session is finished")
@@ -168,15 +185,25 @@ class SessionChecker:
 
     def _policies_of(self, plan: RolloutPlan, session: Session) -> dict[Role, AnyPolicy]:
         engine, policies = self._engine(plan.town), dict[Role, AnyPolicy]()
+        cast = {**self._cast, **plan.partners}
         for role in AGENT_ROLES:
-            if role not in self._cast:
+            if role not in cast:
                 policies[role] = RecordedPolicy(session, role, frames=self._config.frames, limits=engine.limits)
                 continue
-            key = (plan.town, role)
+            key = (plan.town, role, cast[role].name)
             if key not in self._policies:
-                self._policies[key] = self._cast[role].make(role, engine.limits)
+                self._policies[key] = cast[role].make(role, engine.limits)
             policies[role] = self._policies[key]
         return policies
+
+    def _scenario(self, plan: RolloutPlan) -> Scenario | None:
+        """Returns the scenario of a session with its reference, which is measured again; None without references."""
+        if not self._references:
+            return None
+        key = plan.town, plan.seed
+        if key not in self._scenarios:
+            self._scenarios[key] = scenario_with_reference(self._engine(plan.town), plan.seed, self._drives)
+        return self._scenarios[key]
 
     def _check_header(self, plan: RolloutPlan, session: Session) -> None:
         engine, header = self._engine(plan.town), session.header
@@ -184,10 +211,16 @@ class SessionChecker:
             raise SessionError(f"the session is of {header.town}, seed {header.seed}")
         if not same_json(header.config, self._config.record()):
             raise SessionError("the session has other settings than the rollout")
-        policies = self._policies_of(plan, session)
-        engine.reset(seed=plan.seed)
-        states = {role: policies[role].initial_state(policy_seed(plan.seed, role), engine.town) for role in AGENT_ROLES}
-        drawn = with_personas(engine.session_header(), policies, states)
+        policies, scenario = self._policies_of(plan, session), self._scenario(plan)
+        if scenario is None:
+            engine.reset(seed=plan.seed)
+        else:
+            engine.reset(scenario=scenario)
+        states = {
+            role: policies[role].initial_state(policy_seed(plan.seed, role, plan.trial), engine.town)
+            for role in AGENT_ROLES
+        }
+        drawn = with_personas(with_extra(engine.session_header(), self._extra), policies, states)
         difference = first_difference(_only_header(session, header), _only_header(session, drawn))
         if difference is not None:
             raise SessionError(f"its header is not what its seed gives: {difference}")
@@ -199,7 +232,13 @@ class SessionChecker:
         with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
             try:
                 play_session(
-                    self._engine(plan.town), self._policies_of(plan, session), seed=plan.seed, folder=Path(folder) / "s"
+                    self._engine(plan.town),
+                    self._policies_of(plan, session),
+                    seed=plan.seed,
+                    folder=Path(folder) / "s",
+                    scenario=self._scenario(plan),
+                    trial=plan.trial,
+                    extra=self._extra,
                 )
             except OSError:
                 raise  # of the temporary folder
@@ -224,13 +263,14 @@ class SessionChecker:
     ) -> Iterator[str]:
         """Yields differences between the row and the measures of the session."""
         try:
-            wanted = measure(session, self._engine(plan.town).town_of(plan.seed)).to_json()
+            measured = measure(session, self._engine(plan.town).town_of(plan.seed)).to_json()
         except Exception as error:  # a session that was not simulated again may contain anything
             raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
         given: Mapping[str, object] = record.to_json()
-        for name, value in wanted.items():
-            if not same_json(value, given.get(name)):
-                yield f"{name} is {given.get(name)!r}; the session has {value!r}"
+        wanted: Mapping[str, object] = measured
+        for name in {**wanted, **given}:
+            if not same_json(wanted.get(name), given.get(name)):
+                yield f"{name} is {given.get(name)!r}; the session has {wanted.get(name)!r}"
         if read_usage(self._root / plan.path) != dict(row.usage):
             yield "the usage of language models is not that recorded beside the session"
 
@@ -244,8 +284,8 @@ def _check_names(folder: Path, known: set[str]) -> None:
         raise SessionError(f"{folder / missing[0]}: is missing")
 
 
-def _check_end(session: Session, config: EnvConfig) -> None:
-    """Raises `SessionError` unless a session arrived or ran out of time."""
+def _check_end(session: Session, seconds: float) -> None:
+    """Raises `SessionError` unless a session arrived or ran out of time, which is at least a number of seconds."""
     ends = session.of_type(EventType.END)
     if len(ends) != 1 or session.events[-1] is not ends[0]:
         raise SessionError(f"has {len(ends)} events of type {EventType.END}; a session has one, which is its last")
@@ -256,14 +296,12 @@ def _check_end(session: Session, config: EnvConfig) -> None:
     if (session.summary or {}).get("reason") != reason:
         raise SessionError(f"its last event has the reason {short_repr(reason)}, its outcome another one")
     if reason == EndReason.OUT_OF_TIME:
-        if last < config.max_seconds - 1e-9:
-            raise SessionError(
-                f"ran out of time after {last:g} s; the time of the protocol is {config.max_seconds:g} s"
-            )
+        if last < seconds - 1e-9:
+            raise SessionError(f"ran out of time after {last:g} s; the time of the protocol is {seconds:g} s")
     elif reason != EndReason.ARRIVED:
         raise SessionError(
             f"ended for the reason {short_repr(reason)}; a session of a submission ends when the car has arrived, or "
-            f"after {config.max_seconds:g} s"
+            f"after {seconds:g} s"
         )
     elif not task_at_end(session).done:
         raise SessionError("ended by arrival, but not all subgoals were reached")

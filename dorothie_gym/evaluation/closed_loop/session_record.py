@@ -15,6 +15,7 @@ from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.evaluation.analysis.exception_attribution import MEETING_DISTANCE, kind_of, time_met
 from dorothie_gym.evaluation.analysis.units import Units
+from dorothie_gym.evaluation.closed_loop.infractions import InfractionEvent, InfractionPage, infraction_kind
 from dorothie_gym.evaluation.closed_loop.metric import TIMEOUT
 from dorothie_gym.evaluation.closed_loop.sub_scores import ConductPage, ConductRecord, conduct_of
 from dorothie_gym.evaluation.closed_loop.talk_verdict import TalkVerdict, TalkVerdictPage, verdict_of
@@ -29,7 +30,6 @@ from dorothie_gym.evaluation.closed_loop.task_progress import (
     without_reached,
 )
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
 from dorothie_gym.session.scenario import ReferenceDrive, ReferencePage, recorded_reference
@@ -246,17 +246,6 @@ def _on_road(session: Session, events: int) -> tuple[Place, ...]:
 
 # --- Record of a driven session ---------------------------------------------------------------------------------------
 
-HIT_BY_OTHERS: Final = "hit_by_others"
-"""Name of the collisions that others caused; they are counted and have no penalty."""
-
-_RULES: Final = {
-    EventType.RED_LIGHT: "red_light",
-    EventType.STOP_SIGN: "stop_sign",
-    EventType.OFF_ROAD: "off_road",
-    EventType.WRONG_WAY: "wrong_way",
-}
-_TOUCHED: Final = {ObjectClass.PEDESTRIAN: "pedestrian", ObjectClass.VEHICLES: "vehicle"}
-
 
 class SessionRecordPage(TypedDict):
     """Measures of one session in JSON types; fields as in `SessionRecord`."""
@@ -275,6 +264,7 @@ class SessionRecordPage(TypedDict):
     conduct: NotRequired[ConductPage]
     reference: NotRequired[ReferencePage]
     talk_task: NotRequired[TalkVerdictPage]
+    infraction_events: NotRequired[list[InfractionPage]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,6 +287,7 @@ class SessionRecord:
         conduct: answers, truth and comfort; None in results of versions that did not measure them.
         reference: reference of the scenario; None if it was not measured.
         talk_task: verdict on the talk task; None if the session has none.
+        infraction_events: time, place and counterpart of each infraction but "timeout", in order.
     """
 
     live: int
@@ -313,6 +304,7 @@ class SessionRecord:
     conduct: ConductRecord | None = None
     reference: ReferenceDrive | None = None
     talk_task: TalkVerdict | None = None
+    infraction_events: tuple[InfractionEvent, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -320,7 +312,7 @@ class SessionRecord:
         return self.success if self.talk_task is None else self.talk_task.passed
 
     def to_json(self) -> SessionRecordPage:
-        """Returns the fields in JSON types; `conduct`, `reference` and `talk_task` are left out if there are none."""
+        """Returns the fields in JSON types; the last four are left out if there are none."""
         page: SessionRecordPage = {
             "live": self.live,
             "reached": self.reached,
@@ -340,6 +332,8 @@ class SessionRecord:
             page["reference"] = self.reference.to_json()
         if self.talk_task is not None:
             page["talk_task"] = self.talk_task.to_json()
+        if self.infraction_events:
+            page["infraction_events"] = [each.to_json() for each in self.infraction_events]
         return page
 
     @classmethod
@@ -362,6 +356,7 @@ class SessionRecord:
             conduct=ConductRecord.from_json(row["conduct"]) if "conduct" in row else None,
             reference=ReferenceDrive.from_json(row["reference"]) if "reference" in row else None,
             talk_task=TalkVerdict.from_json(row["talk_task"]) if "talk_task" in row else None,
+            infraction_events=tuple(InfractionEvent.from_json(each) for each in row.get("infraction_events", [])),
         )
 
 
@@ -392,23 +387,13 @@ def measure(session: Session, town: Town) -> SessionRecord:
         conduct=conduct_of(session, town),
         reference=recorded_reference(session.header),
         talk_task=verdict_of(session, town),
+        infraction_events=tuple(InfractionEvent.of(each) for each in session.infractions),
     )
 
 
 def count_infractions(session: Session) -> dict[str, int]:
-    """Returns the number of infractions of each kind; kinds without infractions are left out.
-
-    Collisions are classified by the counterpart: pedestrian, vehicle, or other ("static"). Collisions that
-    others caused (`own_fault` is false: the car stood or was hit from behind) count as "hit_by_others".
-    """
-    counts: Counter[str] = Counter()
-    for each in session.infractions:
-        if each.type is not EventType.COLLISION:
-            counts[_RULES[each.type]] += 1
-        elif not each.own_fault:
-            counts[HIT_BY_OTHERS] += 1
-        else:
-            counts[_TOUCHED.get(each.other, "static") if each.other is not None else "static"] += 1
+    """Returns the number of infractions of each kind (`infraction_kind`); kinds without infractions are left out."""
+    counts = Counter(infraction_kind(each) for each in session.infractions)
     ends = session.of_type(EventType.END)
     counts[TIMEOUT] += sum(event.data.get("reason") == EndReason.OUT_OF_TIME for event in ends)
     return {name: count for name, count in sorted(counts.items()) if count}

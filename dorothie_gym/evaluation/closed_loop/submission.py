@@ -20,31 +20,29 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from dorothie_gym._version import __version__
-from dorothie_gym.errors import RolloutError, one_line, short_repr
+from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.evaluation.closed_loop.claims import Claim, can_play, claims_of, faults_of_claims, shipped_player
+from dorothie_gym.evaluation.closed_loop.protocol import PROTOCOL, LeaderboardProtocol, part_of
 from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, read_result
 from dorothie_gym.evaluation.closed_loop.running import (
     SESSIONS_FOLDER,
     SETTINGS_FILE,
     RolloutPlan,
     RolloutSettings,
-    fold_of_towns,
-    parse_towns,
-    towns_text,
 )
 from dorothie_gym.evaluation.closed_loop.session_check import SessionChecker, SessionFindings, SessionTask
 from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER
 from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.evaluation.rollout.runner import COST_FILE
-from dorothie_gym.maps.folds import TownFold
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
-from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import same_json, to_line
 from dorothie_gym.session.recording.header import FORMAT_VERSION
 from dorothie_gym.support.input_files import MAX_RESULT_JSON, MAX_SMALL_JSON, checked, raising, read_json
+from dorothie_gym.support.installation import pip_install
 
 if TYPE_CHECKING:
+    from dorothie_gym.policies.policy_loader import Player
+    from dorothie_gym.session.scenario import ReferenceDrive
     from dorothie_gym.support.files import JsonValue
 
 FORMAT: Final = "dorothie_gym-submission"
@@ -58,66 +56,6 @@ MOST_FAULTS: Final = 20
 
 _FILES: Final = frozenset({SETTINGS_FILE, RESULT_FILE, COST_FILE, SESSIONS_FOLDER, SUBMISSION_FILE})
 """Files of a rollout."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LeaderboardProtocol:
-    """Common protocol of the rows of a leaderboard. Participant and Ad-Wizard are scripted.
-
-    Attributes:
-        folds: folds whose towns a rollout may be played in; it covers one of them as a whole, in the usual order.
-        sessions: number of sessions; if more were allowed, a submitter could stop at the best moment.
-        seed: seed of the rollout.
-        config: settings of the engine.
-    """
-
-    folds: tuple[str, ...] = (TownFold.SEEN, TownFold.DEVELOPMENT, TownFold.UNSEEN)
-    sessions: int = 100
-    seed: int = 0
-    config: EnvConfig = EnvConfig()
-
-    def __post_init__(self) -> None:
-        if self.sessions < 1:
-            raise ValueError(f"sessions is {self.sessions}; it must be at least 1")
-
-    def faults(self, settings: Mapping[str, Any]) -> Iterator[str]:
-        """Yields the parts of a rollout's settings (`RolloutSettings.to_json`) that the protocol does not allow."""
-        yield from faults_of_tier(settings)
-        towns = [str(town) for town in settings["towns"]]
-        whole = {fold: list(parse_towns(fold)) for fold in self.folds}
-        if fold_of_towns(towns) not in self.folds or towns not in whole.values():
-            choices = " or ".join(towns_text(there, ", ") for there in whole.values())
-            yield f"towns are {one_line(towns_text(towns, ', '))}; the protocol has {choices}, in this order"
-        if settings["sessions_planned"] != self.sessions:
-            yield f"{settings['sessions_planned']} sessions; the protocol has {self.sessions}"
-        if settings["seed"] != self.seed:
-            yield f"seed is {settings['seed']}; that of the protocol is {self.seed}"
-        for role in (Role.PARTICIPANT, Role.AD_WIZARD):
-            if settings[str(role)] != ALL_SCRIPTED[role].name:
-                yield f"{role} is {one_line(settings[str(role)])}; that of the protocol is {ALL_SCRIPTED[role].name}"
-        given, wanted = settings["config"], self.config.record()
-        for name in sorted({*given, *wanted}):
-            if not same_json(given.get(name), wanted.get(name)):
-                yield (
-                    f"config, {name} is {short_repr(given.get(name))}; that of the protocol is "
-                    f"{short_repr(wanted.get(name))}"
-                )
-
-    def plans(self, towns: Sequence[str]) -> tuple[RolloutPlan, ...]:
-        """Returns the sessions of the protocol in the towns of a fold, in order."""
-        return RolloutSettings(towns=tuple(towns), sessions=self.sessions, seed=self.seed).plans()
-
-
-def faults_of_tier(settings: Mapping[str, Any]) -> Iterator[str]:
-    """Yields the parts of a rollout's settings that come from the options `--tier` and `--trials`."""
-    if tier := settings.get("tier"):
-        yield f"tier is {short_repr(tier)}; submissions have the default conditions: run the rollout without --tier"
-    if trials := settings.get("trials"):
-        yield f"{short_repr(trials)} trials of each scenario; the protocol has one: run the rollout without --trials"
-
-
-PROTOCOL: Final = LeaderboardProtocol()
-"""Protocol of the leaderboard."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,6 +89,7 @@ def check_submission(
     protocol: LeaderboardProtocol = PROTOCOL,
     workers: int = 1,
     on_session: Callable[[int, int], None] | None = None,
+    drives: Mapping[str, ReferenceDrive] | None = None,
 ) -> SubmissionCheck:
     """Checks the folder of a rollout, and makes its submission.
 
@@ -163,6 +102,7 @@ def check_submission(
         workers: number of processes; more than one needs an importable main module of the caller.
         on_session: called with the numbers of checks done and planned: one for each session, and one more for each
             of a sample.
+        drives: references that the receiver has measured, by `reference_drives.drive_key`; others are measured now.
 
     Raises:
         RolloutError: there is no rollout, its files are damaged, or `sample` is below 1.
@@ -173,14 +113,16 @@ def check_submission(
     root = Path(folder)
     result = read_result(root)
     settings = result.settings
-    faults = [*faults_of_tier(settings)]  # from which most others would follow
+    faults = [*protocol.faults_of_conditions(settings)]
     if not faults:
         faults += [*protocol.faults(settings), *faults_of_claims(settings), *_differences_of_settings(root, result)]
         faults += _surplus_files(root)
     if faults:
         return SubmissionCheck(faults=tuple(faults), submission=None, resimulated=(), sessions=protocol.sessions)
-    plans, cast = protocol.plans(settings["towns"]), _cast(settings)
-    check = _SessionsCheck(partial(SessionChecker, root, protocol.config, cast), result, plans, workers, on_session)
+    wanted = protocol.settings(settings)
+    plans, cast = wanted.plans(), _cast(settings, wanted)
+    prepare = partial(SessionChecker, root, wanted, cast, drives or {})
+    check = _SessionsCheck(prepare, result, plans, workers, on_session)
     faults += _missing_and_surplus(root, result, plans)
     drawn_by = None
     if sample is None or sample >= len(plans):
@@ -303,12 +245,19 @@ def _findings(
     yield from run_tasks(prepare, tasks, workers=max(1, min(workers, len(tasks))))
 
 
-def _cast(settings: Mapping[str, Any]) -> dict[Role, Player]:
-    """Returns the players that are played again: the partners, and the Co-Wizard if the package can play it."""
-    cast = dict(ALL_SCRIPTED)
-    del cast[Role.CO_WIZARD]
-    player = shipped_player(str(settings[str(Role.CO_WIZARD)]))
-    return cast if player is None or not can_play(player) else {**cast, Role.CO_WIZARD: player}
+def _cast(settings: Mapping[str, Any], wanted: RolloutSettings) -> dict[Role, Player]:
+    """Returns the players that are played again: the partners, and the Co-Wizard if the package can play it.
+
+    Raises:
+        RolloutError: a library is missing that a partner needs.
+    """
+    partners = wanted.players
+    del partners[Role.CO_WIZARD]
+    for role, player in (*partners.items(), *((Role.PARTICIPANT, each) for each in wanted.pool)):
+        if not can_play(player, role):
+            raise RolloutError(f"{role}: {player.name} cannot be played again; run: {pip_install('baselines')}")
+    own = shipped_player(str(settings[str(Role.CO_WIZARD)]))
+    return partners if own is None or not can_play(own) else {**partners, Role.CO_WIZARD: own}
 
 
 def _missing_and_surplus(root: Path, result: RolloutResult, plans: Sequence[RolloutPlan]) -> list[str]:
@@ -383,7 +332,7 @@ def _page(result: RolloutResult, digests: Mapping[int, str], found: SubmissionCh
         "version": VERSION,
         "package_version": __version__,
         "settings": dict(result.settings),
-        "part": fold_of_towns(result.settings["towns"]),
+        "part": part_of(result.settings),
         "results": {name: value for name, value in table.items() if name not in ("version", "settings", "rows")},
         "sessions": [{**row.to_json(), "sha256": digests.get(row.number)} for row in result.rows],
         "check": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -61,6 +61,7 @@ def play_session(
     on_step: Callable[[SessionEngine], None] | None = None,
     scenario: Scenario | None = None,
     trial: int = 0,
+    extra: Mapping[str, object] | None = None,
 ) -> SessionSummary:
     """Plays a session from reset to end.
 
@@ -74,6 +75,7 @@ def play_session(
         on_step: called with the engine after the reset and after each decision.
         scenario: scenario that the engine plays in place of the drawn one.
         trial: number of the trial, of several of one scenario, in which the policies have other seeds.
+        extra: further fields of `SessionHeader.extra`.
 
     Returns:
         The summary of the session; with `usage`, by role, if a policy has any (`Policy.usage_of`).
@@ -85,7 +87,14 @@ def play_session(
         OSError: the folder cannot be written.
     """
     cast = SessionCast(
-        host=host, policies=policies, seed=seed, folder=folder, create=create, scenario=scenario, trial=trial
+        host=host,
+        policies=policies,
+        seed=seed,
+        folder=folder,
+        create=create,
+        scenario=scenario,
+        trial=trial,
+        extra=extra or {},
     )
     return _play_alone(cast, on_step)
 
@@ -168,6 +177,7 @@ class SessionCast:
     create: bool = True
     scenario: Scenario | None = None
     trial: int = 0
+    extra: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,7 +211,7 @@ class _Play:
         if cast.folder is None:
             yield cls(host=cast.host, policies=policies, states=states, writer=None, recorder=None)
             return
-        header = with_personas(engine.session_header(), policies, states)
+        header = with_personas(with_extra(engine.session_header(), cast.extra), policies, states)
         with SessionWriter(cast.folder, header, create=cast.create) as writer, noticing_deletion(writer.folder):
             recorder = SessionRecorder(engine, writer)
             yield cls(host=cast.host, policies=policies, states=states, writer=writer, recorder=recorder)
@@ -234,6 +244,11 @@ def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> 
     """Returns the costs of the policies of a session, by role; empty if there are none."""
     found = {str(role): policy.usage_of(states[role]) for role, policy in policies.items()}
     return {role: usage for role, usage in found.items() if usage is not None}
+
+
+def with_extra(header: SessionHeader, extra: Mapping[str, object]) -> SessionHeader:
+    """Returns a header with further fields in `extra`; the same one if there are none."""
+    return replace(header, extra={**header.extra, **extra}) if extra else header
 
 
 def with_personas(

@@ -15,6 +15,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypedDict
 
 from dorothie_gym._version import __version__
@@ -61,8 +62,10 @@ def drive_key(scenario: Scenario, town: str) -> str:
     return f"{town}/{scenario.storyboard.name}/{scenario.seed}"
 
 
-def reference_of(town: Town, scenario: Scenario) -> ReferenceDrive:
-    """Returns the reference of a scenario: the stored one, else that of a drive that is played now.
+def reference_of(
+    town: Town, scenario: Scenario, known: Mapping[str, ReferenceDrive] = MappingProxyType({})
+) -> ReferenceDrive:
+    """Returns the reference of a scenario: a known or stored one, else that of a drive that is played now.
 
     Where the reference pair does not reach the destination, its time is the expected one of the routes
     (`time_allowed.reference_seconds`), and it has no exchanges.
@@ -70,9 +73,20 @@ def reference_of(town: Town, scenario: Scenario) -> ReferenceDrive:
     Args:
         town: town of the scenario.
         scenario: the scenario.
+        known: references that were measured before (`reference-times`), by `drive_key`.
     """
-    stored = stored_drives().get(drive_key(scenario, town.name))
+    key = drive_key(scenario, town.name)
+    stored = known.get(key) or stored_drives().get(key)
     return measure_drive(town, scenario) if stored is None else stored
+
+
+def scenario_with_reference(
+    engine: SessionEngine, seed: int, known: Mapping[str, ReferenceDrive] = MappingProxyType({})
+) -> Scenario:
+    """Returns the scenario that an engine draws from a seed, with its reference (`reference_of`)."""
+    town = engine.town_of(seed)
+    drawn = draw_scenario(town, engine.template, seed, engine.config.stops, engine.config.talk)
+    return replace(drawn, reference=reference_of(town, drawn, known))
 
 
 def measure_drive(town: Town, scenario: Scenario) -> ReferenceDrive:

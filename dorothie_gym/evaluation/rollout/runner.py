@@ -22,14 +22,14 @@ from dorothie_gym.evaluation.rollout.folder import PARTS_FOLDER, PlannedSession,
 from dorothie_gym.evaluation.rollout.on_ray import run_on_ray
 from dorothie_gym.evaluation.rollout.play import SessionCast, play_as_they_end
 from dorothie_gym.evaluation.rollout.processes import run_series
-from dorothie_gym.evaluation.rollout.reference_drives import reference_of
+from dorothie_gym.evaluation.rollout.reference_drives import scenario_with_reference
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, BatchPolicy
 from dorothie_gym.policies.policy_loader import Player
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording.files import SessionState, to_page
 from dorothie_gym.session.recording.session import Session, session_state
-from dorothie_gym.session.scenario import Scenario, draw_scenario
+from dorothie_gym.session.scenario import ReferenceDrive, Scenario
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.fields import SpaceLimits
 from dorothie_gym.support.files import write_atomically
@@ -59,12 +59,16 @@ class SessionMaker:
         config: settings of the sessions.
         cast: player of each role.
         references: whether scenarios get their reference drives (`reference_drives`).
+        extra: further fields of `SessionHeader.extra`.
+        drives: references that were measured before, by `reference_drives.drive_key`.
     """
 
     root: Path
     config: EnvConfig
     cast: Mapping[Role, Player]
     references: bool = False
+    extra: Mapping[str, object] = field(default_factory=dict)
+    drives: Mapping[str, ReferenceDrive] = field(default_factory=dict)
     _engines: dict[str, list[SessionEngine]] = field(default_factory=dict)
     _shared: dict[tuple[str, Role, SpaceLimits], AnyPolicy] = field(default_factory=dict)
     _scenarios: dict[tuple[str, int], Scenario] = field(default_factory=dict)
@@ -141,6 +145,7 @@ class SessionMaker:
             create=False,
             scenario=scenario,
             trial=plan.trial,
+            extra=self.extra,
         )
 
     def _policy(self, player: Player, role: Role, limits: SpaceLimits) -> AnyPolicy:
@@ -157,9 +162,7 @@ class SessionMaker:
         """Returns the scenario of a session with its reference, which is measured once for all trials."""
         key = plan.town, plan.seed
         if key not in self._scenarios:
-            town = engine.town_of(plan.seed)
-            drawn = draw_scenario(town, engine.template, plan.seed, self.config.stops, self.config.talk)
-            self._scenarios[key] = replace(drawn, reference=reference_of(town, drawn))
+            self._scenarios[key] = scenario_with_reference(engine, plan.seed, self.drives)
         return self._scenarios[key]
 
     def engine(self, town: str) -> SessionEngine:
@@ -237,6 +240,8 @@ class SessionJob(Generic[Result]):
         keep_errors: whether an error of a session becomes its outcome; otherwise it ends the run.
         writes_cost: whether time and workers are added up in `COST_FILE`.
         references: whether scenarios get their reference drives.
+        extra: further fields of `SessionHeader.extra`.
+        drives: references that were measured before, by `reference_drives.drive_key`.
     """
 
     settings_file: str
@@ -247,6 +252,8 @@ class SessionJob(Generic[Result]):
     keep_errors: bool = False
     writes_cost: bool = False
     references: bool = False
+    extra: Mapping[str, object] = field(default_factory=dict)
+    drives: Mapping[str, ReferenceDrive] = field(default_factory=dict)
 
     def batches(self, plans: Sequence[Plan], workers: int) -> list[PlanBatch[Plan]]:
         """Returns the sessions that are played at the same time: several where a policy may decide for all.
@@ -329,7 +336,7 @@ class _SessionTask(Generic[Result]):
 
     def __init__(self, root: Path, *, job: SessionJob[Result]) -> None:
         self._root, self._job = root, job
-        self._maker = SessionMaker(root, job.config, job.cast, job.references)
+        self._maker = SessionMaker(root, job.config, job.cast, job.references, job.extra, job.drives)
 
     def __call__(self, plan: Plan) -> SessionOutcome[Plan, Result]:
         begun = time.process_time()

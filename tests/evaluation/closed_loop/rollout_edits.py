@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, measure, read_result
-from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol
+from dorothie_gym.evaluation.closed_loop.protocol import LeaderboardProtocol
 from dorothie_gym.evaluation.closed_loop.usage import usage_to_json
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Role

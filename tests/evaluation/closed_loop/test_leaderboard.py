@@ -10,7 +10,14 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
 from dorothie_gym.errors import RolloutError
-from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutRow, RolloutSettings, roll_out, submission
+from dorothie_gym.evaluation.closed_loop import (
+    RolloutResult,
+    RolloutRow,
+    RolloutSettings,
+    protocol,
+    roll_out,
+    submission,
+)
 from dorothie_gym.evaluation.closed_loop.leaderboard import labels_of, leaderboard_page, read_entries
 from dorothie_gym.evaluation.tiers import TIERS, Tier
 from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS, UNSEEN_TOWNS
@@ -161,7 +168,7 @@ def test_claims_are_marked_in_page_output_and_json(tmp_path: Path) -> None:
 
 
 def test_checked_rollout_claims_only_what_nobody_can_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(submission, "PROTOCOL", PROTOCOL)
+    monkeypatch.setattr(protocol, "PROTOCOL", PROTOCOL)
     monkeypatch.setenv("COLUMNS", "200")
     roll_out(settings(), tmp_path / "lane-follow")
     write(tmp_path / "imported", "scripted", 4, towns=("Town01.xodr",))
@@ -242,8 +249,6 @@ def test_each_tier_is_a_part_of_its_own_with_its_headline(tmp_path: Path, tier: 
     assert "timely completion" in hard.splitlines()[2]
 
 
-def test_a_rollout_in_a_tier_or_with_trials_is_no_submission(tmp_path: Path) -> None:
-    (fault,) = submission.check_submission(in_tier(tmp_path / "tier", TIERS["strangers"])).faults
-    assert "without --tier" in fault and "strangers" in fault
+def test_a_rollout_with_trials_outside_of_a_tier_is_no_submission(tmp_path: Path) -> None:
     (fault,) = submission.check_submission(write(tmp_path / "trials", "scripted", 4, trials=2)).faults
     assert "without --trials" in fault

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from dorothie_gym.cli.app import app
 from dorothie_gym.evaluation.closed_loop.leaderboard import ENOUGH
 from dorothie_gym.evaluation.closed_loop.leaderboard_plan import LeaderboardPlan, usual_rows
-from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol
+from dorothie_gym.evaluation.closed_loop.protocol import LeaderboardProtocol
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import Player

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from dorothie_gym.evaluation.closed_loop import SessionRecord, measure
@@ -51,6 +53,17 @@ def test_infractions_are_counted_by_kind() -> None:
     assert measure(drive(STRAIGHT, events), street()).infractions == {
         "pedestrian": 1, "vehicle": 1, "static": 3, "red_light": 2, "stop_sign": 1, "off_road": 1, "timeout": 1,
     }  # fmt: skip
+
+
+def test_each_infraction_has_its_time_its_place_and_its_counterpart() -> None:
+    place = {"lane": 0, "station": 1.0, "x": 1.0, "y": 2.5, "key": 4, "other": None}
+    events = [event(6.0, EventType.RED_LIGHT, **place), hit(9.0, "Vehicles", own_fault=False), *ARRIVALS]
+    found = measure(drive(STRAIGHT, events), street())
+    red, behind = found.infraction_events
+    assert (red.kind, red.seconds, red.own_fault, red.place, red.counterpart) == ("red_light", 6.0, True, (1.0, 2.5), 4)
+    assert (behind.kind, behind.seconds, behind.own_fault) == ("hit_by_others", 9.0, False)
+    assert SessionRecord.from_json(json.loads(json.dumps(found.to_json()))) == found
+    assert "infraction_events" not in measure(drive(STRAIGHT, ARRIVALS), street()).to_json()
 
 
 def test_best_order_that_is_allowed_is_the_shortest_way() -> None:

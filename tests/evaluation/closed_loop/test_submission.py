@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
 from dorothie_gym.errors import RolloutError
-from dorothie_gym.evaluation.closed_loop import RolloutSettings, read_result, roll_out, submission
+from dorothie_gym.evaluation.closed_loop import RolloutSettings, protocol, read_result, roll_out
+from dorothie_gym.evaluation.closed_loop.protocol import LeaderboardProtocol
 from dorothie_gym.evaluation.closed_loop.submission import (
-    LeaderboardProtocol,
     SubmissionCheck,
     check_submission,
     differences_from,
@@ -151,7 +151,7 @@ def test_submission_file_is_compared_with_the_folder(honest: Path, tmp_path: Pat
 
 
 def test_command_writes_and_checks_a_submission(honest: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(submission, "PROTOCOL", PROTOCOL)
+    monkeypatch.setattr(protocol, "PROTOCOL", PROTOCOL)
     monkeypatch.setenv("COLUMNS", "200")
     file = tmp_path / "submission.json"
 

@@ -37,10 +37,7 @@ def test_stored_references_are_not_measured_again(monkeypatch: pytest.MonkeyPatc
     assert reference_of(town, scenario) == DRIVE
 
 
-def test_sessions_of_a_rollout_have_the_reference_of_their_scenario(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("dorothie_gym.evaluation.rollout.runner.reference_of", lambda town, scenario: DRIVE)
+def test_sessions_of_a_rollout_have_the_known_reference_of_their_scenario(tmp_path: Path) -> None:
     settings = RolloutSettings(
         towns=("brookside",),
         sessions=2,
@@ -48,7 +45,9 @@ def test_sessions_of_a_rollout_have_the_reference_of_their_scenario(
         references=True,
         config=EnvConfig(time_factor=0.1, observe_acts=False),
     )
-    result = roll_out(settings, tmp_path)
+    town = load_town("brookside")
+    known = {drive_key(draw_scenario(town, None, plan.seed), town.name): DRIVE for plan in settings.plans()}
+    result = roll_out(settings, tmp_path, drives=known)
     first, second = [row.record for row in result.rows]
     assert first is not None and second is not None
     assert first.reference == DRIVE and first.seconds == 12.0 and first.infractions == {"timeout": 1}
