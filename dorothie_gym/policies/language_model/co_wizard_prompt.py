@@ -27,6 +27,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     weather_words,
     words_fields,
 )
+from dorothie_gym.policies.language_model.sight_words import object_lines, sight_lines
 from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.session.spaces.observations import ExitColumn
@@ -43,8 +44,11 @@ if TYPE_CHECKING:
 AHEAD = (5, 10, 20, 30, 50, 80)
 """Distances ahead at which a place can be marked [m]."""
 
-SHOWN_OBJECTS = 6
-"""Number of objects in sight that a prompt shows."""
+MEASURED = 0.18
+"""Variance of the position above which it is not measured, but estimated from speed and steering [m^2]."""
+
+UNCERTAINTIES = (2, 5, 10, 20, 50)
+"""Uncertainties of the position that prompts show [m]."""
 
 SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
 """Names of several places, some of which may be missing from the map."""
@@ -246,13 +250,15 @@ def prompt_text(
         f"head lights {'on' if view.lights else 'off'}",
         f"Place: {street_here(view.raw, town, view.lane)}; weather: {weather_words(view.raw)}",
     ]
+    lines += _position_lines(view)
     if view.hazard is not ObjectClass.UNLABELED:
         lines.append(f"Ahead: {view.hazard.label}, {float(view.raw['hazard_distance'][0]):.0f} m")
     if view.manoeuvre is not None:
         angle = f" {view.angle:.0f}" if view.manoeuvre is PhysicalAction.J_TURN else ""
         lines.append(f"Prepared: {view.manoeuvre.label}{angle}")
     lines += section("Exits of the next junction", _exit_lines(view, town))
-    lines += section("In sight", _object_lines(view))
+    lines += sight_lines(view.raw)
+    lines += section("In sight", object_lines(view.raw))
     lines += section("Places on your map", _place_lines(view, town, visited))
     lines.append(_goal_line(view, navigator, goal, mark))
     if step is not None:
@@ -263,6 +269,16 @@ def prompt_text(
     lines += section("Just now", [f"- {event}" for event in events])
     lines.append(f"You can drive: {', '.join(drive_options(view, town))}")
     return "\n".join(lines)
+
+
+def _position_lines(view: CoWizardView) -> list[str]:
+    """Returns the line of a position that is not measured, as without satellite navigation; none for a measured one."""
+    if view.variance <= MEASURED:
+        return []
+    deviation = math.sqrt(view.variance)
+    within = next((metres for metres in UNCERTAINTIES if deviation <= metres), None)
+    words = f"more than {UNCERTAINTIES[-1]} m" if within is None else f"up to {within} m"
+    return [f"Position: only estimated, as satellite navigation is missing; it may be wrong by {words}"]
 
 
 def _exit_lines(view: CoWizardView, town: Town) -> list[str]:
@@ -279,14 +295,6 @@ def _exit_lines(view: CoWizardView, town: Town) -> list[str]:
 
 def _side(angle: int) -> str:
     return "straight" if abs(angle) < 45 else "left" if angle > 0 else "right"
-
-
-def _object_lines(view: CoWizardView) -> list[str]:
-    lines = []
-    for thing in view.objects[:SHOWN_OBJECTS]:
-        name = thing.kind.label if thing.prop is None else thing.prop.name.lower().replace("_", " ")
-        lines.append(f"- {name}, {thing.distance:.0f} m away")
-    return lines
 
 
 def _place_lines(view: CoWizardView, town: Town, visited: Collection[Place]) -> list[str]:
