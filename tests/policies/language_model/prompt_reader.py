@@ -9,20 +9,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 from dorothie_gym.dialogue import Direction, ParsedText, guess_spans, understand
-from dorothie_gym.dialogue.routes import PlanStep, StepAction, StepChange
+from dorothie_gym.dialogue.routes import ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
 
 USUAL_SPEED = 40
+SEARCH_SPEED = 30  # on the street of a place that is not on the map
 SLOW_TIME = 25.0
 NAMES = [name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)]
 SAME_EVERYWHERE = (LandmarkName.HOUSE, LandmarkName.PERSON)
 SIDES = (Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT)
 STEERING = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH)
 WRONG = re.compile(r"wrong (way|direction|turn)|passed it|past it|missed it|other way|the other one|behind us")
-NEAR = re.compile(r"(nearly|almost) there|(just|right|up) ahead|coming up|not far|very close|near now")
+NEAR = re.compile(r"(nearly|almost) (there|at)|(just|right|up) ahead|coming up|not far|(very|getting) close|near now")
 NEAR_SPEED = 20  # at which "stop" still comes in time
 HERE = re.compile(r"right here|this is it|here we are|we're here|there it is|this is the place|that's it")
 QUESTIONS = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.ALIGN)
@@ -40,6 +42,7 @@ class Page:
     prepared: str
     exits: list[tuple[int, str, str, float]]  # angle, direction, street, distance
     places: dict[str, str]  # street by label
+    away: dict[str, float]  # distance by label
     visited: list[str]
     others: list[str]
     goal: str
@@ -82,10 +85,12 @@ def read_page(text: str) -> Page:
         found = re.match(r"JTurn (-?\d+): (\w+), into (.*), in (\d+) m", line)
         assert found is not None, line
         exits.append((int(found[1]), found[2], found[3], float(found[4])))
-    places, visited = {}, list[str]()
+    places, away, visited = {}, {}, list[str]()
     for line in listed("Places"):
-        label, street, been = re.match(r"(.*), on (.*), \d+ m away[^;]*(;.*)?", line).groups()  # type: ignore[union-attr]
-        places[label] = street
+        found = re.match(r"(.*), on (.*), (\d+) m away[^;]*(;.*)?", line)
+        assert found is not None, line
+        label, street, distance, been = found.groups()
+        places[label], away[label] = street, float(distance)
         if been:
             visited.append(label)
     talk = [re.match(r"(\d+):(\d\d) (\w+): (.*)", line) for line in listed("Conversation")]
@@ -101,6 +106,7 @@ def read_page(text: str) -> Page:
         prepared=after("Prepared:"),
         exits=exits,
         places=places,
+        away=away,
         visited=visited,
         others=[f"another {label.split(' on ')[0]}" for label in places],
         goal=goal.split(",")[0],
@@ -139,7 +145,8 @@ class CoWizardReader:
         self._drive(page, note, answer)
         answer["note"] = "; ".join(f"{name}={value}" for name, value in note.items() if value)
         if any(name in note for name in ("turn", "wish", "go")):
-            answer["again"] = "1"
+            far = "wish" not in note and "go" not in note and page.exits and page.exits[0][3] > 120
+            answer["again"] = "3" if far else "1"
         return answer
 
     # --- listening --------------------------------------------------------------------------------------------------
@@ -149,6 +156,7 @@ class CoWizardReader:
         missed = WRONG.search(low) is not None
         if missed:
             self._doubt(page, note, answer)
+            _forget_turn(note)
         if HERE.search(low) and not page.routed and page.speed > 0:
             self._stop(page, note, answer)
             return
@@ -177,23 +185,29 @@ class CoWizardReader:
                 note["halt"] = "1"
             return
         steers = any(action in STEERING for action in actions)
+        landmarks = [name for name in landmarks if name not in words.dropped]
         if landmarks and not steers and GoalStatus.PENDING not in statuses:
             self._aim(page, landmarks[0], words, note, answer)
 
     def _follow(self, page: Page, words: ParsedText, note: dict[str, str], answer: dict[str, str]) -> None:
         """Takes the steps that the passenger asks for: the first at once, later turns when it is their time."""
-        steps = [step for step in words.plan.steps if step.action is not StepAction.VISIT]
+        pending = GoalStatus.PENDING in words.statuses  # of something later
+        unmeant = (StepAction.VISIT, StepAction.STOP) if pending else (StepAction.VISIT,)
+        steps = [step for step in words.plan.steps or _told(words) if step.action not in unmeant]
         steering = [step for step in steps if step.action in (StepAction.TURN, StepAction.U_TURN, StepAction.LANE)]
         if steering:
             if page.routed and answer["goal"] == "keep" and not _is_on_route(page, steering[0]):
                 self._doubt(page, note, answer)
+                if answer["goal"] == "keep" and "off" in note:  # for the second time: another place is meant
+                    answer["goal"] = "none"
+                note["off"] = "1"
             if page.marked and answer["goal"] == "keep":  # the place is not where it was supposed
                 answer["goal"] = "none" if page.goal == "an unknown place" else page.goal
         for step in steps[: 1 if steering and steps[0] is steering[0] else len(steps)]:
             self._obey(page, step, words, note, answer)
-        later = [step for step in steps[1:] if step.action in (StepAction.TURN, StepAction.STRAIGHT)]
+        later = list(takewhile(_is_plain_turn, steps[1:]))
         if steering and steps[0] is steering[0] and not page.routed:
-            note["then"] = ",".join(_code(step) for step in later[:3])
+            note["then"] = ",".join(map(_code, later[:3]))
         if not steps and words.distance is not None and not page.routed:
             answer["mark"] = _ahead(words.distance)
 
@@ -236,11 +250,11 @@ class CoWizardReader:
             answer["say"] = answer["say"] or "Okay."
         elif page.goal != label:
             note.clear()
-            note["go"] = "1"
+            note["go"], note["at"] = "1", streets[0] if streets else ""
             answer.update(goal=label, say="It is not on my map. Which way should I go?")
 
     def _stop(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
-        note.clear()
+        _clear(note)
         note["halt"] = "1"
         answer["drive"] = "Stop" if "Stop" in page.drives else "none"
 
@@ -253,7 +267,7 @@ class CoWizardReader:
             return
         answer["say"] = answer["say"] or "Okay."
         if action is StepAction.SPEED:
-            _change_speed(page, step, note)
+            _change_speed(page, step, words, note)
             return
         if action is StepAction.LIGHTS:
             label = "LightChange off" if step.change is StepChange.OFF else "LightChange on"
@@ -262,11 +276,10 @@ class CoWizardReader:
         note.pop("halt", None)
         note["go"] = "1"
         if action is StepAction.TURN:
-            street = step.condition.place.street if step.condition is not None else None
-            for name in ("wish", "then", "hold"):
+            for name in ("wish", "then", "hold", "past"):
                 note.pop(name, None)
             note["turn"] = step.direction.value if step.direction in SIDES else "any"
-            note["onto"] = f"{street.label} Street" if street is not None and street is not StreetName.UNKNOWN else ""
+            note["onto"], note["past"] = _street(step), _landmark_before(page, step)
             note["skip"] = str(step.ordinal - 1) if step.ordinal and step.ordinal > 1 else ""
         elif action is StepAction.U_TURN:
             note.pop("turn", None)
@@ -332,7 +345,8 @@ class CoWizardReader:
         if page.time > float(note.get("until", 0)):
             note.pop("speed", None)
             note.pop("until", None)
-        speed = int(note.get("speed", USUAL_SPEED))
+        usual = SEARCH_SPEED if page.off_map and page.street == note.get("at") else USUAL_SPEED
+        speed = int(note.get("speed", usual))
         if abs(page.cruise - speed) > 2:
             label = f"SpeedChange {'up' if page.cruise < speed else 'down'}"
             answer.update(drive=label if label in page.drives else "none", again="1")
@@ -350,14 +364,15 @@ class CoWizardReader:
         note.pop("hold", None)
         fitting = [(angle, street) for angle, way, street, _ in page.exits if note["turn"] in (way, "any")]
         onto = [(angle, street) for angle, street in fitting if street == note.get("onto")]
-        if note.get("onto") and not onto and note["turn"] == "any":
-            return next((label for label in straight if label in page.drives), "")
-        chosen = onto or fitting
+        later = bool(note.get("onto")) and not onto and note["turn"] == "any"
+        later = later or page.away.get(note.get("past", ""), 0.0) > page.exits[0][3] + 25.0
+        chosen = [] if later else onto or fitting
         if not chosen:
-            return ""
+            note["hold"] = "1"
+            return next((label for label in straight if label in page.drives), "")
         canonical = {"left": 90, "right": -90, "straight": 0}.get(note["turn"], 0)
         angle = min(chosen, key=lambda each: abs(each[0] - canonical))[0]
-        for name in ("turn", "onto", "skip", "hold"):
+        for name in ("turn", "onto", "skip", "hold", "past"):
             note.pop(name, None)
         label = f"JTurn {angle}"
         if label not in page.drives:
@@ -369,14 +384,14 @@ class CoWizardReader:
 def _next_of_plan(page: Page, note: dict[str, str]) -> None:
     """Takes the next turn of a description once the one before is done, and drops a turn that is not possible."""
     waits = page.car.startswith("waiting")
-    if waits and note.get("turn") and not any(note["turn"] in (way, "any") for _, way, _, _ in page.exits):
-        for name in ("turn", "onto", "skip", "hold", "then"):
-            note.pop(name, None)
+    if waits and note.get("turn") and not any(way in (note["turn"], "straight") for _, way, _, _ in page.exits):
+        _forget_turn(note)
     if "taken" in note and (not page.prepared and page.time - float(note["taken"]) > 2):
         note.pop("taken")
     if note.get("then") and "turn" not in note and "taken" not in note and "wish" not in note and not page.prepared:
         first, _, rest = note["then"].partition(",")
-        note.update(turn=first, onto="", skip="", then=rest)
+        way, _, street = first.partition("@")
+        note.update(turn=way, onto=street, skip="", then=rest)
 
 
 def _is_on_route(page: Page, step: PlanStep) -> bool:
@@ -388,16 +403,72 @@ def _is_on_route(page: Page, step: PlanStep) -> bool:
     return step.direction not in SIDES or f"({step.direction.value}," in page.step
 
 
+def _landmark_before(page: Page, step: PlanStep) -> str:
+    """The place on the map after which a turn is due."""
+    if step.condition is None or step.condition.relation is not ConditionRelation.AFTER:
+        return ""
+    name = step.condition.place.landmark
+    known = [label for label in page.places if name is not None and _name(label) == name.label]
+    return min(known, key=lambda label: page.away[label], default="")
+
+
+def _is_plain_turn(step: PlanStep) -> bool:
+    """Whether a step is one at the next junction, or onto a street."""
+    place = step.condition.place if step.condition is not None else None
+    plain = place is None or place.landmark is None
+    return plain and (
+        step.action is StepAction.STRAIGHT or (step.action is StepAction.TURN and step.direction in SIDES)
+    )
+
+
 def _code(step: PlanStep) -> str:
-    return step.direction.value if step.action is StepAction.TURN and step.direction in SIDES else "straight"
+    if step.action is StepAction.STRAIGHT or step.direction is None:
+        return "straight"
+    street = _street(step)
+    return f"{step.direction.value}@{street}" if street else step.direction.value
+
+
+def _street(step: PlanStep) -> str:
+    street = step.condition.place.street if step.condition is not None else None
+    return f"{street.label} Street" if street is not None and street is not StreetName.UNKNOWN else ""
+
+
+def _told(words: ParsedText) -> tuple[PlanStep, ...]:
+    """The step of a statement such as "we're turning left here"."""
+    acts = [span.act for span in guess_spans(words.text) if span.act.move is DialogueMove.INSTRUCT]
+    named = {action for act in acts for action in act.values(Slot.ACTION)}
+    kinds = {
+        ActionValue.J_TURN: StepAction.TURN,
+        ActionValue.LANE_SWITCH: StepAction.LANE,
+        ActionValue.U_TURN: StepAction.U_TURN,
+        ActionValue.STOP: StepAction.STOP,
+    }
+    side = words.direction if words.direction in SIDES else None
+    found = [kinds[action] for action in kinds if action in named]
+    if len(found) != 1 or (side is None and found[0] in (StepAction.TURN, StepAction.LANE)):
+        return ()
+    return (PlanStep(action=found[0], direction=side),)
+
+
+def _forget_turn(note: dict[str, str]) -> None:
+    for name in ("turn", "onto", "skip", "hold", "then", "past"):
+        note.pop(name, None)
+
+
+def _clear(note: dict[str, str]) -> None:
+    """Forgets all but the street of the place."""
+    kept = note.get("at", "")
+    note.clear()
+    note["at"] = kept
 
 
 def _slow(page: Page, note: dict[str, str], speed: int) -> None:
     note["speed"], note["until"] = str(speed), f"{page.time + SLOW_TIME:.0f}"
 
 
-def _change_speed(page: Page, step: PlanStep, note: dict[str, str]) -> None:
-    wanted = step.speed if step.speed is not None else page.cruise + (10 if step.change is StepChange.FASTER else -15)
+def _change_speed(page: Page, step: PlanStep, words: ParsedText, note: dict[str, str]) -> None:
+    said = step.speed if step.speed is not None else words.speed
+    wanted = said if said is not None else page.cruise + (10 if step.change is StepChange.FASTER else -15)
     _slow(page, note, min(max(5 * round(wanted / 5), 10), 60))
 
 
