@@ -168,16 +168,21 @@ def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
 
 def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | None:
     """Returns the centre of the lane of a street that is nearest to the car as the crow flies."""
-    indices, (x, y) = streets_named(view.raw["street_names"], street), view.position
-    found = []
-    for lane in town.lanes:
-        if lane.street in indices and not lane.in_junction:
-            middle = lane.position(lane.length / 2)
-            found.append((pm.hypot(middle[0] - x, middle[1] - y), lane.id))
+    x, y = view.position
+    middles = _middles(town, streets_named(view.raw["street_names"], street))
+    found = [(pm.hypot(middle[0] - x, middle[1] - y), lane) for lane, middle in middles]
     if not found:
         return None
     nearest = min(found)[1]
     return nearest, town.lanes[nearest].length / 2
+
+
+@lru_cache(maxsize=256)
+def _middles(town: Town, streets: frozenset[int]) -> tuple[tuple[int, tuple[float, float]], ...]:
+    """Returns the lanes of streets outside junctions, each with its centre [m]."""
+    lanes = (lane for lane in town.lanes if lane.street in streets and not lane.in_junction)
+    centres = ((lane.id, lane.position(lane.length / 2)) for lane in lanes)
+    return tuple((lane, (float(centre[0]), float(centre[1]))) for lane, centre in centres)
 
 
 def answer_schema(view: CoWizardView, town: Town) -> AnswerSchema:
