@@ -2,8 +2,9 @@
 
 A page has lines `Title: words`, and lists: a line `Title:` with lines `- item` below. A page of changes has the lines
 and lists that differ. Of the conversation it has the new lines, and of the places those whose words differ. Distances
-of places and of what is in sight change all the time: alone, they are shown with the whole page only. Where the exits
-of the next junction differ in their distance only, one line has it. A line `No longer:` names what has gone.
+of places, and distances and directions of what is in sight, change all the time: alone, they are shown with the whole
+page only. Where the exits of the next junction differ in their distance only, one line has it. A line `No longer:`
+names what has gone.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def _changed(title: str, old: Sequence[str], new: Sequence[str]) -> list[str]:
 
 
 def _kinds(section: Sequence[str]) -> list[str]:
-    return sorted(_NUMBER.sub("", line) for line in section)
+    return sorted(_name(line) for line in section)
 
 
 def _distance(exit_line: str) -> str:

@@ -79,8 +79,8 @@ def test_pages_of_changes_are_short_and_sufficient() -> None:
 
 
 def _without_far_distances(page: str) -> set[str]:
-    """Lines of a page; those of places and of things in sight without their distances."""
-    return {re.sub(r"\d+ m away", "", line) for line in page.splitlines()}
+    """Lines of a page; those of places without their distances, those of things in sight with their names only."""
+    return {re.sub(r"\d+ m away(, (ahead|behind|to the \w+))?", "", line) for line in page.splitlines()}
 
 
 def test_page_after_changes_is_the_whole_page_but_for_distances_of_places_and_things() -> None:

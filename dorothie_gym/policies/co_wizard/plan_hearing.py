@@ -366,7 +366,7 @@ def _counted_together(steps: tuple[PlanStep, ...]) -> tuple[PlanStep, ...]:
     """Returns the steps without a stretch that the number of the next turn counts again: "over two, third right"."""
     kept: list[PlanStep] = []
     steps = tuple(map(_way_along, steps))
-    for step, following in zip(steps, (*steps[1:], None), strict=True):
+    for step, following in zip(steps, (*steps, None)[1:], strict=True):
         turns = following is not None and following.action is StepAction.TURN and following.condition is None
         crossed = None if step.action is not StepAction.STRAIGHT else _crossed(step)
         if not (turns and crossed is not None and following is not None and following.ordinal == crossed + 1):

@@ -91,6 +91,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
 
     role = Role.AD_WIZARD
     patience = 12.0
+    action_field = "change"
 
     def begin(self, town: Town) -> AdWizardMemory:
         """Returns the memory before the first decision."""

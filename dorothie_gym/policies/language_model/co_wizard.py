@@ -94,6 +94,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
     """Interface of the Co-Wizard."""
 
     role = Role.CO_WIZARD
+    action_field = "drive"
 
     def begin(self, town: Town) -> CoWizardMemory:
         """Returns the memory before the first decision."""

@@ -27,6 +27,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     weather_words,
     words_fields,
 )
+from dorothie_gym.policies.language_model.sight_words import object_lines, sight_lines
 from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.session.spaces.observations import ExitColumn
@@ -43,8 +44,11 @@ if TYPE_CHECKING:
 AHEAD = (5, 10, 20, 30, 50, 80)
 """Distances ahead at which a place can be marked [m]."""
 
-SHOWN_OBJECTS = 6
-"""Number of objects in sight that a prompt shows."""
+MEASURED = 0.18
+"""Variance of the position above which it is not measured, but estimated from speed and steering [m^2]."""
+
+UNCERTAINTIES = (2, 5, 10, 20, 50)
+"""Uncertainties of the position that prompts show [m]."""
 
 SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
 """Names of several places, some of which may be missing from the map."""
@@ -164,16 +168,21 @@ def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
 
 def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | None:
     """Returns the centre of the lane of a street that is nearest to the car as the crow flies."""
-    indices, (x, y) = streets_named(view.raw["street_names"], street), view.position
-    found = []
-    for lane in town.lanes:
-        if lane.street in indices and not lane.in_junction:
-            middle = lane.position(lane.length / 2)
-            found.append((pm.hypot(middle[0] - x, middle[1] - y), lane.id))
+    x, y = view.position
+    middles = _middles(town, streets_named(view.raw["street_names"], street))
+    found = [(pm.hypot(middle[0] - x, middle[1] - y), lane) for lane, middle in middles]
     if not found:
         return None
     nearest = min(found)[1]
     return nearest, town.lanes[nearest].length / 2
+
+
+@lru_cache(maxsize=256)
+def _middles(town: Town, streets: frozenset[int]) -> tuple[tuple[int, tuple[float, float]], ...]:
+    """Returns the lanes of streets outside junctions, each with its centre [m]."""
+    lanes = (lane for lane in town.lanes if lane.street in streets and not lane.in_junction)
+    centres = ((lane.id, lane.position(lane.length / 2)) for lane in lanes)
+    return tuple((lane, (float(centre[0]), float(centre[1]))) for lane, centre in centres)
 
 
 def answer_schema(view: CoWizardView, town: Town) -> AnswerSchema:
@@ -246,13 +255,15 @@ def prompt_text(
         f"head lights {'on' if view.lights else 'off'}",
         f"Place: {street_here(view.raw, town, view.lane)}; weather: {weather_words(view.raw)}",
     ]
+    lines += _position_lines(view)
     if view.hazard is not ObjectClass.UNLABELED:
         lines.append(f"Ahead: {view.hazard.label}, {float(view.raw['hazard_distance'][0]):.0f} m")
     if view.manoeuvre is not None:
         angle = f" {view.angle:.0f}" if view.manoeuvre is PhysicalAction.J_TURN else ""
         lines.append(f"Prepared: {view.manoeuvre.label}{angle}")
     lines += section("Exits of the next junction", _exit_lines(view, town))
-    lines += section("In sight", _object_lines(view))
+    lines += sight_lines(view.raw)
+    lines += section("In sight", object_lines(view.raw))
     lines += section("Places on your map", _place_lines(view, town, visited))
     lines.append(_goal_line(view, navigator, goal, mark))
     if step is not None:
@@ -263,6 +274,16 @@ def prompt_text(
     lines += section("Just now", [f"- {event}" for event in events])
     lines.append(f"You can drive: {', '.join(drive_options(view, town))}")
     return "\n".join(lines)
+
+
+def _position_lines(view: CoWizardView) -> list[str]:
+    """Returns the line of a position that is not measured, as without satellite navigation; none for a measured one."""
+    if view.variance <= MEASURED:
+        return []
+    deviation = math.sqrt(view.variance)
+    within = next((metres for metres in UNCERTAINTIES if deviation <= metres), None)
+    words = f"more than {UNCERTAINTIES[-1]} m" if within is None else f"up to {within} m"
+    return [f"Position: only estimated, as satellite navigation is missing; it may be wrong by {words}"]
 
 
 def _exit_lines(view: CoWizardView, town: Town) -> list[str]:
@@ -279,14 +300,6 @@ def _exit_lines(view: CoWizardView, town: Town) -> list[str]:
 
 def _side(angle: int) -> str:
     return "straight" if abs(angle) < 45 else "left" if angle > 0 else "right"
-
-
-def _object_lines(view: CoWizardView) -> list[str]:
-    lines = []
-    for thing in view.objects[:SHOWN_OBJECTS]:
-        name = thing.kind.label if thing.prop is None else thing.prop.name.lower().replace("_", " ")
-        lines.append(f"- {name}, {thing.distance:.0f} m away")
-    return lines
 
 
 def _place_lines(view: CoWizardView, town: Town, visited: Collection[Place]) -> list[str]:

@@ -27,9 +27,12 @@ from dorothie_gym.policies.language_model.role_interface import (
     with_talk,
     words_fields,
 )
+from dorothie_gym.policies.language_model.sight_words import object_lines, object_name, sight_lines
+from dorothie_gym.policies.participant.obstacles import obstacle_on_route
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress, stopping_distance
+from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.turn_lanes import next_turn
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
 from dorothie_gym.support import portable_math as pm
@@ -50,6 +53,9 @@ SAYING_STOP = 1.0
 LONG_STANDSTILL = 8.0
 """Standstill that triggers a call [s]."""
 
+OBSTACLE_SIGHT = 80.0
+"""Distance at which an obstacle on the way is noticed, as by the scripted participant [m]."""
+
 REPLAN_AFTER = 2
 """Decisions off the route after which another one is planned."""
 
@@ -60,7 +66,7 @@ class ParticipantMemory(Memory):
 
     Attributes:
         guide: name of the place to which it guides the car; empty if there is none.
-        progress: route to that place; None if there is none.
+        route: route to that place, if there is one, and the roadblocks that it leads around.
         told: kind and lane of the step of the route that was last pointed out.
         tasks: last observed list of tasks, with their states.
         standing_since: time since which the car stands [s]; None if it drives.
@@ -68,11 +74,16 @@ class ParticipantMemory(Memory):
     """
 
     guide: str = ""
-    progress: RouteProgress | None = None
+    route: RouteState = RouteState()
     told: tuple[str, int] = ("", -1)
     tasks: tuple[str, ...] = ()
     standing_since: float | None = None
     told_standing: bool = False
+
+    @property
+    def progress(self) -> RouteProgress | None:
+        """Progress on the way; None without one."""
+        return self.route.progress
 
 
 class ParticipantInterface(RoleInterface[ParticipantMemory]):
@@ -90,7 +101,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
         """Follows the route, and detects events that trigger a call."""
         view = ParticipantView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
-        memory = replace(memory, progress=_followed(memory, view))
+        memory = replace(memory, route=memory.route.with_progress(_followed(memory, view)))
         memory, said = with_heard(memory, observation, Role.CO_WIZARD, "driver")
         events = [f'The driver said: "{said}"'] if said else []
         if message := str(observation["message"]).strip():
@@ -99,8 +110,9 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
         if memory.tasks and tasks != memory.tasks:
             events.append("Your tasks have changed.")
         memory = replace(memory, tasks=tasks)
-        memory, noticed = _notice_standstill(memory, view)
-        events += noticed
+        for notice in (_notice_standstill, _notice_obstacle):
+            memory, noticed = notice(memory, view)
+            events += noticed
         memory, noticed = _notice_step(memory, view)
         return memory, (*events, *noticed)
 
@@ -114,7 +126,9 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
             f"Story: {str(observation['story']).strip()}",
             *section("Your tasks, in order", task_lines(observation, view)),
             f"Car: {view.speed * 3.6:.0f} km/h, on {street_here(observation, town, view.lane)}; "
-            f"weather: {weather_words(observation)}",
+            f"weather: {weather_words(observation)}; head lights {'on' if observation['lights'] else 'off'}",
+            *sight_lines(observation),
+            *section("In sight", object_lines(observation)),
             *section("Places", _place_lines(observation, view, town)),
             f"You guide to: {memory.guide or 'no place'}",
         ]
@@ -137,10 +151,10 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
         if label == KEEP:
             return memory, 0
         if label == NONE:
-            return replace(memory, guide="", progress=None), 0
+            return replace(memory, guide="", route=memory.route.with_progress(None)), 0
         place = named_places(observation, memory.town)[label].place
-        progress = RouteProgress.plan(memory.town, view.place, place)
-        return replace(memory, guide=label, progress=progress, told=("", -1)), 0
+        progress = RouteProgress.plan(memory.town, view.place, place, memory.route.blocked)
+        return replace(memory, guide=label, route=memory.route.with_progress(progress), told=("", -1)), 0
 
     def act(
         self, observation: ObservationMapping, memory: ParticipantMemory
@@ -191,7 +205,9 @@ def _followed(memory: ParticipantMemory, view: ParticipantView) -> RouteProgress
     if progress is None or view.turning:
         return progress
     progress = progress.followed(memory.town, view.lane, view.station)
-    return progress.replanned(memory.town, view.place) if progress.astray >= REPLAN_AFTER else progress
+    if progress.astray < REPLAN_AFTER:
+        return progress
+    return progress.replanned(memory.town, view.place, memory.route.blocked)
 
 
 def _next_step(memory: ParticipantMemory, view: ParticipantView) -> tuple[tuple[str, int], str, bool] | None:
@@ -231,6 +247,23 @@ def _notice_step(memory: ParticipantMemory, view: ParticipantView) -> tuple[Part
     if step is None or not step[2] or step[0] == memory.told:
         return memory, []
     return replace(memory, told=step[0]), [f"On the way: {step[1]}"]
+
+
+def _notice_obstacle(memory: ParticipantMemory, view: ParticipantView) -> tuple[ParticipantMemory, list[str]]:
+    """Notices an obstacle in sight on the way, and plans another way around it."""
+    progress = memory.progress
+    if progress is None or view.turning:
+        return memory, []
+    found = obstacle_on_route(memory.town, view, progress, OBSTACLE_SIGHT)
+    if found is None or memory.route.knows_roadblock(found[0]):
+        return memory, []
+    place, thing = found
+    route = memory.route.with_roadblock(memory.town, place)
+    another = progress.replanned(memory.town, view.place, route.blocked)
+    words = f"The way is blocked, {thing.distance:.0f} m from here: {object_name(thing)}."
+    if another.route is not None:
+        words += " The way there now leads around it."
+    return replace(memory, route=route.with_progress(another), told=("", -1)), [words]
 
 
 def _notice_standstill(memory: ParticipantMemory, view: ParticipantView) -> tuple[ParticipantMemory, list[str]]:

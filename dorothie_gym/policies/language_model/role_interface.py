@@ -96,10 +96,12 @@ class RoleInterface(ABC, Generic[M]):
 
     Attributes:
         patience: longest time between two calls as a multiple of `LanguageModelConfig.quiet_time`.
+        action_field: field of the answer with an action that may no longer be possible when it is due; empty for none.
     """
 
     role: ClassVar[Role]
     patience: ClassVar[float] = 1.0
+    action_field: ClassVar[str] = ""
 
     def __init__(self, limits: SpaceLimits) -> None:
         """Prepares the interface for spaces of given sizes."""

@@ -53,6 +53,7 @@ class TurnState:
         delay: simulated time that the last answer took [s].
         busy_until: time until which no further answer is requested [s].
         pending: answer that has not taken effect yet.
+        chosen: action of the last answer.
         expired: number of chosen actions that were no longer possible when they were due.
     """
 
@@ -62,6 +63,7 @@ class TurnState:
     delay: float = 0.0
     busy_until: float = 0.0
     pending: PendingAnswer | None = None
+    chosen: str = ""
     expired: int = 0
 
 
@@ -143,8 +145,17 @@ class RoleTurns:
     def act(self, observation: ObservationMapping, state: TurnState) -> tuple[ActionDict, TurnState]:
         """Returns the action of the decision."""
         action, memory, expired = self._interface.act(observation, state.memory)
-        return action, replace(state, memory=memory, expired=state.expired + expired)
+        return action, _with_expired(replace(state, memory=memory), expired)
 
     def _accept(self, observation: ObservationMapping, state: TurnState, answer: Mapping[str, str]) -> TurnState:
         memory, expired = self._interface.accept(observation, state.memory, answer)
-        return replace(state, memory=memory, expired=state.expired + expired)
+        chosen = answer.get(self._interface.action_field, "")
+        return _with_expired(replace(state, memory=memory, chosen=chosen), expired)
+
+
+def _with_expired(state: TurnState, expired: int) -> TurnState:
+    """Counts actions that were no longer possible; the next page tells of them."""
+    if not expired:
+        return state
+    told = f'What you chose, "{state.chosen}", was no longer possible, and has not been done.'
+    return replace(state, events=(*state.events, told), expired=state.expired + expired)

@@ -11,7 +11,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.notable_conditions import PARAMETER, notice, view_remark
@@ -20,12 +20,12 @@ from dorothie_gym.policies.observation_parser import (
     is_foggy,
     is_rainy,
     nearest_landmark,
-    place_on_lanes,
     street_of,
     weather,
 )
 from dorothie_gym.policies.participant.given_orders import last_given, turned_round_lately
 from dorothie_gym.policies.participant.goals import announcement
+from dorothie_gym.policies.participant.obstacles import obstacle_on_route
 from dorothie_gym.policies.participant.standstill import waits_for_road
 from dorothie_gym.policies.participant.stories import picks_up, purpose_of_target
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
@@ -35,7 +35,6 @@ from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.routing import Place
     from dorothie_gym.policies.participant.state import ParticipantState
     from dorothie_gym.policies.participant.view import ParticipantView
     from dorothie_gym.tasks.purposes import Purpose
@@ -136,7 +135,8 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
     progress = state.route.progress
     if progress is None:
         return
-    found, prop = _obstacle_on_route(state, view)
+    seen = obstacle_on_route(state.town, view, progress, state.config.roadblock_sight)
+    found = None if seen is None else seen[0]
     if found is None and near:
         ahead = min(view.station + 12.0, state.town.lanes[view.lane].length)
         found = (view.lane, ahead)
@@ -148,20 +148,10 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
     state.route = route.with_progress(progress)
     state.guidance = state.guidance.for_new_route(progress.left(view.station))
     if state.guidance.guiding and not near:
-        obstacle = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC, prop=prop)
+        obstacle = Proposition.of(
+            Predicate.BLOCKED, object=ObjectClass.STATIC, prop=None if seen is None else seen[1].prop
+        )
         state.say_only(intend(Function.INFORM, obstacle, urgent=True))
-
-
-def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[Place | None, PropKind | None]:
-    """Returns the place of the first obstacle in sight on the next lanes of the route, and its kind."""
-    for thing in view.objects:
-        if thing.kind is ObjectClass.STATIC and thing.distance < state.config.roadblock_sight:
-            lanes = [leg.lane for leg in state.route.to_goal.legs[:6]]
-            found = place_on_lanes(state.town, lanes, thing.x, thing.y)
-            behind = found is not None and found[0] == view.lane and found[1] < view.station
-            if found is not None and not behind:
-                return found, thing.prop
-    return None, None
 
 
 def _mention_view(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:

@@ -50,3 +50,11 @@ def test_a_corrected_change_of_speed_undoes_the_other_one() -> None:
     ride.say("go faster", seconds=5.0)
     ride.say("sorry, I meant slower", seconds=5.0)
     assert CoWizardView.read(ride.observations["co_wizard"], ride.env.town).cruise < before - 3.0
+
+
+def test_a_change_to_a_lane_that_is_not_there_is_refused_in_words() -> None:
+    ride = Ride(4)
+    ride.run(2.0)
+    ride.order({"action": "lane", "direction": "left"})
+    ride.run(2.0)
+    assert "no left lane" in ride.words

@@ -9,17 +9,23 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 from dorothie_gym.dialogue import Direction, ParsedText, guess_spans, understand
+from dorothie_gym.dialogue.routes import ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
 
 USUAL_SPEED = 40
+SEARCH_SPEED = 30  # on the street of a place that is not on the map
 SLOW_TIME = 25.0
 NAMES = [name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)]
 SAME_EVERYWHERE = (LandmarkName.HOUSE, LandmarkName.PERSON)
+SIDES = (Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT)
 STEERING = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH)
-WRONG = re.compile(r"wrong (way|direction|turn)|passed it|past it|missed it|other way|the other one")
+WRONG = re.compile(r"wrong (way|direction|turn)|passed it|past it|missed it|other way|the other one|behind us")
+NEAR = re.compile(r"(nearly|almost) (there|at)|(just|right|up) ahead|coming up|not far|(very|getting) close|near now")
+NEAR_SPEED = 20  # at which "stop" still comes in time
 HERE = re.compile(r"right here|this is it|here we are|we're here|there it is|this is the place|that's it")
 QUESTIONS = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.ALIGN)
 
@@ -36,12 +42,14 @@ class Page:
     prepared: str
     exits: list[tuple[int, str, str, float]]  # angle, direction, street, distance
     places: dict[str, str]  # street by label
+    away: dict[str, float]  # distance by label
     visited: list[str]
     others: list[str]
     goal: str
     there: bool
     routed: bool
     off_map: bool
+    marked: bool
     step: str
     due: bool
     note: dict[str, str]
@@ -77,10 +85,12 @@ def read_page(text: str) -> Page:
         found = re.match(r"JTurn (-?\d+): (\w+), into (.*), in (\d+) m", line)
         assert found is not None, line
         exits.append((int(found[1]), found[2], found[3], float(found[4])))
-    places, visited = {}, list[str]()
+    places, away, visited = {}, {}, list[str]()
     for line in listed("Places"):
-        label, street, been = re.match(r"(.*), on (.*), \d+ m away[^;]*(;.*)?", line).groups()  # type: ignore[union-attr]
-        places[label] = street
+        found = re.match(r"(.*), on (.*), (\d+) m away[^;]*(;.*)?", line)
+        assert found is not None, line
+        label, street, distance, been = found.groups()
+        places[label], away[label] = street, float(distance)
         if been:
             visited.append(label)
     talk = [re.match(r"(\d+):(\d\d) (\w+): (.*)", line) for line in listed("Conversation")]
@@ -96,12 +106,14 @@ def read_page(text: str) -> Page:
         prepared=after("Prepared:"),
         exits=exits,
         places=places,
+        away=away,
         visited=visited,
         others=[f"another {label.split(' on ')[0]}" for label in places],
         goal=goal.split(",")[0],
         there="you are there" in goal,
-        routed="by the route" in goal or "you are there" in goal,
+        routed=("by the route" in goal or "you are there" in goal) and "marked" not in goal,
         off_map="not on your map" in goal,
+        marked="marked" in goal,
         step=route.partition(": ")[2],
         due=route.startswith("now"),
         note=dict(part.split("=", 1) for part in after("Your note:").split("; ") if "=" in part),
@@ -133,21 +145,26 @@ class CoWizardReader:
         self._drive(page, note, answer)
         answer["note"] = "; ".join(f"{name}={value}" for name, value in note.items() if value)
         if any(name in note for name in ("turn", "wish", "go")):
-            answer["again"] = "1"
+            far = "wish" not in note and "go" not in note and page.exits and page.exits[0][3] > 120
+            answer["again"] = "3" if far else "1"
         return answer
 
     # --- listening --------------------------------------------------------------------------------------------------
 
     def _hear(self, page: Page, text: str, note: dict[str, str], answer: dict[str, str]) -> None:
-        words = understand(text)
-        if WRONG.search(text.lower()):
+        words, low = understand(text), text.lower()
+        missed = WRONG.search(low) is not None
+        if missed:
             self._doubt(page, note, answer)
+            _forget_turn(note)
+        if HERE.search(low) and not page.routed and page.speed > 0:
+            self._stop(page, note, answer)
             return
-        if HERE.search(text.lower()) and page.off_map and page.speed > 0:
-            self._obey(page, ActionValue.STOP, DialogueAct.of(DialogueMove.INSTRUCT), words, note, answer)
-            return
-        for span in guess_spans(text):
+        for span in guess_spans(text) if not missed else ():
             self._take(page, span.act, words, note, answer)
+        self._follow(page, words, note, answer)
+        if NEAR.search(low) and not page.routed:
+            _slow(page, note, NEAR_SPEED)
         if not answer["say"] and text.rstrip().endswith("?"):
             answer["say"] = "Yes."
 
@@ -167,21 +184,32 @@ class CoWizardReader:
                 note.clear()
                 note["halt"] = "1"
             return
-        turns = [action for action in actions if action in STEERING]
-        if landmarks and not turns and GoalStatus.PENDING not in statuses:
+        steers = any(action in STEERING for action in actions)
+        landmarks = [name for name in landmarks if name not in words.dropped]
+        if landmarks and not steers and GoalStatus.PENDING not in statuses:
             self._aim(page, landmarks[0], words, note, answer)
-        if turns and page.routed and answer["goal"] == "keep" and not self._is_on_route(page, words, turns[0]):
-            self._doubt(page, note, answer)
-        for action in actions:
-            self._obey(page, action, act, words, note, answer)
-        if not actions and words.distance is not None and page.off_map:
-            answer["mark"] = _ahead(words.distance)
 
-    def _is_on_route(self, page: Page, words: ParsedText, action: ActionValue) -> bool:
-        """Whether an instruction is the next step of the route that the prompt shows."""
-        if action is not ActionValue.J_TURN:
-            return action.label in page.step
-        return words.direction is None or f"({words.direction.value}," in page.step
+    def _follow(self, page: Page, words: ParsedText, note: dict[str, str], answer: dict[str, str]) -> None:
+        """Takes the steps that the passenger asks for: the first at once, later turns when it is their time."""
+        pending = GoalStatus.PENDING in words.statuses  # of something later
+        unmeant = (StepAction.VISIT, StepAction.STOP) if pending else (StepAction.VISIT,)
+        steps = [step for step in words.plan.steps or _told(words) if step.action not in unmeant]
+        steering = [step for step in steps if step.action in (StepAction.TURN, StepAction.U_TURN, StepAction.LANE)]
+        if steering:
+            if page.routed and answer["goal"] == "keep" and not _is_on_route(page, steering[0]):
+                self._doubt(page, note, answer)
+                if answer["goal"] == "keep" and "off" in note:  # for the second time: another place is meant
+                    answer["goal"] = "none"
+                note["off"] = "1"
+            if page.marked and answer["goal"] == "keep":  # the place is not where it was supposed
+                answer["goal"] = "none" if page.goal == "an unknown place" else page.goal
+        for step in steps[: 1 if steering and steps[0] is steering[0] else len(steps)]:
+            self._obey(page, step, words, note, answer)
+        later = list(takewhile(_is_plain_turn, steps[1:]))
+        if steering and steps[0] is steering[0] and not page.routed:
+            note["then"] = ",".join(map(_code, later[:3]))
+        if not steps and words.distance is not None and not page.routed:
+            answer["mark"] = _ahead(words.distance)
 
     def _doubt(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
         """Drops a place that the passenger does not mean."""
@@ -222,61 +250,55 @@ class CoWizardReader:
             answer["say"] = answer["say"] or "Okay."
         elif page.goal != label:
             note.clear()
-            note["go"] = "1"
+            note["go"], note["at"] = "1", streets[0] if streets else ""
             answer.update(goal=label, say="It is not on my map. Which way should I go?")
 
+    def _stop(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
+        _clear(note)
+        note["halt"] = "1"
+        answer["drive"] = "Stop" if "Stop" in page.drives else "none"
+
     def _obey(
-        self,
-        page: Page,
-        action: ActionValue,
-        act: DialogueAct,
-        words: ParsedText,
-        note: dict[str, str],
-        answer: dict[str, str],
+        self, page: Page, step: PlanStep, words: ParsedText, note: dict[str, str], answer: dict[str, str]
     ) -> None:
+        action = step.action
+        if action in (StepAction.STOP, StepAction.WAIT):
+            self._stop(page, note, answer)
+            return
         answer["say"] = answer["say"] or "Okay."
-        if action is ActionValue.STOP:
-            note.clear()
-            note["halt"] = "1"
-            answer["drive"] = "Stop" if "Stop" in page.drives else "none"
-            answer["say"] = ""
+        if action is StepAction.SPEED:
+            _change_speed(page, step, words, note)
+            return
+        if action is StepAction.LIGHTS:
+            label = "LightChange off" if step.change is StepChange.OFF else "LightChange on"
+            answer["drive"] = label if label in page.drives else "none"
             return
         note.pop("halt", None)
         note["go"] = "1"
-        if action is ActionValue.J_TURN:
-            streets = [value for value in act.values(Slot.STREET) if isinstance(value, StreetName)]
-            note.pop("wish", None)
-            note["turn"] = words.direction.value if words.direction is not None else "any"
-            note["onto"] = f"{streets[0].label} Street" if streets else ""
-            note["skip"] = str(words.ordinal - 1) if words.ordinal and words.ordinal > 1 else ""
-        elif action is ActionValue.LANE_FOLLOW:
-            note.pop("wish", None)
-            if words.further or (words.distance is not None and (page.speed < 1 or page.off_map)):
-                answer["mark"] = _ahead(words.distance or 6.0)
-            elif words.direction is Direction.STRAIGHT or (page.exits and page.exits[0][3] < 60):
-                note.update(turn="straight", onto="", skip="")
-        elif action is ActionValue.U_TURN:
+        if action is StepAction.TURN:
+            for name in ("wish", "then", "hold", "past"):
+                note.pop(name, None)
+            note["turn"] = step.direction.value if step.direction in SIDES else "any"
+            note["onto"], note["past"] = _street(step), _landmark_before(page, step)
+            note["skip"] = str(step.ordinal - 1) if step.ordinal and step.ordinal > 1 else ""
+        elif action is StepAction.U_TURN:
             note.pop("turn", None)
+            note.pop("then", None)
             note["wish"] = "UTurn"
-        elif action is ActionValue.LANE_SWITCH:
-            side = "right" if words.direction is Direction.RIGHT else "left"
-            note["wish"] = f"LaneSwitch {side}"
-        elif action is ActionValue.SPEED_CHANGE:
-            if words.speed is None and words.faster is False and not page.routed:
-                answer["mark"] = "20 m ahead"
-            else:
-                asked = round(words.speed) if words.speed is not None else page.cruise + (10 if words.faster else -10)
-                note["speed"] = str(min(max(5 * round(asked / 5), 10), 60))
-                note["until"] = f"{page.time + SLOW_TIME:.0f}"
-        elif action is ActionValue.LIGHT_CHANGE:
-            label = "LightChange off" if words.lights is False else "LightChange on"
-            answer["drive"] = label if label in page.drives else "none"
+        elif action is StepAction.LANE:
+            note["wish"] = f"LaneSwitch {'right' if Direction.RIGHT in (step.direction, step.side) else 'left'}"
+        elif words.further or (step.distance is not None and not page.routed):
+            answer["mark"] = _ahead(step.distance or 6.0)
+        elif page.exits and page.exits[0][3] < 60 and not page.routed:
+            note.pop("wish", None)
+            note.update(turn="straight", onto="", skip="")
 
     # --- driving ----------------------------------------------------------------------------------------------------
 
     def _drive(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
         if answer["drive"] != "none":
             return
+        _next_of_plan(page, note)
         label = self._route_step(page, note, answer)
         if not label and "halt" in note:
             if page.stopped and page.time - page.last_said > 12 and not page.heard:
@@ -323,7 +345,8 @@ class CoWizardReader:
         if page.time > float(note.get("until", 0)):
             note.pop("speed", None)
             note.pop("until", None)
-        speed = int(note.get("speed", USUAL_SPEED))
+        usual = SEARCH_SPEED if page.off_map and page.street == note.get("at") else USUAL_SPEED
+        speed = int(note.get("speed", usual))
         if abs(page.cruise - speed) > 2:
             label = f"SpeedChange {'up' if page.cruise < speed else 'down'}"
             answer.update(drive=label if label in page.drives else "none", again="1")
@@ -341,17 +364,112 @@ class CoWizardReader:
         note.pop("hold", None)
         fitting = [(angle, street) for angle, way, street, _ in page.exits if note["turn"] in (way, "any")]
         onto = [(angle, street) for angle, street in fitting if street == note.get("onto")]
-        if note.get("onto") and not onto and note["turn"] == "any":
-            return next((label for label in straight if label in page.drives), "")
-        chosen = onto or fitting
+        later = bool(note.get("onto")) and not onto and note["turn"] == "any"
+        later = later or page.away.get(note.get("past", ""), 0.0) > page.exits[0][3] + 25.0
+        chosen = [] if later else onto or fitting
         if not chosen:
-            return ""
+            note["hold"] = "1"
+            return next((label for label in straight if label in page.drives), "")
         canonical = {"left": 90, "right": -90, "straight": 0}.get(note["turn"], 0)
         angle = min(chosen, key=lambda each: abs(each[0] - canonical))[0]
-        for name in ("turn", "onto", "skip", "hold"):
+        for name in ("turn", "onto", "skip", "hold", "past"):
             note.pop(name, None)
         label = f"JTurn {angle}"
-        return label if label in page.drives else ""
+        if label not in page.drives:
+            return ""
+        note["taken"] = f"{page.time:.0f}"
+        return label
+
+
+def _next_of_plan(page: Page, note: dict[str, str]) -> None:
+    """Takes the next turn of a description once the one before is done, and drops a turn that is not possible."""
+    waits = page.car.startswith("waiting")
+    if waits and note.get("turn") and not any(way in (note["turn"], "straight") for _, way, _, _ in page.exits):
+        _forget_turn(note)
+    if "taken" in note and (not page.prepared and page.time - float(note["taken"]) > 2):
+        note.pop("taken")
+    if note.get("then") and "turn" not in note and "taken" not in note and "wish" not in note and not page.prepared:
+        first, _, rest = note["then"].partition(",")
+        way, _, street = first.partition("@")
+        note.update(turn=way, onto=street, skip="", then=rest)
+
+
+def _is_on_route(page: Page, step: PlanStep) -> bool:
+    """Whether an instruction is the next step of the route that the prompt shows."""
+    if step.action is StepAction.U_TURN:
+        return "UTurn" in page.step
+    if step.action is StepAction.LANE:
+        return "LaneSwitch" in page.step
+    return step.direction not in SIDES or f"({step.direction.value}," in page.step
+
+
+def _landmark_before(page: Page, step: PlanStep) -> str:
+    """The place on the map after which a turn is due."""
+    if step.condition is None or step.condition.relation is not ConditionRelation.AFTER:
+        return ""
+    name = step.condition.place.landmark
+    known = [label for label in page.places if name is not None and _name(label) == name.label]
+    return min(known, key=lambda label: page.away[label], default="")
+
+
+def _is_plain_turn(step: PlanStep) -> bool:
+    """Whether a step is one at the next junction, or onto a street."""
+    place = step.condition.place if step.condition is not None else None
+    plain = place is None or place.landmark is None
+    return plain and (
+        step.action is StepAction.STRAIGHT or (step.action is StepAction.TURN and step.direction in SIDES)
+    )
+
+
+def _code(step: PlanStep) -> str:
+    if step.action is StepAction.STRAIGHT or step.direction is None:
+        return "straight"
+    street = _street(step)
+    return f"{step.direction.value}@{street}" if street else step.direction.value
+
+
+def _street(step: PlanStep) -> str:
+    street = step.condition.place.street if step.condition is not None else None
+    return f"{street.label} Street" if street is not None and street is not StreetName.UNKNOWN else ""
+
+
+def _told(words: ParsedText) -> tuple[PlanStep, ...]:
+    """The step of a statement such as "we're turning left here"."""
+    acts = [span.act for span in guess_spans(words.text) if span.act.move is DialogueMove.INSTRUCT]
+    named = {action for act in acts for action in act.values(Slot.ACTION)}
+    kinds = {
+        ActionValue.J_TURN: StepAction.TURN,
+        ActionValue.LANE_SWITCH: StepAction.LANE,
+        ActionValue.U_TURN: StepAction.U_TURN,
+        ActionValue.STOP: StepAction.STOP,
+    }
+    side = words.direction if words.direction in SIDES else None
+    found = [kinds[action] for action in kinds if action in named]
+    if len(found) != 1 or (side is None and found[0] in (StepAction.TURN, StepAction.LANE)):
+        return ()
+    return (PlanStep(action=found[0], direction=side),)
+
+
+def _forget_turn(note: dict[str, str]) -> None:
+    for name in ("turn", "onto", "skip", "hold", "then", "past"):
+        note.pop(name, None)
+
+
+def _clear(note: dict[str, str]) -> None:
+    """Forgets all but the street of the place."""
+    kept = note.get("at", "")
+    note.clear()
+    note["at"] = kept
+
+
+def _slow(page: Page, note: dict[str, str], speed: int) -> None:
+    note["speed"], note["until"] = str(speed), f"{page.time + SLOW_TIME:.0f}"
+
+
+def _change_speed(page: Page, step: PlanStep, words: ParsedText, note: dict[str, str]) -> None:
+    said = step.speed if step.speed is not None else words.speed
+    wanted = said if said is not None else page.cruise + (10 if step.change is StepChange.FASTER else -15)
+    _slow(page, note, min(max(5 * round(wanted / 5), 10), 60))
 
 
 def _name(label: str) -> str:

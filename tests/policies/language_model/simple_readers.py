@@ -7,6 +7,10 @@ import re
 
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField
 
+LOST = re.compile(r"didn't|catch|afraid|don't|can't|where|which way|should I|lost|reached|arrived", re.IGNORECASE)
+STANDSTILL = 12  # silence of a standing car after which the way is said again [s]
+REPEAT = 9  # silence after which a turn that is near is said again [s]
+
 
 def listed(prompt: str, title: str) -> list[str]:
     """Lines of a list in a prompt."""
@@ -32,16 +36,40 @@ def guide(prompt: str) -> dict[str, str]:
     current = re.search(r"You guide to: (.*)", prompt)[1]  # type: ignore[index]
     if current != place:
         return {**answer, "guide": place, "say": f"Please go to the {name} on {street}."}
+    way = re.search(r"Way there: .*; (.*)", prompt)
+    step = words_of(way[1].removeprefix("next: ")) if way else f"To the {name} on {street}."
+    silence = time_of(prompt) - last_said(prompt)
+    speed = int(re.search(r"Car: (\d+) km/h", prompt)[1])  # type: ignore[index]
     for event in listed(prompt, "Just now"):
-        step = re.match(r"On the way: (?:next: )?(.*)", event)
-        if step is not None:
-            answer["say"] = words_of(step[1])
-        elif event.startswith("The driver said") and event.endswith('?"'):
-            way = re.search(r"Way there: .*; (.*)", prompt)
-            answer["say"] = words_of(way[1].removeprefix("next: ")) if way else f"To the {name} on {street}."
+        told = re.match(r"On the way: (?:next: )?(.*)", event)
+        if told is not None:
+            answer["say"] = words_of(told[1])
+        elif event.startswith("The driver said") and (event.endswith('?"') or LOST.search(event)):
+            answer["say"] = step
         elif event.startswith("The car has been standing"):
-            answer["say"] = "Please drive on."
+            answer["say"] = f"Please drive on. {step}"
+        elif event.startswith("The way is blocked"):
+            answer["say"] = f"The road is blocked. {step}"
+    if not answer["say"] and ((speed == 0 and silence > STANDSTILL) or (is_due(way) and silence > REPEAT)):
+        answer["say"] = f"To the {name} on {street}. {step}" if speed == 0 else step
     return answer
+
+
+def time_of(prompt: str) -> int:
+    minutes, seconds = re.search(r"Time: (\d+):(\d\d)", prompt).groups()  # type: ignore[union-attr]
+    return 60 * int(minutes) + int(seconds)
+
+
+def last_said(prompt: str) -> int:
+    """Time of the own last words."""
+    said = [re.match(r"(\d+):(\d\d) you:", line) for line in listed(prompt, "Conversation")]
+    return max((60 * int(line[1]) + int(line[2]) for line in said if line is not None), default=0)
+
+
+def is_due(way: re.Match[str] | None) -> bool:
+    """Whether the next turn on the way is near."""
+    found = re.search(r"(left|right|round).* in (\d+) m", way[1]) if way is not None else None
+    return found is not None and int(found[2]) < 60
 
 
 def words_of(step: str) -> str:
@@ -55,8 +83,11 @@ def words_of(step: str) -> str:
         return "Slow down please."
     if step.startswith("the place is"):
         return "Go straight on."
-    way = step.split()[0]
-    return "Go straight on at the next junction." if way == "straight" else f"Turn {way} at the next junction."
+    way, _, street = step.partition(" in ")[0], None, step.partition(", onto ")[2]
+    if way == "straight on":
+        return "Go straight on at the next junction."
+    onto = f" onto {street}" if street and not street.startswith("an ") else ""
+    return f"Turn {way} at the next junction{onto}."
 
 
 class Interferer:
