@@ -11,6 +11,7 @@ from lxml import etree
 
 from dorothie_gym.maps import LinkType, Signal, SignalKind, Town, load_town, town_names, write_opendrive
 from dorothie_gym.maps.opendrive import import_opendrive
+from dorothie_gym.maps.opendrive.plan_view import Axis
 from tests.maps.equal_towns import differences
 from tests.maps.opendrive_text import shared_map
 from tests.maps.yaml_text import MIDTOWN
@@ -130,3 +131,25 @@ def test_file_is_the_same_for_the_same_town(tmp_path: Path) -> None:
     for name in ("one.xodr", "other.xodr"):
         write_opendrive(town, tmp_path / name)
     assert (tmp_path / "one.xodr").read_bytes() == (tmp_path / "other.xodr").read_bytes()
+
+
+def test_turns_keep_their_types_whatever_their_angles(tmp_path: Path) -> None:
+    town = all_features(tmp_path)
+    turn = next(
+        link
+        for link in town.links
+        if link.type is LinkType.STRAIGHT
+        and town.lanes[link.target].in_junction
+        and not town.lanes[link.source].in_junction
+    )
+    links = [dataclasses.replace(link, type=LinkType.LEFT) if link == turn else link for link in town.links]
+    changed = with_parts(town, links=links)
+    assert differences(changed, read_back(changed, tmp_path)) == []
+
+
+@pytest.mark.parametrize(("aside", "share"), [(0.0, 1.0), (3.0, 0.4), (4.5, 0.1), (6.0, -0.2), (-5.0, 2.0)])
+def test_lane_inside_of_a_bend_is_shorter_than_its_axis(aside: float, share: float) -> None:
+    turned = np.linspace(0.0, 0.5 * np.pi, 12)
+    axis = Axis(5.0 * np.column_stack((np.cos(turned), np.sin(turned))))  # turns left
+    found = axis.shortening(np.array([0.0, axis.length]), np.array([aside, aside]))
+    assert found == pytest.approx(share, abs=0.1)

@@ -67,7 +67,7 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
     lanes = _lanes(records, topology, lines)
     traffic = driving_side(records, lanes)
     lanes = tuple(_numbered_outwards(records, topology, lane, traffic) for lane in lanes)
-    links = successor_links(lanes, topology) + lane_change_links(records, topology, lanes)
+    links = successor_links(records, lanes, topology) + lane_change_links(records, topology, lanes)
     if trapped := trapped_lanes(lanes, links, traffic):
         topology, lanes, links = _without(trapped, topology, lanes, links, records)
     lanes, streets = find_streets(records, lanes, links)

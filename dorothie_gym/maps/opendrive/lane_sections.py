@@ -10,8 +10,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.import_notes import NoteKind
+from dorothie_gym.maps.link_types import LANE_CHANGES, LinkType
 from dorothie_gym.maps.opendrive.elements import Element, ElementReader, describe
-from dorothie_gym.maps.opendrive.own_data import LANE_BEGINS
+from dorothie_gym.maps.opendrive.own_data import LANE_BEGINS, TURN
 from dorothie_gym.maps.opendrive.records import DRIVING_TYPES, LaneRecord, SectionRecord
 
 if TYPE_CHECKING:
@@ -150,7 +151,13 @@ def _lane(reader: ElementReader, lane: Element, right_hand: bool) -> LaneRecord:
         reader.fail(lane, "is a driving lane without a width or border element")
     backward = _runs_against(reader, lane, (number < 0) == right_hand)
     begins = any(data.get("code") == LANE_BEGINS for data in lane.iterfind("userData"))
-    return replace(record, reversed=backward, access=_access(reader, lane), begins=begins)
+    return replace(record, reversed=backward, access=_access(reader, lane), begins=begins, turn=_turn(lane))
+
+
+def _turn(lane: Element) -> LinkType | None:
+    """Returns the type of the turn over a lane of our own files; None where they say none that there is."""
+    said = {str(data.get("value")) for data in lane.iterfind("userData") if data.get("code") == TURN}
+    return next((kind for kind in LinkType if kind not in LANE_CHANGES and said == {kind.value}), None)
 
 
 def _border(reader: ElementReader, lane: Element) -> Cubics | None:

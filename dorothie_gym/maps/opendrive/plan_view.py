@@ -96,6 +96,17 @@ class Axis:
         ahead, aside = self._local(points, station)
         return station, aside, ahead
 
+    def shortening(self, stations: Array, aside: Array) -> float:
+        """Returns the smallest length of a line relative to that of the axis beside it, negative where it runs back.
+
+        Args:
+            stations: distances along the axis (n,), ascending [m].
+            aside: distances of the line to the LEFT of the axis there (n,) [m].
+        """
+        beside = (self._stations >= stations[0]) & (self._stations <= stations[-1])
+        away = np.interp(self._stations[beside], stations, aside)
+        return float(np.min(1.0 - self._curvature[beside] * away, initial=1.0))
+
     def _local(self, points: Array, station: Array) -> tuple[Array, Array]:
         x, y, heading = self.line.place(station)
         dx, dy = points[:, 0] - x, points[:, 1] - y

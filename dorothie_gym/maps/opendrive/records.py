@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dorothie_gym.maps.import_notes import ImportNotes
+from dorothie_gym.maps.link_types import LinkType
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import Cubics, ReferenceLine
 from dorothie_gym.maps.town import LightProgramme
@@ -43,6 +44,7 @@ class LaneRecord:
             where nothing is said.
         closed: whether cars have no access.
         begins: whether it is no part of the lane before it in driving direction, although that leads nowhere else.
+        turn: type of the turn over it, where the file says it.
         shift: distance from the start of its profiles to the start of its section [m]; not 0 where a section was
             divided, or continues the lanes of the one before.
     """
@@ -60,6 +62,7 @@ class LaneRecord:
     access: tuple[tuple[float, bool], ...] = ()
     closed: bool = False
     begins: bool = False
+    turn: LinkType | None = None
     shift: float = 0.0
 
     @property

@@ -12,11 +12,12 @@ from dorothie_gym.maps.model import NO_STREET, SignalKind
 from dorothie_gym.maps.opendrive.cross_sections import height_rows
 from dorothie_gym.maps.opendrive.furniture import SIGNAL_TYPES
 from dorothie_gym.maps.opendrive.geometry import Arc, Cubics, Polynomial
-from dorothie_gym.maps.opendrive.own_data import LANE_BEGINS
+from dorothie_gym.maps.opendrive.own_data import LANE_BEGINS, TURN
 from dorothie_gym.maps.opendrive.road_links import LaneAt, RoadTip, begun_inside
 from dorothie_gym.support.portable_math import wrap_radians
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.link_types import LinkType
     from dorothie_gym.maps.opendrive.cross_sections import CrossSection, SectionLane
     from dorothie_gym.maps.opendrive.elements import Element
     from dorothie_gym.maps.opendrive.geometry import Primitive
@@ -61,6 +62,10 @@ class RoadElements:
         self._town = town
         self._links = links
         self._keeps_left = keeps_left
+        self._turns: dict[int, set[LinkType]] = {}
+        for link in town.links:
+            if town.lanes[link.target].in_junction and not town.lanes[link.source].in_junction:
+                self._turns.setdefault(link.target, set()).add(link.type)
         self._changes = {(link.source, link.target) for link in town.links if link.type.is_lane_change}
 
     def write(
@@ -163,6 +168,9 @@ class RoadElements:
             _add(element, "speed", sOffset="0", max=number(limit), unit="m/s")
             if begins:
                 _add(element, "userData", code=LANE_BEGINS, value="begins")
+            turns = self._turns.get(strand.lane, set())
+            if len(turns) == 1:
+                _add(element, "userData", code=TURN, value=str(next(iter(turns))))
 
 
 def _add(parent: Element, tag: str, **attributes: str) -> Element:

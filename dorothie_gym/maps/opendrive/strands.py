@@ -31,6 +31,9 @@ _ADVANCE = 1e-4
 # of their own.
 _DISTORTION, _OFF = 3.0, 0.002
 
+# Smallest length of a lane relative to that of its axis, inside of a bend: a reader draws a loop where it runs back.
+_TIGHTEST = 0.2
+
 # Largest distance of a lane from the axis of its road [m].
 _FARTHEST = 60.0
 
@@ -127,7 +130,7 @@ def strand_beside(
     if np.max(reached - rows[:, 0]) > _PROJECTED:
         return None
     rows = rows[np.concatenate(([True], np.diff(reached) > _ADVANCE))]
-    if len(rows) < 2:
+    if len(rows) < 2 or (lane is not None and axis.shortening(rows[:, 0], rows[:, 1]) < _TIGHTEST):
         return None
     places = list(edges)
     begin, end = (_snapped(float(rows[k, 0]), places) for k in (0, -1))

@@ -267,11 +267,11 @@ def turn_type(angle: float) -> LinkType:
     return LinkType.LEFT if angle > 0 else LinkType.RIGHT
 
 
-def successor_links(lanes: tuple[Lane, ...], topology: Topology) -> tuple[LaneLink, ...]:
+def successor_links(records: OpenDriveRecords, lanes: tuple[Lane, ...], topology: Topology) -> tuple[LaneLink, ...]:
     """Returns the links between successive lanes; the link into a junction carries the turn type.
 
     If a road forks into several almost straight branches, only the straightest is called straight; the others are named
-    by their side of it.
+    by their side of it. What our own files say about turns counts more than angles.
     """
     after: defaultdict[int, list[int]] = defaultdict(list)
     for source, target in topology.links:
@@ -295,6 +295,10 @@ def successor_links(lanes: tuple[Lane, ...], topology: Topology) -> tuple[LaneLi
             if k != best:
                 side = LinkType.LEFT if sum(turns[k]) > sum(turns[best]) else LinkType.RIGHT
                 links[k] = replace(links[k], type=side)
+    for k in turns:
+        piece = topology.chains[links[k].target][0]
+        said = records.roads[piece.road].sections[piece.section].lanes[piece.lane].turn
+        links[k] = links[k] if said is None else replace(links[k], type=said)
     return tuple(links)
 
 

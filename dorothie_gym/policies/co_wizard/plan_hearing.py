@@ -275,6 +275,10 @@ def _take_over(
         _continue(state, steps)
         return
     possible, refused = _without_lane(state, view, steps)
+    if refused is not None:
+        state.say(refused)
+    if not possible:
+        return
     possible = _visiting(state, view, _counted_together(possible))
     found = first_objection(state, view, possible)
     if found is not None and _seeks_street(state, view, possible[found[0]]):
@@ -285,13 +289,10 @@ def _take_over(
     if found is None and plain and kept[0].action in _PLAIN:
         _accept(state, view, kept[0])
         return
-    if refused is not None:
-        state.say(refused)
     if kept:
         _confirm(state, kept, joined=refused is not None)
-    for step in kept:
-        if step.speed is not None:
-            state.say(*limit_remark(state, view, step.speed))
+    for speed in (step.speed for step in kept if step.speed is not None):
+        state.say(*limit_remark(state, view, speed))
     if found is not None:
         object_to(state, view, found[1], possible[found[0]], joined=bool(kept))
 

@@ -316,11 +316,15 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         return
     next_chat = view.time + float(rng.exponential(state.style.chat)) + 20.0
     state.conversation = state.conversation.with_next_chat(next_chat)
-    asked = {content for item in state.speech.said for content in item.meaning}
+    asked = _said_lately(state)
     options = [each for each in _chat_options(state, view, rng) if asked.isdisjoint(each[-1].meaning)]
     chosen = options[int(rng.integers(len(options)))]  # a remark that is unrelated to the task is always possible
     note_told(state, chosen)
     state.say(*chosen)
+
+
+def _said_lately(state: ParticipantState) -> set[Proposition]:
+    return {content for item in state.speech.said for content in item.meaning}
 
 
 def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
@@ -362,9 +366,10 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
             speed = _usual_speed(state, view) + 5 if rng.random() < 0.5 else None
-            state.conversation = state.conversation.after_hurrying()
             content = act_builders.action(ActionValue.SPEED_CHANGE, speed=speed)
-            return [(intend(Function.REQUEST, content, wording=Wording(faster=True, speed=speed)),)]
+            if content not in _said_lately(state):  # a speed that was just asked for is not changed again
+                state.conversation = state.conversation.after_hurrying()
+                return [(intend(Function.REQUEST, content, wording=Wording(faster=True, speed=speed)),)]
     if view.objects:
         near = view.objects[int(rng.integers(min(len(view.objects), 3)))].kind
         found += [(intend(asks, Proposition.of(Predicate.SEES, object=near)),)] * 2

@@ -307,3 +307,14 @@ def test_instructions_in_words_are_never_misheard_on_purpose() -> None:
         ride.say("turn left please", seconds=5.0)
         asked += [speech.act.move for speech in ride.said]
     assert DialogueMove.CONFUSE not in asked
+
+
+def test_change_to_a_missing_lane_is_refused_and_the_plan_stays() -> None:
+    ride = Ride(RING)
+    ride.order(turn("left", ordinal=2), turn("right"))
+    planned = ride.state.plan.steps
+    ride.order({"action": "lane", "direction": "left"}, text="get over to the left")
+    assert ride.state.plan.steps == planned != ()
+    ride.run(6.0)
+    refused = [content for speech in ride.said for content in speech.meaning if content.predicate is Predicate.POSSIBLE]
+    assert any(content.negated for content in refused)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Landma
 from dorothie_gym.policies.participant.approach_end import ending
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn, correct_early
 from dorothie_gym.policies.participant.hints import looks_remark
+from dorothie_gym.policies.participant.reactions import _chat_options
 from dorothie_gym.policies.participant.trip_memory import TripMemory
 from dorothie_gym.policies.participant.trip_talk import recollection, trip_questions, trip_remarks
 from dorothie_gym.policies.place_looks import look_of
@@ -204,3 +206,22 @@ def test_a_turn_announced_to_the_other_side_is_contradicted(turning: Drive) -> N
     (remark,) = turning.state.speech.queue
     assert remark.wording.direction is wanted.direction
     assert understand(said([remark])).direction is wanted.direction
+
+
+# --- remarks that are unrelated to the errands ------------------------------------------------------------------------
+
+
+def test_a_hurried_passenger_asks_for_no_other_speed_when_one_was_just_asked_for(drive: Drive) -> None:
+    drive.state.guidance = replace(drive.state.guidance, guiding=False)
+    hurrying = []
+    for seed in range(60):
+        state, view = copy.deepcopy(drive.state), replace(drive.view, speed=8.0)
+        [remark, *_] = _chat_options(state, view, np.random.default_rng(seed))[0]
+        if state.conversation.hurried:
+            hurrying.append((seed, remark))
+    assert hurrying
+    for seed, remark in hurrying:
+        state = copy.deepcopy(drive.state)
+        state.speech = replace(state.speech, said=(remark,))
+        options = _chat_options(state, replace(drive.view, speed=8.0), np.random.default_rng(seed))
+        assert any(not one.meaning for of in options for one in of) and not state.conversation.hurried
