@@ -40,6 +40,41 @@ _SUBORDINATING: Final = frozenset({"where", "when", "what", "which", "how"})
 _ENOUGH: Final = frozenset({"plenty", "enough", "ample", "tops", "max", "maximum", "sufficient"})
 """Words by which a statement about a speed sets it: "thirty miles an hour is plenty"."""
 
+_LISTING: Final = (["it's"], ["that's"], ["we've"], ["there's"])
+_PLAINLY: Final = frozenset({"just", "simply", "then", "now", "also", "first", "next", "always", "basically"})
+"""Adverbs behind "you" of a way that is told."""
+
+_SHORT_VERB: Final = 3
+_NO_VERBS: Final = frozenset(
+    {"thanks", "cheers", "please", "always", "perhaps", "sometimes", "afterwards", "this", "across"}
+)
+"""Words in -s that are no verbs."""
+
+_FRAME: Final = 3
+"""Least number of words of the frame of a request that are skipped."""
+
+_FRAME_ENDS: Final = frozenset({"could", "can", "would", "might", "should", "we", "you"})
+"""Last words of the frame of a request behind which its verb follows."""
+
+_NEGATED: Final = frozenset(
+    {
+        "where",
+        "that's",
+        "#landmark",
+        "#street",
+        "not",
+        "don't",
+        "didn't",
+        "doesn't",
+        "never",
+        "no",
+        "mustn't",
+        "needn't",
+        "when",
+        "until",
+    }
+)
+
 _IMPERATIVES: Final = frozenset({"actions", "verbs", "lights"})
 """Groups of the grammar with which an order begins."""
 
@@ -79,6 +114,8 @@ class ClauseReader:
             new: whether the clause begins the sentence.
         """
         found = mood_of(self.words, place)
+        if found in (None, ClauseMood.STATEMENT) and self._tells_to_act(self._behind_soft(place)):
+            return ClauseMood.REQUEST  # "you just slow down a bit"
         if found is ClauseMood.STATEMENT and self._advises(place):
             return ClauseMood.REQUEST  # "I'd get in the other lane if I were you"
         if found is ClauseMood.QUESTION and new and not self.question and self._conditions(place):
@@ -87,6 +124,24 @@ class ClauseReader:
         if found is ClauseMood.QUESTION and not new and not self.question and word in _SUBORDINATING:
             found = None
         return self._inherited(place, before, new=new) if found is None else found
+
+    def names_next(self, place: int) -> bool:
+        """Returns whether a clause only names what comes next in a list: "(and then) it's the Coco"."""
+        if [*self.words[place : place + 1]] not in _LISTING:
+            return False
+        place += 1 + (self.words[place + 1 : place + 2] in (["the"], ["to"], ["on"]))
+        return place < len(self.words) and self.words[place] == "#landmark"
+
+    def _tells_to_act(self, place: int) -> bool:
+        """Returns whether the driver is told what to do as a matter of course: "you just get in the left lane"."""
+        words, begin = self.words, place
+        if words[place : place + 1] not in (["you"], ["ye"]):
+            return False
+        place += 1
+        while place < len(words) and words[place] in _PLAINLY:
+            place += 1
+        match = route_grammar().terminals.longest(words, place) if place > begin + 1 and place < len(words) else None
+        return match is not None and match.group in ("actions", "lights") and not words[place].endswith(("ed", "ing"))
 
     def _advises(self, place: int) -> bool:
         """Returns whether a clause tells what the speaker would do in the driver's place."""
@@ -193,13 +248,27 @@ class ClauseReader:
                 return False
         return False
 
+    def _is_unknown(self, number: int) -> bool:
+        """Returns whether no phrase of the grammar begins at a token."""
+        grammar = route_grammar()
+        known = grammar.terminals.longest(self.words, number) or grammar.opportunities.longest(self.words, number)
+        return known is None and self.words[number] not in _NO_VERBS
+
     def _is_finite(self, number: int, place: int) -> bool:
         """Returns whether a token is, or ends in, a finite verb whose subject begins at `place`."""
         word, following = self.words[number], self.words[number + 1 : number + 2]
         if number > place and (word in route_grammar().finite or word in route_grammar().subjects):
             return True
+        named = number > 0 and words_name(self.words[number - 1]) and number - 1 >= place
+        if named and word.endswith("s") and word.isalpha() and len(word) > _SHORT_VERB and self._is_unknown(number):
+            return True  # "the Ikea shuts at eight"
         contracted = number in self.contracted or (word.endswith("'s") and word not in _NO_SUBJECTS)
         return contracted and following != ["#landmark"]
+
+
+def words_name(word: str) -> bool:
+    """Returns whether a token stands for a landmark or a street."""
+    return word in ("#landmark", "#street")
 
 
 def is_participle(word: str) -> bool:
@@ -218,3 +287,12 @@ def mood_of(words: Sequence[str], place: int = 0) -> ClauseMood | None:
             return ClauseMood(match.kind)
         place += match.length
     return None
+
+
+def behind_request(words: Sequence[str], place: int) -> int:
+    """Returns the place behind words that only frame a request: "do you think you could"; `place` without any."""
+    match = route_grammar().openers.longest(words, place)
+    if match is None or match.kind != "request" or match.length < _FRAME or place + match.length >= len(words):
+        return place
+    frame = words[place : place + match.length]
+    return place + match.length if frame[-1] in _FRAME_ENDS and _NEGATED.isdisjoint(frame) else place

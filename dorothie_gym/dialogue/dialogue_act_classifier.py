@@ -27,7 +27,7 @@ from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import behind_signs
 from dorothie_gym.dialogue.span_features import span_features
 from dorothie_gym.dialogue.span_tagger import retagged
-from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
+from dorothie_gym.dialogue.vocatives import is_endearment, without_asides, without_vocative
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot, SlotValue
 
@@ -361,6 +361,8 @@ def _split_run_on(sentence: str) -> list[str]:
 def _is_boundary(head: str, rest: str) -> bool:
     """Returns whether the texts before and after a comma are separate acts."""
     if any(part.lower().strip(" .?!,") in word_lists().vocatives for part in (head, rest)):
+        return False
+    if any(is_endearment([word for word in split_words(part) if word != ","]) for part in (head, rest)):
         return False
     if belong_together(head, rest):
         return False

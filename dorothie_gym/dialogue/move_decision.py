@@ -6,6 +6,7 @@ them, the cues of `dialogue_act_classifier` do.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
@@ -100,6 +101,9 @@ _HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "t
 _CALLS: Final = frozenset(
     {"whoa", "woah", "oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
 )
+_SOFT_OPENERS: Final = frozenset({"and", "so", "okay", "ok", "then", "but", "well", "right", ","})
+"""Words in front of a condition that opens an order: "and where the wall ends, turn left"."""
+
 _REPAIRING: Final = frozenset(
     {
         "no",
@@ -368,7 +372,8 @@ def belong_together(head: str, rest: str) -> bool:
         return True  # "if the road is blocked, take Murfin"
     if _SIDE_ONLY.fullmatch(rest.strip(" .,!?").lower()) and not first.plan.steps:
         return True  # "it has a red door, on the right"
-    opens = route_grammar().terminals.longest(split_words(head), 0) if split_words(head) else None
+    opening = list(itertools.dropwhile(_SOFT_OPENERS.__contains__, split_words(head)))
+    opens = route_grammar().terminals.longest(opening, 0) if opening else None
     when = opens is not None and opens.group == "relations"
     if (
         (first.waiting or when)

@@ -21,6 +21,7 @@ from dorothie_gym.dialogue.plan_reading import read_plan, with_plain_lights
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import DrivingPlan
+from dorothie_gym.dialogue.turn_phrases import plain_orders
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.slots import (
@@ -193,7 +194,7 @@ def understand(text: str) -> ParsedText:
     lists = word_lists()
     parse = read_plan(text)
     said = without_asides(
-        with_plain_lights(without_vocative(split_words(with_breaks(text)), lists)), lists, machines=True
+        with_plain_lights(plain_orders(without_vocative(split_words(with_breaks(text)), lists))), lists, machines=True
     )
     spoken = " ".join(said)
     mentions, words = find_names(said)

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeAlias
 
-from dorothie_gym.dialogue.clause_moods import is_participle
+from dorothie_gym.dialogue.clause_moods import behind_request, is_participle
 from dorothie_gym.dialogue.contingencies import find_contingency
 from dorothie_gym.dialogue.plan_directions import DirectionReader, begins_direction
 from dorothie_gym.dialogue.plan_items import (
@@ -58,6 +58,7 @@ _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "the
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
 _CANCELLING: Final = frozenset({"forget", "drop", "dropping", "lose", "remove", "scrub", "ditch"})
 """First words of giving up an errand or a turn."""
+_BEHIND_CANCELLED: Final = frozenset({"", ",", "?", "please", "then", "and", "from", "for", "off", "now"})
 _RANKS: Final = {"first": "advance", "beforehand": "advance", "last": "defer"}
 """Adverbs behind an errand that put it in front of, or behind the others."""
 _BEHIND_RANKS: Final = frozenset({"", ",", "?", "and", "then", "please", "though", "but"})
@@ -101,6 +102,9 @@ _INFINITIVES: Final = frozenset(
     {"take", "make", "get", "go", "drive", "do", "have", "keep", "be", "swing", "pull", "head", "move"}
 )
 _FURTHER: Final = frozenset({"further", "farther", "on", "along", "ahead"})
+_BEHIND_STOPS: Final = frozenset({"by", "at", "off", "in", "near", "opposite", "outside", "here", "there"})
+"""Words behind a "stop" that is a verb."""
+
 _JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
 
 
@@ -127,11 +131,18 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
     def read(self) -> list[Item]:
         place, subjects = 0, self.grammar.subjects
         while place < len(self.words):
+            place = self._behind_frame(place)
             word = self.words[place]
             if word in subjects:
                 self._new_clause(place)
             place = next(end for rule in _rules_from(word) if (end := rule(self, place)) > place)
         return self.items
+
+    def _behind_frame(self, place: int) -> int:
+        """Returns the place behind words that only frame a request, where a clause begins: "do you think you could"."""
+        if place and not self._begins_clause(place):
+            return place
+        return behind_request(self.words, place)
 
     def _new_clause(self, place: int) -> None:
         """Adds the border before a subject with its verb: "go on | there's nothing coming"."""
@@ -152,6 +163,9 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         if "stop" not in self.words:
             return place
         number, behind = self.ordinal(place)
+        alone = behind == place + 1 and self._begins_clause(place) and self.word_at(behind + 1) in _BEHIND_STOPS
+        if alone and self.word_at(behind) == "stop":
+            return behind  # "..., next stop by the KFC"
         if (number is not None or self.words[place] in ("last", "only")) and self.word_at(
             max(behind, place + 1)
         ) == "stop":
@@ -199,6 +213,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         match = self.grammar.terminals.longest(self.words, place)
         if match is None:
             return place
+        if self.word_at(place - 1) == "why" and self.words[place] in ("don't", "dont", "not"):
+            return place + 1 + (self.word_at(place + 1) in ("you", "we", "ye"))  # "why don't you turn left"
         end = place + match.length
         if match.group == "relations":
             return self._condition(match, place)
@@ -240,6 +256,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         acting = following is not None and following.group in ("actions", "verbs")
         if match.kind == "visit" and self.words[place:end] == ["to"]:
             return following is not None and following.group == "verbs" and self.words[end] in _INFINITIVES
+        if match.kind == "visit" and self.words[place:end] == ["going", "to"]:
+            return following is not None and following.group in ("verbs", "actions", "lights")
         last = self.items[-1] if self.items else None
         return acting and isinstance(last, DistanceItem) and self.words[place] in _FURTHER
 
@@ -253,11 +271,17 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         end = place + match.length
         if match.kind == "stop" and self.words[end - 1] in ("me", "us") and self.words[place] in _PRESENTING:
             return self.word_at(end) not in _LAST
-        noun = self.word_at(place - 1) in (*self.grammar.determiners, "two", "three", "more", "many", "few")
+        counted = (*self.grammar.determiners, "two", "three", "more", "many", "few")
+        noun = self.word_at(place - 1) in counted and not self._begins_clause(place)  # not in "after that stop"
         noun = noun or (match.kind == "wait" and self.word_at(place - 1) in _WAITING)
         if self.words[place] == "park" and self.word_at(place - 1) in ("car", "a", "the"):
             return True
         return noun and (match.kind == "wait" or self.words[place] in ("stop", "stops"))
+
+    def _begins_clause(self, place: int) -> bool:
+        """Returns whether the last item is a border that ends at a place."""
+        last = self.items[-1] if self.items else None
+        return isinstance(last, BoundaryItem) and last.place == place
 
     def _item(self, match: Match, place: int) -> int:
         """Adds the item of a phrase; returns the token behind it."""
@@ -329,18 +353,7 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return self.word_at(end) in SIDES or end in self.names or self.word_at(end) in ("turn", "one", "stop")
         behind = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
         named = isinstance(self.names.get(behind), LandmarkName) and self.names[behind] is not LandmarkName.PERSON
-        return named and self.word_at(behind + 1) in (
-            "",
-            ",",
-            "?",
-            "please",
-            "then",
-            "and",
-            "from",
-            "for",
-            "off",
-            "now",
-        )
+        return named and self.word_at(behind + 1) in _BEHIND_CANCELLED
 
     def _is_next_junction(self, found: NounPhrase, behind: int) -> bool:
         """Returns whether a noun phrase is a junction without a number: "at the corner"."""
@@ -358,6 +371,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return end
         if self.words[end - 1] in ("over", "up", "down", "along") and self.word_at(end) in ("there", "here"):
             return place
+        if match.kind == "after" and match.length == 1 and self.measures(end):
+            return end  # "after three hundred feet"
         found, behind = self.noun_phrase(end)
         if found is None and match.kind == "across" and "straight" in self.words[place:end]:
             self.items.append(ActionItem("straight", place, end))
@@ -423,8 +438,19 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         found, behind = self.noun_phrase(place)
         if found is None:
             return place
+        if self.word_at(place - 1) == "for" and self._waits() and found.reference is not None:
+            left = self.grammar.leaving.longest(self.words, behind)
+            if left is not None:
+                self.items.append(ConditionItem(ConditionRelation.UNTIL, found))  # "wait for that truck to move"
+                return behind + left.length
         self.items.append(found)
         return behind
+
+    def _waits(self) -> bool:
+        """Returns whether the last item is an order to wait."""
+        said = [item for item in self.items if not isinstance(item, WordItem)]
+        last = said[-1] if said else None
+        return isinstance(last, ActionItem) and last.kind == "wait"
 
 
 _Rule: TypeAlias = Callable[[_Reader, int], int]

@@ -41,6 +41,9 @@ REFUSING: Final = frozenset({*NEGATING, "cancel"})
 PASSING: Final = frozenset({"pass", "ignore", "skip", "let"})
 """Words of actions by which turns are left alone."""
 
+_AT_PLACES: Final = frozenset({StepAction.TURN, StepAction.STRAIGHT, StepAction.U_TURN, StepAction.SPEED})
+"""Actions that are due at a place by which the words put them."""
+
 _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP, StepAction.STRAIGHT})
 """Actions with an ordinal."""
 
@@ -348,6 +351,8 @@ class PlanState:
             frame.speed = frame.bare_number if frame.speed is None and frame.change is None else frame.speed
             if frame.speed is None and frame.change is None:
                 return []
+        if frame.relation is ConditionRelation.BESIDE and frame.action in _AT_PLACES:
+            frame.relation = ConditionRelation.AT  # "by the Shell, turn left"
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
@@ -363,9 +368,8 @@ class PlanState:
 
     def _avoids(self, frame: Frame) -> bool:
         """Makes a place that must not be passed one to avoid: "don't go over the bridge"; returns whether it did."""
-        passed = (
-            frame.action is StepAction.STRAIGHT and frame.relation is ConditionRelation.PAST and frame.at is not None
-        )
+        going = frame.action is StepAction.STRAIGHT and frame.at is not None
+        passed = going and frame.relation is ConditionRelation.PAST
         street = frame.at is not None and frame.at.to_json().keys() == {"street"}
         turned = frame.action is StepAction.TURN and frame.direction is None and street
         alone = sum(other.action is not None for other in self.frames) == 1

@@ -17,6 +17,9 @@ _SPOKEN_OF: Final = frozenset({"it", "that", "this", "next"})
 _NOTHING: Final = frozenset({"", ",", "?", "and", "then", "on", "please"})
 """What may stand behind "the one after" of an opportunity that has been spoken of."""
 
+_NO_OWNERS: Final = frozenset({"let's", "what's", "how's", "here's", "where's", "who's", "when's"})
+"""Words in 's that are no owners of what follows."""
+
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
 
@@ -37,6 +40,7 @@ class NounReader(TokenReader):
                 self.word_at(place).endswith("'s")
                 and place not in self.names
                 and self.word_at(place) not in self.grammar.subjects
+                and self.word_at(place) not in _NO_OWNERS
             ):
                 article, place = True, place + 1  # "granny's house"
             else:
@@ -107,7 +111,10 @@ class NounReader(TokenReader):
                 return NounPhrase(PlaceReference(street=street), None), end + 1
             return None, place
         if self.word_at(end) == "after" and self.word_at(end + 1) in _SPOKEN_OF:
-            return NounPhrase(None, 2 if self.word_at(end + 1) == "next" else 1, follows=True), end + 2
+            count = 2 if self.word_at(end + 1) in ("next", "this") else 1
+            behind = end + 2 + (self.word_at(end + 2) == "one")
+            if match is not None and self.words[place] not in ("block", "blocks") and not self._acts_at(behind):
+                return NounPhrase(None, count, follows=True), behind
         if self.word_at(end) == "after" and self.word_at(end + 1) in _NOTHING:
             return NounPhrase(None, 1, follows=True), end + 1
         follows = self.word_at(place - 1) in ("next", "following")
@@ -115,6 +122,11 @@ class NounReader(TokenReader):
         if blocks and ordinal is None and self.word_at(place - 1) in _ONE:
             ordinal = 1
         return NounPhrase(None, ordinal, blocks, follows=follows and not blocks), end
+
+    def _acts_at(self, place: int) -> bool:
+        """Returns whether an order begins at a place, so that "after that" stands between two of them."""
+        match = self.grammar.terminals.longest(self.words, place)
+        return match is not None and match.group in ("actions", "verbs", "lights") and place > 0
 
     def _named(
         self, place: int, value: LandmarkName | StreetName | ObjectClass, ordinal: int | None

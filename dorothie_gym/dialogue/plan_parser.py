@@ -274,7 +274,10 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         if item.kind == "then":
             self.stop_between()
             self.close()
+        before = self.mood
         self._clause(item.place, new=False)
+        if item.kind == "then" and before in ORDERED and self.clauses.names_next(item.place):
+            self.mood = self.moods[-1] = ClauseMood.COMMAND  # "pick up Tom, and after that it's the Coco"
 
     def _contingency(self, item: ContingencyItem) -> None:
         """Lets what depends on a condition of the world wait: what follows, or what has been said in this sentence."""

@@ -55,6 +55,7 @@ _PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
 _ALONG: Final = frozenset({"on", "along", "up", "down"})
 """Last words of an order to go on behind which a street is the one to go along."""
 
+_OVERTAKING: Final = frozenset({"pass", "passing"})
 _ROUND: Final = frozenset({"round", "around", "past", "by"})
 """Last words of an order to get past another vehicle."""
 
@@ -236,7 +237,9 @@ class PlaceReader(PlanState):
         current = (
             self.frame if self.frame is not None and not self.fresh and self.frame.action is not None else self.pending
         )
-        if behind or current.action in (StepAction.STOP, StepAction.STRAIGHT):
+        if current.action is StepAction.STRAIGHT and relation is ConditionRelation.PAST and current.at is None:
+            current.ordinal = ordinal  # "go straight through two junctions"
+        elif behind or current.action in (StepAction.STOP, StepAction.STRAIGHT):
             current.relation, current.at = relation, PlaceReference(ordinal=ordinal)
         else:
             current.ordinal = ordinal
@@ -293,6 +296,9 @@ class PlaceReader(PlanState):
         crossed = frame.action is StepAction.STRAIGHT
         if crossed and place.reference is Anaphor.HERE:
             return  # "straight along here"
+        if crossed and place.object is ObjectClass.VEHICLES and frame.word in _OVERTAKING:
+            frame.action = StepAction.LANE  # "pass that bus on the left"
+            return
         if crossed and place.landmark is LandmarkName.HOUSE and frame.last == "straight":
             frame.action, frame.place = StepAction.VISIT, place  # "go straight home"
             return

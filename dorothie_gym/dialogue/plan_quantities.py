@@ -82,6 +82,11 @@ class QuantityReader(TokenReader):
             return end
         return begin
 
+    def measures(self, place: int) -> bool:
+        """Returns whether a distance stands at a place: "three hundred feet"."""
+        number, end = self._number(place)
+        return number is not None and self.word_at(end) in self.grammar.metres and self._per_hour(end + 1)[0] is None
+
     def _is_speed(self, place: int, end: int) -> bool:
         """Returns whether a number behind "to" is a speed: "slow down to twenty"."""
         word, following = self.word_at(end), self.word_at(place - 2)

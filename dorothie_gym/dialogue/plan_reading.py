@@ -12,14 +12,20 @@ from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_li
 from dorothie_gym.dialogue.entity_recognition import find_names, known_words
 from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.numerals import read_ordinal
+from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.dialogue.plan_chunker import read_items
 from dorothie_gym.dialogue.plan_parser import PlanParse, Sentence, parse_plan
 from dorothie_gym.dialogue.route_grammar import route_grammar
+from dorothie_gym.dialogue.turn_phrases import plain_orders
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
 
 _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
 _CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
 _HESITATIONS = frozenset({"uh", "er", "erm", "um", "hm", "hmm"})
+_ASKING = (["do"], ["did"], ["d'you"], ["don't"], ["didn't"], ["if"])
+"""Words in front of a "you know" that asks."""
+
+_NAMES_FILE = "15_names.talk"
 _PERSON = "#person"
 _SEPARABLE = frozenset({"pick", "picking"})
 _FETCHES = frozenset({"fetch", "fetching", "grab", "grabbing", "collect", "collecting", "meet"})
@@ -97,8 +103,10 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
     fillers, kept, place = route_grammar().fillers, list[str](), 0
     while place < len(words):
         match = fillers.longest(words, place)
-        if match is None:
+        knows = match is not None and words[place] == "you" and kept[-1:] in _ASKING
+        if match is None or knows:
             kept.append(words[place])
+            match = None
         elif words[place] in _HESITATIONS and _counts_again(kept, words[place + match.length :]):
             kept.append("sorry")
         place += 1 if match is None else match.length
@@ -131,6 +139,13 @@ def _with_particles(words: list[str]) -> list[str]:
     return words
 
 
+@functools.cache
+def _first_names() -> frozenset[str]:
+    """Returns the first names that the talk files give to people."""
+    lines = [line for line in read_talk_files()[_NAMES_FILE].splitlines() if not line.startswith("#")]
+    return frozenset(word.lower() for word in re.findall(r"\b[A-Z][a-z]+\b", " ".join(lines)))
+
+
 def _with_people(words: list[str]) -> list[str]:
     """Returns the words with the name of somebody who is fetched masked: "grab dave from the house"."""
     grammar = route_grammar()
@@ -139,7 +154,8 @@ def _with_people(words: list[str]) -> list[str]:
         begin = place + 1 + (words[place] == "pick")
         name = words[begin] if begin < len(words) else ""
         following = words[begin + 1] if begin + 1 < len(words) else ","
-        known = name in grammar.modifiers or name in known_words() or grammar.terminals.longest([name], 0) is not None
+        known = name in grammar.modifiers or (name in known_words() and name not in _first_names())
+        known = known or grammar.terminals.longest([name], 0) is not None
         if verb and name.isalpha() and not known and following in _BEHIND_NAMES:
             words = [*words[:begin], _PERSON, *words[begin + 1 :]]
         elif words[place] == "get" and "from" in words[place + 2 : place + 5] and _gets_people(words[place + 1 :]):
@@ -158,7 +174,7 @@ def _strangers(text: str) -> frozenset[str]:
 
 def _sentence(text: str) -> Sentence | None:
     lists = word_lists()
-    said = _with_particles(with_plain_lights(_plain(split_words(text), lists)))
+    said = _with_particles(with_plain_lights(plain_orders(_plain(split_words(text), lists))))
     if not said:
         return None
     mentions, masked = find_names(said, statuses=False)

@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.directions import WordLists
 
+_OWNERS = frozenset({"my", "you", "me", "our"})
+_FOND = frozenset(
+    {"dear", "good", "old", "lovely", "young", "sweet", "darling", "kind", "little", "big", "brave", "fine", "clever"}
+)
+_ADDRESSEES = frozenset(
+    {
+        "boy", "chap", "fellow", "lad", "man", "woman", "lady", "girl", "friend", "fella", "child", "sir", "thing",
+        "soul", "sweetheart", "love", "dear", "sport", "chum", "pal", "bean", "son", "lass", "gentleman", "angel",
+    }
+)  # fmt: skip
+"""Nouns with which somebody is spoken to."""
+
+_LONGEST = 4
+_LEAST = 2
 _ENDEARING = frozenset({"my", "dear", "lovely", "old"})
 _AFTER_ADDRESSEE = frozenset(
     {
@@ -22,7 +37,7 @@ def without_vocative(words: list[str], lists: WordLists) -> list[str]:
     """Returns the words without a vocative at the end ("stop here, man"), at the beginning or behind a greeting."""
     while words and words[-1] == ",":
         words.pop()
-    words = _without_addressee(words, lists)
+    words = _without_endearment(_without_addressee(words, lists))
     marked = words[-1:] == ["?"]
     end = len(words) - marked
     for length in (1, 2):
@@ -35,6 +50,27 @@ def without_vocative(words: list[str], lists: WordLists) -> list[str]:
         if len(words) > length + 1 and words[length] == "," and " ".join(words[:length]) in lists.vocatives:
             return words[length + 1 :]
     return words
+
+
+def _without_endearment(words: list[str]) -> list[str]:
+    """Returns the words without "my dear boy" or "you lovely man" in front of the first, or behind the last comma."""
+    if "," not in words:
+        return words
+    first = words.index(",")
+    if is_endearment(words[:first]) and first + 1 < len(words):
+        return words[first + 1 :]
+    last = len(words) - words[::-1].index(",") - 1
+    marked = words[-1:] == ["?"]
+    if is_endearment(words[last + 1 : len(words) - marked]):
+        return words[:last] + words[len(words) - marked :]
+    return words
+
+
+def is_endearment(part: Sequence[str]) -> bool:
+    """Returns whether words are an owner or "you", endearments, and a noun for somebody."""
+    if not 1 < len(part) <= _LONGEST or part[-1] not in _ADDRESSEES or part[0] not in (*_OWNERS, *_FOND):
+        return False
+    return all(word in _FOND for word in part[1:-1]) and (len(part) > _LEAST or part[0] != "my")
 
 
 def _without_addressee(words: list[str], lists: WordLists) -> list[str]:
