@@ -175,9 +175,10 @@ def policy_sha256(settings: Mapping[str, Any]) -> str:
 
 @functools.cache
 def code_sha256() -> str:
-    """Returns the hash of the Python files of the package, by their paths within it."""
+    """Returns the hash of the Python and YAML files of the package, by their paths within it."""
     root, digest = Path(dorothie_gym.__file__).parent, hashlib.sha256()
-    for path in sorted(root.rglob("*.py"), key=lambda path: path.relative_to(root).as_posix()):
+    files = (path for path in root.rglob("*") if path.suffix in (".py", ".yaml"))
+    for path in sorted(files, key=lambda path: path.relative_to(root).as_posix()):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0")
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
