@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, SupportsFloat
 
 import gymnasium as gym
@@ -48,6 +48,9 @@ _KEEPING_GOAL: Final = frozenset({"faster", "slower"})
 
 _PLACES: Final = tuple(name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED))
 
+_LABEL_OF: Final = {place: LABELS.index(place) for place in _PLACES}
+"""Index of each place in `LABELS`."""
+
 _SAYINGS: Final[Mapping[str, DialogueAct]] = {
     "say_okay": DialogueAct.of(DialogueMove.ACKNOWLEDGE),
     "say_will_do": DialogueAct.of(DialogueMove.CONFIRM),
@@ -66,6 +69,10 @@ _ABOUT_GOAL: Final[Mapping[str, Callable[[LandmarkName], DialogueAct]]] = {
     "ask_goal": lambda place: DialogueAct.of(DialogueMove.CHECK, place),
 }
 """Acts of the sayings that name the goal."""
+
+
+GOAL_HEARD: Final = "goal_heard"
+"""Name of the action that sets the place that the participant has mentioned last as goal."""
 
 
 class MacroKind(enum.StrEnum):
@@ -98,12 +105,13 @@ MACRO_ACTIONS: Final = (
     *(MacroAction(name=name, kind=MacroKind.DRIVE) for name in (*_COMMANDS, *_DIRECTIONS)),
     *(MacroAction(name=f"goal_{place.label}", kind=MacroKind.GOAL, place=place) for place in _PLACES),
     *(MacroAction(name=name, kind=MacroKind(name.split("_")[0])) for name in (*_SAYINGS, *_ABOUT_GOAL)),
+    MacroAction(name=GOAL_HEARD, kind=MacroKind.GOAL),
 )
 """The macro-actions, in the order of the action space; the first one continues."""
 
 
 class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], RecordConstructorArgs):
-    """Wrapper of `CoWizard-v0` with 30 actions, or fewer by `kinds`, in place of a dict of 104 entries.
+    """Wrapper of `CoWizard-v0` with 31 actions, or fewer by `kinds`, in place of a dict of 104 entries.
 
     One action begins a command, a goal or an utterance, and lasts until something happens: the participant has spoken,
     the car waits for a choice, stands, or has arrived, or `seconds` have passed. An action that sets a goal is not
@@ -178,6 +186,8 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         if not self.action_space.contains(np.int64(action)):
             raise ValueError(f"action is {action!r}; it must be a whole number in 0..{len(self.actions) - 1}")
         chosen = self.actions[int(action)] if self.action_masks()[int(action)] else self.actions[0]
+        if chosen.name == GOAL_HEARD:
+            chosen = replace(chosen, place=self._heard_place())
         begun = self._driver.view.time
         reward, decisions = 0.0, 0
         typed = self._begun(chosen)
@@ -204,6 +214,7 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
             **{name: bool(physical[PhysicalAction.J_TURN]) and name in exits for name in _DIRECTIONS},
             **dict.fromkeys(_SAYINGS, silent),
             **dict.fromkeys(_ABOUT_GOAL, silent and self._driver.goal is not None),
+            GOAL_HEARD: self._heard_place() not in (None, self._driver.goal),
         }
         return np.array(
             [possible[one.name] if one.place is None else self._is_new_goal(one.place) for one in self.actions]
@@ -273,6 +284,13 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
             if fitting:
                 found[name] = min(fitting, key=lambda angle: abs(angle - wanted))
         return found
+
+    def _heard_place(self) -> LandmarkName | None:
+        """Returns the place on the map that the participant has mentioned last, within `MEMORY`; None without one."""
+        since = self._driver.view.time - MEMORY
+        heard = {place: float(self._slots_at[_LABEL_OF[place]]) for place in _PLACES}
+        known = [place for place, time in heard.items() if time > since and self._driver.knows(place)]
+        return max(known, key=heard.__getitem__, default=None)
 
     def _is_new_goal(self, place: LandmarkName) -> bool:
         return place is not self._driver.goal and self._driver.knows(place)
