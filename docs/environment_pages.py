@@ -1,7 +1,7 @@
 """Pages of the environments, generated from their docstrings and the specifications of their spaces.
 
-`pages()` returns the text of each page in `docs/environments`, and `draw_pictures()` renders the frames on them. The
-commands are `python docs/pages.py environments` and `python docs/pages.py frames`.
+`pages()` returns the text of each page in `docs/environments`: `python docs/pages.py environments`. The animations on
+them are drawn by `environment_animations.py`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
-import pettingzoo
 from environment_tables import (
     LIMITS,
     field_tables,
@@ -29,15 +27,13 @@ from environment_tables import (
     vector_table,
     weight_table,
 )
-from numpy.typing import NDArray
-from PIL import Image
 from vocabulary_page import GENERATED, anchors, vocabularies
 
 import dorothie_gym
 from dorothie_gym.archive import Task
 from dorothie_gym.envs.history_space import act_fields, decision_fields, history_fields
 from dorothie_gym.envs.navigation_continuous_v0 import CONTINUOUS_FIELD_SPECS
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation import FIELD_SPECS
 from dorothie_gym.session.spaces import action_fields, observation_fields
 
@@ -48,9 +44,6 @@ SECTIONS = (
     "Version History",
 )  # fmt: skip
 """Sections of the docstring of an environment, in the order of the pages."""
-
-COLOURS = 64
-"""Number of colours of the pictures, which keeps their files small."""
 
 
 # --- Pages ----------------------------------------------------------------------------------------------------------
@@ -70,7 +63,6 @@ class EnvironmentPage:
         actions: lines after the section "Action Space".
         rewards: lines after the section "Rewards".
         guide: page that explains the environment, and its title.
-        picture: name of the file with a frame and its description, or None.
         pettingzoo: whether the environment is one of PettingZoo.
     """
 
@@ -83,7 +75,6 @@ class EnvironmentPage:
     actions: Callable[[], list[str]]
     rewards: Callable[[], list[str]] = list
     guide: tuple[str, str]
-    picture: tuple[str, str] | None = None
     pettingzoo: bool = False
 
     @property
@@ -103,17 +94,19 @@ observations, infos = env.reset(seed=0)
 actions = {agent: env.action_space(agent).sample(mask=infos[agent]["action_mask"]) for agent in env.agents}
 observations, rewards, terminations, truncations, infos = env.step(actions)"""
 
-SESSION = ("duo_wizard.png", "A session from above, with errands and dialogue at the right")
-DRIVE = ("navigation.png", "What the Co-Wizard observes of a drive, with the instructions at the right")
-ROLE_PICTURES = {
-    Role.PARTICIPANT: (
-        "participant.png",
-        "What the participant observes: all places, its errands, the objects in sight",
-    ),
-    Role.CO_WIZARD: ("co_wizard.png", "What the Co-Wizard observes: the places on its map, the objects in sight"),
-    Role.AD_WIZARD: ("ad_wizard.png", "What the Ad-Wizard observes: all places, the errands, its obstacles"),
+ANIMATIONS: Mapping[str, str] = {
+    "duo_wizard": "A session from above, with errands and dialogue at the right",
+    "participant": "What the participant observes: all places, its errands, the objects in sight",
+    "co_wizard": "What the Co-Wizard observes: the places on its map, the objects in sight",
+    "ad_wizard": "What the Ad-Wizard observes: all places, the errands, its obstacles",
+    "navigation": "A drive by discrete actions, with the instructions at the right",
+    "navigation_continuous": "A drive by throttle, steering and brake, with the instructions at the right",
+    "ufn": "Utterances of the participant in a recorded session, and the act of each",
+    "rfn": "The dialogue of a recorded session, and the act that the Co-Wizard says next",
+    "nfd": "A recorded session, and the action that the Co-Wizard carries out next",
+    "town": "The ego (green) among traffic in midtown, in highway-env's viewer",
 }
-"""Pictures of the views of one role, in a session of the same seed."""
+"""What the animation on each page shows."""
 
 ROLE_SUMMARIES = {
     Role.PARTICIPANT: "The agent is the participant: it knows the errands and the whole map and guides the Co-Wizard by"
@@ -138,7 +131,7 @@ def _pages() -> Iterator[EnvironmentPage]:
     weights = dorothie_gym.RewardWeights()
     roles = ("../roles.md", "Roles, observations and actions")
     yield EnvironmentPage(
-        name="duo_wizard", id="DuoWizard-v0", cls=dorothie_gym.DuoWizardEnv, pettingzoo=True, picture=SESSION,
+        name="duo_wizard", id="DuoWizard-v0", cls=dorothie_gym.DuoWizardEnv, pettingzoo=True,
         summary="All three roles through the parallel API of PettingZoo (also AEC).",
         snippet=PARALLEL, guide=roles,
         observations=lambda: [
@@ -153,7 +146,7 @@ def _pages() -> Iterator[EnvironmentPage]:
     )  # fmt: skip
     for role, env_id in ((Role.PARTICIPANT, "Participant"), (Role.CO_WIZARD, "CoWizard"), (Role.AD_WIZARD, "AdWizard")):
         yield EnvironmentPage(
-            name=str(role), id=f"{env_id}-v0", cls=dorothie_gym.SingleRole, picture=ROLE_PICTURES[role], guide=roles,
+            name=str(role), id=f"{env_id}-v0", cls=dorothie_gym.SingleRole, guide=roles,
             summary=ROLE_SUMMARIES[role], snippet=MASKED,
             observations=lambda role=role: field_tables(observation_fields(role, LIMITS)),
             actions=lambda role=role: field_tables(action_fields(role, LIMITS)),
@@ -165,7 +158,7 @@ def _pages() -> Iterator[EnvironmentPage]:
         for name in ("dense", "careful", "sparse")
     }
     yield EnvironmentPage(
-        name="navigation", id="Navigation-v0", cls=dorothie_gym.NavigationEnv, picture=DRIVE, guide=navigation,
+        name="navigation", id="Navigation-v0", cls=dorothie_gym.NavigationEnv, guide=navigation,
         summary="Driving with given directions, by discrete actions.", snippet=MASKED,
         observations=lambda: vector_table(FIELD_SPECS),
         actions=navigation_actions,
@@ -173,7 +166,7 @@ def _pages() -> Iterator[EnvironmentPage]:
     )  # fmt: skip
     yield EnvironmentPage(
         name="navigation_continuous", id="Navigation-continuous-v0", cls=dorothie_gym.NavigationContinuousEnv,
-        summary="Driving with given directions, by throttle, steering and brake.", picture=DRIVE, guide=navigation,
+        summary="Driving with given directions, by throttle, steering and brake.", guide=navigation,
         snippet=SAMPLE,
         observations=lambda: vector_table(CONTINUOUS_FIELD_SPECS),
         actions=pedal_actions,
@@ -189,7 +182,6 @@ def _pages() -> Iterator[EnvironmentPage]:
     yield EnvironmentPage(
         name="town", id="Town-v0", cls=dorothie_gym.TownEnv, snippet=SAMPLE, guide=("../towns.md", "Towns and maps"),
         summary="A plain environment of highway-env in any town, without roles, dialogue and errands.",
-        picture=("town.png", "The ego (green) among traffic in midtown, in highway-env's viewer"),
         observations=kinematics, actions=meta_actions,
     )  # fmt: skip
 
@@ -217,9 +209,7 @@ def _write(page: EnvironmentPage, links: Mapping[str, str]) -> str:
     make = 'pettingzoo.make("parallel", ' if page.pettingzoo else "gym.make("
     made = f'{make}"dorothie_gym/{page.id}"{corpus})'
     code = f"import {package}\n\nimport dorothie_gym\n\nenv = {made}\n{page.snippet}\nenv.close()"
-    lines = [f"# {page.id}", "", GENERATED, "", page.summary]
-    if page.picture is not None:
-        lines += ["", f"![{page.picture[1]}]({page.picture[0]})"]
+    lines = [f"# {page.id}", "", GENERATED, "", page.summary, "", f"![{ANIMATIONS[page.name]}]({page.name}.webp)"]
     lines += ["", f"See also: [{page.guide[1]}]({page.guide[0]}).", "", "```python", code, "```"]
     after = {"Observation Space": page.observations, "Action Space": page.actions, "Rewards": page.rewards}
     for title in SECTIONS:
@@ -285,53 +275,3 @@ def pages() -> dict[str, str]:
     links |= {name: f"vocabularies.md#{anchor}" for name, anchor in anchors().items()}
     texts = {f"{page.name}.md": _write(page, links) for page in all_pages}
     return {"index.md": _index(all_pages), "vocabularies.md": vocabularies(), **texts}
-
-
-# --- Pictures -------------------------------------------------------------------------------------------------------
-
-
-def draw_pictures() -> None:
-    """Draws the frames on the pages."""
-    duo = pettingzoo.make("parallel", "dorothie_gym/DuoWizard-v0", render_mode="rgb_array")
-    observations, _ = duo.reset(seed=7)
-    limits, town = duo.unwrapped.limits, duo.unwrapped.town
-    policies = {role: dorothie_gym.make_policy("scripted", role, limits) for role in AGENT_ROLES}
-    states = {role: policy.initial_state(7, town) for role, policy in policies.items()}
-    for _ in range(60):
-        actions = {}
-        for role, policy in policies.items():
-            actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
-        observations, *_ = duo.step(actions)
-    _save("duo_wizard.png", duo.render())
-    for name in ("Participant", "CoWizard", "AdWizard"):
-        _draw_role(f"dorothie_gym/{name}-v0")
-    drive = gym.make("dorothie_gym/Navigation-v0", render_mode="rgb_array")
-    drive.action_space.seed(0)
-    _, info = drive.reset(seed=3)
-    for _ in range(24):
-        *_, info = drive.step(drive.action_space.sample(info["action_mask"]))
-    _save("navigation.png", drive.render())
-    settings = {"town": "midtown", "vehicles": 60, "pedestrians": 20, "scaling": 4.0}
-    town_env = gym.make("dorothie_gym/Town-v0", config=settings, render_mode="rgb_array")
-    town_env.reset(seed=4)
-    for _ in range(5):
-        town_env.step(1)
-    _save("town.png", town_env.render())
-
-
-def _draw_role(env_id: str) -> None:
-    """Draws what a role observes after a minute of a session of scripted policies."""
-    env = gym.make(env_id, render_mode="rgb_array")
-    role, engine = env.get_wrapper_attr("role"), env.get_wrapper_attr("engine")
-    policy: Any = dorothie_gym.make_policy("scripted", role, engine.limits)
-    seen, _ = env.reset(seed=7)
-    state = policy.initial_state(7, engine.town)
-    for _ in range(120):
-        action, state = policy.step(seen, state)
-        seen, *_ = env.step(action)
-    _save(f"{role}.png", env.render())
-
-
-def _save(name: str, frame: Any) -> None:
-    image: NDArray[np.uint8] = np.asarray(frame)
-    Image.fromarray(image).quantize(COLOURS).save(FOLDER / name, optimize=True)

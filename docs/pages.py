@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import environment_animations
 import environment_pages
 import module_page
 import understanding_page
@@ -306,7 +307,7 @@ def main(arguments: list[str]) -> None:
         module_page.PAGE.write_text(module_page.modules(), encoding="utf-8", newline="\n")
         return
     if given.command == "frames":
-        environment_pages.draw_pictures()
+        environment_animations.draw_animations()
         return
     if given.command == "curves":
         named = dict(run.split("=", 1) for run in given.runs)

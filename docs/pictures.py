@@ -22,7 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-import environment_pages
+import environment_animations
 import numpy as np
 from film_cut import film_frames
 from numpy.typing import NDArray
@@ -381,7 +381,7 @@ def main(arguments: Sequence[str]) -> None:
         if name in PICTURES:
             PICTURES[name](DOCS / f"{name}.png")
         elif name == "environments":
-            environment_pages.draw_pictures()
+            environment_animations.draw_animations()
         elif given.corpus is None:
             print("corpus: left out; give a corpus with --corpus DIR")
         else:

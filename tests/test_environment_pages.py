@@ -7,9 +7,11 @@ from types import ModuleType
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import pettingzoo
 import pytest
 from gymnasium import spaces
+from PIL import Image
 
 import dorothie_gym
 from tests.session.recording.builders import write
@@ -163,6 +165,20 @@ def test_links_to_vocabularies_have_a_heading(name: str, generator: ModuleType) 
     assert set(re.findall(r"vocabularies\.md#([\w-]+)", page(name))) <= anchors
 
 
-def test_pictures_are_small() -> None:
-    pictures = list(FOLDER.glob("*.png"))
-    assert len(pictures) == 6 and all(path.stat().st_size < 150_000 for path in pictures)
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_shows_an_animation_that_is_small_and_moves(name: str) -> None:
+    path = FOLDER / f"{name}.webp"
+    assert f"]({name}.webp)" in page(name).split("\n## ")[0], "the animation is above the sections"
+    assert path.stat().st_size < 400_000
+    with Image.open(path) as film:
+        frames = int(getattr(film, "n_frames", 1))
+        assert frames >= 20 and film.width == 640
+        first = np.asarray(film.convert("RGB"), dtype=np.int16)
+        film.seek(frames - 1)
+        assert (np.abs(first - np.asarray(film.convert("RGB"))).max(axis=2) > 60).mean() > 0.01, "nothing moves"
+
+
+def test_one_command_draws_every_animation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)
+    drawn = importlib.import_module("environment_animations").ANIMATIONS
+    assert set(drawn) == set(PAGES) == {path.stem for path in FOLDER.glob("*.webp")}

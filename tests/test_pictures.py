@@ -66,7 +66,7 @@ def test_charts_show_the_recorded_figures(pictures: ModuleType) -> None:
 
 
 def test_every_picture_of_the_pages_is_drawn_by_a_command(pictures: ModuleType) -> None:
-    from_runs = {"navigation_curve", "perception", "detections"}  # of trainings and benchmarks
+    from_runs = {"navigation_curve", "co_wizard_curve", "perception", "detections"}  # of trainings and benchmarks
     from_browser = {f"console_{seat}" for seat in ("participant", "co_wizard", "ad_wizard", "experimenter")}
     from_browser |= {
         "annotation_tool",

@@ -35,6 +35,7 @@ from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.action_values import real_numbers, whole_number
 from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.display import open_display
 from dorothie_gym.support.time_limit import TimeLimited, steps_until
 
 if TYPE_CHECKING:
@@ -295,8 +296,14 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
         }
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Renders as highway-env does, also under SDL's dummy video driver, where its viewer would show black."""
+        """Renders as highway-env does, also under SDL's dummy video driver, where its viewer would show black.
+
+        Raises:
+            RuntimeError: the mode is "human", and there is no display.
+        """
         if self.viewer is None and self.render_mode is not None:
+            if self.render_mode == "human":
+                open_display()
             viewer = EnvViewer(self)
             viewer.enabled = True
             self.viewer: EnvViewer | None = viewer

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import enum
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, SupportsFloat
 
 import gymnasium as gym
@@ -47,6 +48,9 @@ _KEEPING_GOAL: Final = frozenset({"faster", "slower"})
 
 _PLACES: Final = tuple(name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED))
 
+_LABEL_OF: Final = {place: LABELS.index(place) for place in _PLACES}
+"""Index of each place in `LABELS`."""
+
 _SAYINGS: Final[Mapping[str, DialogueAct]] = {
     "say_okay": DialogueAct.of(DialogueMove.ACKNOWLEDGE),
     "say_will_do": DialogueAct.of(DialogueMove.CONFIRM),
@@ -67,30 +71,47 @@ _ABOUT_GOAL: Final[Mapping[str, Callable[[LandmarkName], DialogueAct]]] = {
 """Acts of the sayings that name the goal."""
 
 
+GOAL_HEARD: Final = "goal_heard"
+"""Name of the action that sets the place that the participant has mentioned last as goal."""
+
+
+class MacroKind(enum.StrEnum):
+    """Kind of a macro-action."""
+
+    CONTINUE = "continue"
+    DRIVE = "drive"
+    GOAL = "goal"
+    SAY = "say"
+    ASK = "ask"
+
+
 @dataclass(frozen=True, kw_only=True)
 class MacroAction:
     """One macro-action.
 
     Attributes:
         name: its name, such as "left", "goal_KFC" or "ask_which_way".
+        kind: its kind.
         place: place that becomes the goal; None for other actions.
     """
 
     name: str
+    kind: MacroKind
     place: LandmarkName | None = None
 
 
 MACRO_ACTIONS: Final = (
-    MacroAction(name="continue"),
-    *(MacroAction(name=name) for name in (*_COMMANDS, *_DIRECTIONS)),
-    *(MacroAction(name=f"goal_{place.label}", place=place) for place in _PLACES),
-    *(MacroAction(name=name) for name in (*_SAYINGS, *_ABOUT_GOAL)),
+    MacroAction(name="continue", kind=MacroKind.CONTINUE),
+    *(MacroAction(name=name, kind=MacroKind.DRIVE) for name in (*_COMMANDS, *_DIRECTIONS)),
+    *(MacroAction(name=f"goal_{place.label}", kind=MacroKind.GOAL, place=place) for place in _PLACES),
+    *(MacroAction(name=name, kind=MacroKind(name.split("_")[0])) for name in (*_SAYINGS, *_ABOUT_GOAL)),
+    MacroAction(name=GOAL_HEARD, kind=MacroKind.GOAL),
 )
 """The macro-actions, in the order of the action space; the first one continues."""
 
 
 class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], RecordConstructorArgs):
-    """Wrapper of `CoWizard-v0` with 30 actions in place of a dict of 104 entries.
+    """Wrapper of `CoWizard-v0` with 31 actions, or fewer by `kinds`, in place of a dict of 104 entries.
 
     One action begins a command, a goal or an utterance, and lasts until something happens: the participant has spoken,
     the car waits for a choice, stands, or has arrived, or `seconds` have passed. An action that sets a goal is not
@@ -109,16 +130,22 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
     sb3-contrib calls, and `info["action_mask"]` state what is possible: places that are on the map, exits that exist,
     and speech while the Co-Wizard is silent.
 
+    Attributes:
+        actions: the macro-actions of the action space, in order.
+
     Args:
         env: a Co-Wizard's environment.
         seconds: longest simulated time of an action [s].
+        kinds: kinds of actions to keep, such as `{"goal", "ask"}`; None keeps all. To continue is always possible.
 
     Raises:
-        ValueError: the environment is not that of a Co-Wizard, or hides dialogue acts.
+        ValueError: the environment is not that of a Co-Wizard, or hides dialogue acts; there is no such kind.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], seconds: float = 5.0) -> None:
-        RecordConstructorArgs.__init__(self, seconds=seconds)
+    def __init__(
+        self, env: gym.Env[Any, Any], seconds: float = 5.0, kinds: Collection[MacroKind | str] | None = None
+    ) -> None:
+        RecordConstructorArgs.__init__(self, seconds=seconds, kinds=kinds)
         gym.Wrapper.__init__(self, env)
         self._inner: SingleRole = env.unwrapped  # type: ignore[assignment]  # checked next
         if getattr(env.unwrapped, "role", None) is not Role.CO_WIZARD:
@@ -129,7 +156,9 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         if not seconds > 0.0:
             raise ValueError(f"seconds is {seconds}; it must be above 0")
         self._seconds = seconds
-        self.action_space: spaces.Space[Any] = spaces.Discrete(len(MACRO_ACTIONS))
+        kept = set(MacroKind) if kinds is None else _checked_kinds(kinds)
+        self.actions = tuple(action for action in MACRO_ACTIONS if action.kind in kept)
+        self.action_space: spaces.Space[Any] = spaces.Discrete(len(self.actions))
         self.observation_space: spaces.Space[Any] = spaces.Dict(
             {
                 **observed.spaces,
@@ -155,8 +184,10 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         An action that the mask excludes continues.
         """
         if not self.action_space.contains(np.int64(action)):
-            raise ValueError(f"action is {action!r}; it must be a whole number in 0..{len(MACRO_ACTIONS) - 1}")
-        chosen = MACRO_ACTIONS[int(action)] if self.action_masks()[int(action)] else MACRO_ACTIONS[0]
+            raise ValueError(f"action is {action!r}; it must be a whole number in 0..{len(self.actions) - 1}")
+        chosen = self.actions[int(action)] if self.action_masks()[int(action)] else self.actions[0]
+        if chosen.name == GOAL_HEARD:
+            chosen = replace(chosen, place=self._heard_place())
         begun = self._driver.view.time
         reward, decisions = 0.0, 0
         typed = self._begun(chosen)
@@ -173,7 +204,7 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         return self._observed(), reward, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Returns which macro-actions are possible now, (30,) bool; the interface of sb3-contrib."""
+        """Returns which of `actions` are possible now, (n,) bool; the interface of sb3-contrib."""
         physical = np.asarray(self._mask["physical"])
         silent = self._driver.view.speaking <= 0.0
         exits = self._exits()
@@ -183,9 +214,10 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
             **{name: bool(physical[PhysicalAction.J_TURN]) and name in exits for name in _DIRECTIONS},
             **dict.fromkeys(_SAYINGS, silent),
             **dict.fromkeys(_ABOUT_GOAL, silent and self._driver.goal is not None),
+            GOAL_HEARD: self._heard_place() not in (None, self._driver.goal),
         }
         return np.array(
-            [possible[one.name] if one.place is None else self._is_new_goal(one.place) for one in MACRO_ACTIONS]
+            [possible[one.name] if one.place is None else self._is_new_goal(one.place) for one in self.actions]
         )
 
     # --- one action ---------------------------------------------------------------------------------------------------
@@ -253,8 +285,24 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
                 found[name] = min(fitting, key=lambda angle: abs(angle - wanted))
         return found
 
+    def _heard_place(self) -> LandmarkName | None:
+        """Returns the place on the map that the participant has mentioned last, within `MEMORY`; None without one."""
+        since = self._driver.view.time - MEMORY
+        heard = {place: float(self._slots_at[_LABEL_OF[place]]) for place in _PLACES}
+        known = [place for place, time in heard.items() if time > since and self._driver.knows(place)]
+        return max(known, key=heard.__getitem__, default=None)
+
     def _is_new_goal(self, place: LandmarkName) -> bool:
         return place is not self._driver.goal and self._driver.knows(place)
+
+
+def _checked_kinds(kinds: Collection[MacroKind | str]) -> set[MacroKind]:
+    """Returns kinds of actions, with that to continue; raises `ValueError` for an unknown one, or a single text."""
+    names = list(map(str, MacroKind))
+    if isinstance(kinds, str) or (unknown := [kind for kind in kinds if kind not in names]):
+        wrong = kinds if isinstance(kinds, str) else unknown[0]
+        raise ValueError(f"kinds has {wrong!r}; give a set of {', '.join(names)}")
+    return {MacroKind.CONTINUE, *map(MacroKind, kinds)}
 
 
 def _with_speech(driving: CoWizardAction, act: DialogueAct) -> CoWizardAction:

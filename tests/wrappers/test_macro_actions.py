@@ -38,7 +38,7 @@ def goal_id(number: int) -> int:
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 def test_there_are_tens_of_actions_and_the_environment_is_valid() -> None:
     env = made()
-    assert env.action_space == spaces.Discrete(30) and len(NUMBERS) == 30
+    assert env.action_space == spaces.Discrete(31) and len(NUMBERS) == 31
     check_env(env, skip_render_check=True, skip_close_check=True)
 
 
@@ -121,8 +121,8 @@ def test_excluded_actions_continue_and_wrong_ones_raise() -> None:
     env.reset(seed=7)
     excluded = int(np.flatnonzero(~env.action_masks())[0])
     assert not any(env.step(excluded)[4]["refused"].values())
-    with pytest.raises(ValueError, match=r"action is 30; it must be a whole number in 0..29"):
-        env.step(30)
+    with pytest.raises(ValueError, match=r"action is 31; it must be a whole number in 0..30"):
+        env.step(31)
 
 
 def test_only_a_co_wizard_that_observes_acts_is_wrapped() -> None:
@@ -136,7 +136,7 @@ def test_flat_box_holds_the_observation_normalised_and_equal_seeds_give_equal_ep
     runs = []
     for _ in range(2):
         env = dorothie_gym.flatten(made(partners={"ad_wizard": "silent"}), box=True)
-        assert isinstance(env.observation_space, spaces.Box) and env.action_space == spaces.Discrete(30)
+        assert isinstance(env.observation_space, spaces.Box) and env.action_space == spaces.Discrete(31)
         rng = np.random.default_rng(0)
         observation, _ = env.reset(seed=3)
         rows = [observation]
@@ -146,3 +146,40 @@ def test_flat_box_holds_the_observation_normalised_and_equal_seeds_give_equal_ep
             rows.append(observation)
         runs.append(np.array(rows))
     assert (runs[0] == runs[1]).all() and np.abs(runs[0]).max() <= 1.0
+
+
+def test_kinds_keep_their_actions_and_masks() -> None:
+    env = MacroActions(made().env, seconds=5.0, kinds={"goal", "ask"})
+    names = [one.name for one in env.actions]
+    assert names[0] == "continue" and {name.split("_")[0] for name in names} == {"continue", "goal", "ask"}
+    assert env.action_space == spaces.Discrete(len(names))
+    _, info = env.reset(seed=7)
+    assert info["action_mask"].shape == (len(names),) and info["action_mask"][0]
+    with pytest.raises(ValueError, match=f"must be a whole number in 0..{len(names) - 1}"):
+        env.step(len(names))
+
+
+@pytest.mark.parametrize("kinds", [{"goals"}, "goal"])
+def test_unknown_kinds_are_named(kinds: Any) -> None:
+    with pytest.raises(ValueError, match="kinds has 'goals?'; give a set of continue, drive, goal, say, ask"):
+        MacroActions(made().env, kinds=kinds)
+
+
+def test_the_place_that_was_mentioned_becomes_the_goal() -> None:
+    partners = {"participant": "scripted:talkativeness=0..0.2", "ad_wizard": "silent"}
+    env = made(partners=partners, config=EnvConfig(max_seconds=120.0, word_error_rate=0.0))
+    followed = 0
+    for seed in range(6):
+        observation, info = env.reset(seed=seed)
+        assert not info["action_mask"][NUMBERS["goal_heard"]], "nothing was said"
+        while not info["action_mask"][NUMBERS["goal_heard"]]:
+            observation, _, _, over, info = env.step(NUMBERS["continue"])
+            if over:
+                break
+        else:
+            places_heard = {one.value for one in LandmarkName if observation["heard"][LABELS.index(one)] > 0.0}
+            observation, _, _, _, info = env.step(NUMBERS["goal_heard"])
+            assert int(observation["goal"]) in places_heard - {0}
+            assert not info["action_mask"][NUMBERS["goal_heard"]] or observation["heard_moves"].any()
+            followed += 1
+    assert followed >= 2

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.pictures import palette
 from dorothie_gym.pictures.views.aerial import AerialView
 from dorothie_gym.pictures.views.panel import Panel
+from dorothie_gym.support.display import open_display
 from dorothie_gym.support.libraries import pygame
 
 if TYPE_CHECKING:
@@ -93,8 +94,8 @@ class HumanWindow:
         Raises:
             RuntimeError: there is no display.
         """
+        open_display()
         try:
-            pygame.display.init()
             self._screen = pygame.display.set_mode(size)
         except pygame.error as error:
             raise RuntimeError(f'no window can be opened ({error}); use render_mode="rgb_array"') from error
