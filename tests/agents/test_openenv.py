@@ -170,6 +170,23 @@ def test_wrong_arguments_of_a_reset_are_words(url: str, arguments: dict[str, obj
     asyncio.run(reset())
 
 
+def test_refused_reset_leaves_the_session_as_it_was(url: str) -> None:
+    from dorothie_gym.agents.openenv.client import DorothieClient
+    from dorothie_gym.agents.openenv.models import TextAction
+
+    async def refused() -> None:
+        async with DorothieClient(base_url=url) as env:
+            await env.reset(seed=1, episode_id="one")
+            before = (await env.step(TextAction(tool="wait", value="5"))).observation.time
+            with pytest.raises(Exception, match="VALIDATION_ERROR"):
+                await env.reset(seed=2, episode_id={"number": 2})
+            state, after = await env.state(), await env.step(TextAction(tool="look"))
+            assert (state.episode_id, state.step_count) == ("one", 1)
+            assert after.observation.time == before > 0.0
+
+    asyncio.run(refused())
+
+
 def test_port_in_use_is_named(url: str) -> None:
     command = [sys.executable, "-m", "dorothie_gym", "serve", "openenv", "--port", url.rpartition(":")[2]]
     done = subprocess.run(command, capture_output=True, text=True)

@@ -68,10 +68,10 @@ class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
             _check_town(town)
             self._session, self._settings = TextSession(role, town, pages=pages), (role, town, pages)
         drawn = randbits(31) if seed is None else seed
+        state = State(episode_id=episode_id, step_count=0, seed=drawn, role=role, town=town)
         with _PLAYING:
             turn = self._session.reset(drawn)
-        self._score = 0.0
-        self._state = State(episode_id=episode_id, step_count=0, seed=drawn, role=role, town=town)
+        self._score, self._state = 0.0, state
         return self._observation(self._session, turn)
 
     def step(self, action: TextAction, timeout_s: float | None = None, **_: Any) -> TextObservation:
