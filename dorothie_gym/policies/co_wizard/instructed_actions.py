@@ -35,6 +35,9 @@ STRAIGHT_ON_DISTANCE = 60.0
 SLOWER_DISTANCE = 20.0
 """Distance to a goal off the map that "slower" without a reason is taken to mean [m]."""
 
+SOON_AGAIN = 250.0
+"""Way back to a place that was missed, for which a speed is kept that was asked for [m]."""
+
 ASKED_SPEED_CHANGE = 10
 """Change of the cruise speed for "faster" and "slower" without a number [km/h]."""
 
@@ -121,7 +124,10 @@ def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words:
         asked = asked_speed(
             state, view, 2 * asked - round(view.cruise), words.faster
         )  # the other change is undone, too
-    until = view.time + state.config.slow_time
+    seconds = state.config.slow_time
+    if words.speed is not None and guided:  # for the way back to a place that was missed
+        seconds = max(seconds, 3.6 * SOON_AGAIN / asked)
+    until = view.time + seconds
     state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
     if state.town.cruise is None and asked < state.config.open_road_speed:
         state.intentions = state.intentions.calmed(CALM_SPEED)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dorothie_gym.dialogue.speaker_style import draw_style
+from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
@@ -149,7 +150,7 @@ def update_route(state: CoWizardState, view: CoWizardView) -> None:
     if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
         # the manoeuvre cannot begin before the light is green
         state.intentions = state.intentions.wishing_until(view.time + state.config.red_light_extension)
-    if view.standing:
+    if view.standing or view.manoeuvre is PhysicalAction.U_TURN:
         state.intentions = state.intentions.slow_longer(state.clock.interval)
     _pass_junction(state, view)
     if state.route.progress is None or view.manoeuvring:

@@ -80,6 +80,9 @@ BEHIND_CORNER = 5.0
 ENDING_TIME = 2.0
 """Time to say on which side of the street the place is, and what stands there [s]."""
 
+SPEAKING = 2.0
+"""Time in which a car that has just turned gets faster while the place is announced [s]."""
+
 STANDING_RANGE = 45.0
 """Distance to the place within which a standing car gets its next instruction [m]."""
 
@@ -185,7 +188,7 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
 
 def _announce_place(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
     """Announces the place, or requests a lower speed if there is no time for an announcement."""
-    goal, speed = state.task.goal, max(view.speed, state.config.soon_speed)
+    goal, speed = state.task.goal, max(view.speed, _speed_soon(state, view))
     if goal is None:
         return
     if left > 3.5 * speed + 20.0:
@@ -202,6 +205,13 @@ def _announce_place(state: ParticipantState, view: ParticipantView, left: float,
     state.say(*said)
 
 
+def _speed_soon(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the speed expected of a car that has just started or turned, after a few words [m/s]."""
+    if not _may_be_fast(state):
+        return state.config.soon_speed
+    return max(min(view.speed + SPEAKING * state.config.pull, _top_speed(state, view)), state.config.soon_speed)
+
+
 def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether only the end of the last stretch is left."""
     progress = state.route.progress
@@ -214,9 +224,10 @@ def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float
     """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
     slow = view.speed < max(state.motion.speed - BRAKING, state.config.slow_speed)
     told = state.speech.has_just_spoken(view.time, SLOWS_WITHIN) and view.speed > state.config.slow_speed
-    if state.guidance.approach_announced and left > state.config.slow_distance and (slow or told):
-        return False  # the car is slowing down, or is about to
     room, after = room_to_stop(state, view, left)
+    late = _may_be_fast(state) and after < 0.0
+    if state.guidance.approach_announced and left > state.config.slow_distance and (slow or told) and not late:
+        return False  # the car is slowing down, or is about to
     return room <= (state.config.short_stop if state.route.misses else state.config.aim) or room < -OVERSHOOT * after
 
 
@@ -247,7 +258,7 @@ def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) ->
         gain = config.pull
     elif _is_about_to_slow_down(state, view):
         gain = GAIN_RANGE[0]
-    slow = state.guidance.slowed_early or state.guidance.approach_announced
+    slow = (state.guidance.slowed_early or state.guidance.approach_announced) and not _speeds_up(state, view)
     now, top = view.speed, max(config.soon_speed if slow else _top_speed(state, view), view.speed)
     soon = min(max(now + gain * interval, 0.0), top)
     rooms = []
@@ -255,6 +266,17 @@ def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) ->
         then = min(max(speed + gain * delay, 0.0), top)
         rooms.append(ahead - (speed + then) / 2 * delay - stopping_distance(then))
     return rooms[0], rooms[1]
+
+
+def _speeds_up(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car gets faster than one that drives slowly, as it was told to."""
+    faster = view.speed > max(state.motion.speed + BRAKING, state.config.slow_speed)
+    return faster and _may_be_fast(state)
+
+
+def _may_be_fast(state: ParticipantState) -> bool:
+    """Returns whether the streets are fast, or the place was missed before, so that a slow car is not relied on."""
+    return state.town.cruise is None or state.route.misses > 0
 
 
 def _top_speed(state: ParticipantState, view: ParticipantView) -> float:
