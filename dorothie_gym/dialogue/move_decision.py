@@ -265,8 +265,9 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     if after is None and move in _SIGNS_FIRST and (_runs_on(parsed) or _sends_on(parsed)):
         return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
     commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
-    if move is DialogueMove.QUERY_YN and commanded and not parsed.question:
-        return DialogueMove.INSTRUCT  # "do the Shell first"
+    confirms_nothing = move is DialogueMove.CONFIRM and after is None and _begins_with_order(parsed)
+    if commanded and not parsed.question and (move is DialogueMove.QUERY_YN or confirms_nothing):
+        return DialogueMove.INSTRUCT  # "do the Shell first"; "stop by the Shell on the way to the KFC"
     if move in _ASKED and requested and not (move is DialogueMove.QUERY_W and parsed.question):
         offered = any(f"{words} " in f"{parsed.masked} " for words in _OFFERS)
         mine = any(f"{words} " in parsed.masked for words in ("can i", "could i", "may i", "might i"))
@@ -294,6 +295,13 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
     if move is DialogueMove.CLARIFY and own and after is None:
         return DialogueMove.INSTRUCT
     return move
+
+
+def _begins_with_order(parsed: ParsedText) -> bool:
+    """Returns whether the first words are an imperative."""
+    words = parsed.masked.split()
+    match = route_grammar().terminals.longest(words, 0)
+    return match is not None and match.group in ("actions", "verbs") and not words[0].endswith("ing")
 
 
 def _ends_in_order(parse: PlanParse | None) -> bool:

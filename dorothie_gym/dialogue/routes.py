@@ -383,10 +383,10 @@ def _with_place(verb: str) -> Callable[[PlanStep], str]:
 _COMMANDS: Final[Mapping[StepAction, Callable[[PlanStep], str]]] = MappingProxyType(
     {
         StepAction.TURN: _turn,
-        StepAction.STRAIGHT: lambda step: "go straight on",
-        StepAction.LANE: lambda step: (
-            "change lanes" if step.direction is None else f"change to the {step.direction} lane"
+        StepAction.STRAIGHT: lambda step: (
+            f"go straight on past the {_nth(step.ordinal)} junction" if step.ordinal else "go straight on"
         ),
+        StepAction.LANE: lambda step: f"change to the {step.direction} lane" if step.direction else "change lanes",
         StepAction.U_TURN: lambda step: "turn around",
         StepAction.STOP: lambda step: "stop",
         StepAction.GO: lambda step: "drive on",

@@ -100,3 +100,12 @@ def test_forms_of_one_order(said, plain):
 def test_what_is_told_or_asked_orders_nothing(said):
     assert not understand(said).plan.steps
     assert guess_spans(said)[0].act.move in (DialogueMove.EXPLAIN, DialogueMove.QUERY_YN)
+
+
+@pytest.mark.parametrize("order", ["stop by the Shell", "drop in at the Shell"])
+def test_an_errand_on_the_way_to_another_is_an_order(order):
+    said = f"{order} on the way to the KFC"
+    assert guess_spans(said)[0].act.move is DialogueMove.INSTRUCT
+    first, second = understand(said).plan.steps
+    assert first == understand(order).plan.steps[0]
+    assert second == understand("take me to the KFC").plan.steps[0]
