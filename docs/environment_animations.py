@@ -158,15 +158,15 @@ def _captioned(view: Frame, asked: str, answer: str) -> Frame:
 
 
 def _of_town() -> Iterator[Frame]:
-    """Yields the drive of an ego that keeps its speed among dense traffic."""
+    """Yields the drive of an ego that starts and keeps its speed among dense traffic."""
     settings = {
         "town": "midtown", "vehicles": 110, "pedestrians": 80, "scaling": 5.0, "screen_width": WIDTH,
         "screen_height": 400,
     }  # fmt: skip
     env = gym.make("dorothie_gym/Town-v0", config=settings, render_mode="rgb_array")
-    env.reset(seed=4)
-    for _ in range(FRAMES):
-        *_, terminated, truncated, _ = env.step(1)
+    env.reset(seed=1)
+    for number in range(FRAMES):
+        *_, terminated, truncated, _ = env.step(1 if number else 3)  # the ego stands at first: FASTER, then IDLE
         yield env.render()  # type: ignore[misc]  # an array in this render mode
         if terminated or truncated:
             return
