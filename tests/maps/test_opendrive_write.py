@@ -147,7 +147,7 @@ def test_turns_keep_their_types_whatever_their_angles(tmp_path: Path) -> None:
     assert differences(changed, read_back(changed, tmp_path)) == []
 
 
-@pytest.mark.parametrize(("aside", "share"), [(0.0, 1.0), (3.0, 0.4), (4.5, 0.1), (6.0, -0.2), (-5.0, 2.0)])
+@pytest.mark.parametrize(("aside", "share"), [(0.0, 1.0), (3.0, 0.4), (4.5, 0.1), (6.0, -0.2)])
 def test_lane_inside_of_a_bend_is_shorter_than_its_axis(aside: float, share: float) -> None:
     turned = np.linspace(0.0, 0.5 * np.pi, 40)
     axis = Axis(5.0 * np.column_stack((np.cos(turned), np.sin(turned))))  # turns left

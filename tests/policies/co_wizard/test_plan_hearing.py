@@ -318,3 +318,11 @@ def test_change_to_a_missing_lane_is_refused_and_the_plan_stays() -> None:
     ride.run(6.0)
     refused = [content for speech in ride.said for content in speech.meaning if content.predicate is Predicate.POSSIBLE]
     assert any(content.negated for content in refused)
+
+
+def test_slowness_asked_for_on_the_way_back_to_a_place_lasts_while_the_car_turns_round() -> None:
+    ride = Ride(RING)
+    ride.state.intentions = ride.state.intentions.with_asked_speed(15, 30, 50.0)
+    before = ride.state.intentions.slow_until
+    ride.say("make a u-turn", seconds=20.0)
+    assert ride.state.intentions.slow_until > before
