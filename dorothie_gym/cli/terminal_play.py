@@ -31,7 +31,7 @@ NOTHING: Final = " "
 
 COMMANDS: Final[Mapping[str, str]] = {
     " ": "continue", "g": "start", "x": "stop", "u": "turn_round", "+": "faster", "-": "slower",
-    "a": "left", "w": "straight", "d": "right",
+    "a": "left", "w": "straight", "d": "right", "p": "goal_heard",
     "o": "say_okay", "k": "say_will_do", "y": "say_yes", "n": "say_no", "h": "say_not_understood", "m": "say_goal",
     "f": "ask_where_to", "t": "ask_which_street", "j": "ask_which_way", "e": "ask_whether_done", "c": "ask_goal",
 }  # fmt: skip

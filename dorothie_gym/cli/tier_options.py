@@ -10,7 +10,7 @@ import typer
 
 from dorothie_gym.cli.options import find_players
 from dorothie_gym.cli.output import fail
-from dorothie_gym.evaluation.rollout import read_drives
+from dorothie_gym.evaluation import rollout as rollouts
 from dorothie_gym.evaluation.tiers import POOL_SEPARATOR, TIERS, Tier, find_tier
 from dorothie_gym.ontology.roles import Role
 
@@ -43,7 +43,7 @@ def read_references(file: Path | None) -> dict[str, ReferenceDrive]:
     if file is None:
         return {}
     try:
-        return read_drives(file)
+        return rollouts.read_drives(file)
     except OSError as error:
         fail(f"{file}: cannot be read ({error.strerror}); write it with `dorothie-gym reference-times`")
 
