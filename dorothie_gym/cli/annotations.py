@@ -10,7 +10,7 @@ from rich.table import Table
 
 from dorothie_gym import archive
 from dorothie_gym.cli.options import AsJson, Maps
-from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_errors, stdout, wide_stdout
+from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_errors, stdout
 from dorothie_gym.evaluation import analysis
 from dorothie_gym.lab import annotation as marking
 from dorothie_gym.support.installation import pip_install
@@ -164,18 +164,28 @@ def agreement(
         _show(found)
 
 
-def _show(found: CorpusAgreement) -> None:
+def _table(*titles: str) -> Table:
+    """Returns a table of pairs of annotators; on narrow terminals, names and titles fold."""
     table = Table(box=None, pad_edge=False)
-    for title in ("annotators", "sessions", "utterances", "spans (F1)", "moves (kappa)", "by piece", "slots (kappa)",
-                  "exchanges (kappa)", "transactions"):  # fmt: skip
-        table.add_column(title, justify="left" if title == "annotators" else "right", no_wrap=True)
+    table.add_column("annotators")
+    for title in titles:
+        table.add_column(title, justify="right")
+    return table
+
+
+def _show(found: CorpusAgreement) -> None:
+    labels = _table("sessions", "utterances", "spans (F1)", "moves (kappa)", "by piece", "slots (kappa)")
+    units = _table("exchanges (kappa)", "transactions (kappa)")
     for (first, second), (sessions, pair) in found.pairs.items():
-        labels, units = pair.labels, (pair.exchanges.kappa, pair.transactions.kappa)
-        figures = (labels.spans, labels.moves_of_equal_spans, labels.moves, labels.slots, *units)
-        table.add_row(f"{first}, {second}", str(sessions), str(labels.utterances), *map(coefficient, figures))
-    table.add_row("the paper", "20", "1045", "", "0.77", "", "0.85", "", "")
-    console = wide_stdout()
-    console.print(table)
+        figures = (pair.labels.spans, pair.labels.moves_of_equal_spans, pair.labels.moves, pair.labels.slots)
+        name = f"{first}, {second}"
+        labels.add_row(name, str(sessions), str(pair.labels.utterances), *map(coefficient, figures))
+        units.add_row(name, coefficient(pair.exchanges.kappa), coefficient(pair.transactions.kappa))
+    labels.add_row("the paper", "20", "1045", "", "0.77", "", "0.85")
+    console = stdout()
+    for table in (labels, units):
+        console.print(table)
+        console.print()
     if found.alpha is None:
         console.print(f"Krippendorff's alpha needs krippendorff: {pip_install('agreement')}", style="yellow")
     else:

@@ -155,9 +155,11 @@ def _count(corpus: archive.Corpus, picture: Path | None, *, as_json: bool) -> No
 
 
 def _table2(table: Facts) -> Table:
+    """Returns the figures of the corpus beside the paper's; on narrow terminals the titles fold, not the figures."""
     shown = Table(box=None, pad_edge=False)
-    for title in ("", "here", "paper", "per session here", "in the paper"):
-        shown.add_column(title, justify="right" if title else "left", no_wrap=True)
+    shown.add_column("")
+    for title in ("here", "paper", "per session here", "in the paper"):
+        shown.add_column(title, justify="right", no_wrap=True)
     for title, key in _ROWS:
         mine, paper = table[key], analysis.PAPER[key]
         row = [title, _figure(mine), _figure(paper)]
@@ -189,9 +191,10 @@ def _folds(folds: Mapping[str, int]) -> Table:
 
 def _anchors(anchors: Facts) -> Table:
     shown = Table(box=None, pad_edge=False)
-    for title in ("majority baselines", "here", "allowed", "paper", "unseen"):
-        shown.add_column(title, justify="left" if title.startswith("majority") else "right", no_wrap=True)
-    shown.add_column("", no_wrap=True)
+    shown.add_column("majority baselines")
+    for title in ("here", "allowed", "paper", "unseen"):
+        shown.add_column(title, justify="right", no_wrap=True)
+    shown.add_column("")
     for title, key in _ANCHORS:
         row = anchors[key]
         note = row.get("label") or ""

@@ -74,6 +74,15 @@ def test_agreement_of_a_corpus() -> None:
     assert "anna, ben" in text and "0.91" in text and "0.77" in text and "alpha of 2 annotators" in text
 
 
+def test_agreement_is_shown_whole_at_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    corpus()
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = call("agreement", "corpus").stdout.partition("Krippendorff")[0]
+    assert "…" not in shown and max(map(len, shown.splitlines())) <= 80
+    rows = [line.split() for line in shown.splitlines() if line.startswith("anna, ben")]
+    assert [len(row) - 2 for row in rows] == [6, 2], "labels and units of the pair"
+
+
 def test_agreement_without_two_annotators_is_refused() -> None:
     recorded(Path("corpus/s"))
     assert "nothing to compare" in refused("agreement", "corpus")

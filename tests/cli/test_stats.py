@@ -62,6 +62,17 @@ def test_figures_of_talk_are_whole_on_a_narrow_terminal(monkeypatch: pytest.Monk
     assert "sessions that mention somebody or something" in shown and " %" in shown
 
 
+@pytest.mark.parametrize("option", [(), ("--phenomena",), ("--behaviour",), ("--speech",), ("--check",)])
+def test_no_figure_is_cut_at_80_columns(option: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("TERM", "dumb")
+    shown = CliRunner().invoke(app, ["stats", str(corpus()), *option]).stdout
+    assert len(shown.splitlines()) > 3 or option == ("--check",)
+    assert "…" not in shown and max(map(len, shown.splitlines())) <= 80
+
+
 def test_corpus_is_shown_beside_that_of_the_paper() -> None:
     shown = stats(corpus()).stdout
     assert "8,415" in shown and "18.70" in shown and "vocabulary" in shown
