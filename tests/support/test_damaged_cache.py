@@ -92,7 +92,7 @@ def warmed(folder: Path, command: Sequence[str]) -> Path:
     return folder
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
 def test_command_makes_again_what_is_damaged(tmp_path: Path) -> None:
     command = [sys.executable, "-c", LOOK_UP]
