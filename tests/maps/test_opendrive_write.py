@@ -153,3 +153,14 @@ def test_lane_inside_of_a_bend_is_shorter_than_its_axis(aside: float, share: flo
     axis = Axis(5.0 * np.column_stack((np.cos(turned), np.sin(turned))))  # turns left
     found = axis.shortening(np.array([0.0, axis.length]), np.array([aside, aside]))
     assert found == pytest.approx(share, abs=0.1)
+
+
+def test_sidewalk_that_goes_round_several_times_is_written_and_read(tmp_path: Path) -> None:
+    town = load_town("brookside")
+    angle = np.linspace(0.0, 15.7 * 2.0 * np.pi, 900)
+    lengths = 4.24 + 0.02 * np.sin(0.93 * angle)
+    coil = np.column_stack((2000.0 + lengths * np.cos(angle), 2000.0 + lengths * np.sin(angle), 0.0 * angle))
+    odd = dataclasses.replace(town.sidewalks[0], points=coil)
+    write_opendrive(with_parts(town, sidewalks=(odd, *town.sidewalks[1:])), tmp_path / "town.xodr")
+    read = load_town(tmp_path / "town.xodr")
+    assert any(np.allclose(walk.points[[0, -1], :2], coil[[0, -1], :2], atol=0.05) for walk in read.sidewalks)

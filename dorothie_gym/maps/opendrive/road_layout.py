@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import NO_JUNCTION, NO_STREET, Lane
 from dorothie_gym.maps.opendrive.plan_view import Axis
-from dorothie_gym.maps.opendrive.strands import LineSamples, Strand, sample_line, strand_beside
+from dorothie_gym.maps.opendrive.strands import LineSamples, Strand, own_strand, sample_line, strand_beside
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 
@@ -271,7 +271,7 @@ class _Layout:
             if not any(self._add_beside(k, sidewalk, samples) for k in near):
                 axis = Axis(sidewalk.points[:, :2] * (1.0, -1.0))
                 strand = strand_beside(axis, samples, (0.0, axis.length), sidewalk=sidewalk.id)
-                strands = () if strand is None else (strand,)
+                strands = (strand or own_strand(samples, sidewalk.id),)
                 self.roads.append(RoadLayout(number=self._next, street=sidewalk.street, axis=axis, strands=strands))
                 self._next += 1
 

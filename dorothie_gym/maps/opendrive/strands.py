@@ -77,11 +77,13 @@ class LineSamples(NamedTuple):
     """Samples of a line of a town in the frame of OpenDRIVE.
 
     Attributes:
+        along: distances along the line (n,), ascending [m].
         places: (n, 2) [m].
         heights, widths: (n,) [m].
         given: which samples are points of the line (n,).
     """
 
+    along: Array
     places: Array
     heights: Array
     widths: Array
@@ -97,10 +99,32 @@ def sample_line(points: Array, widths: Array) -> LineSamples:
     at = at[np.concatenate(([True], np.diff(at) > _ADVANCE))]
     at[-1] = own.length
     return LineSamples(
+        along=at,
         places=own.place(at)[:, :2],
         heights=np.interp(at, along, points[:, 2]),
         widths=np.interp(at, along, widths),
         given=np.min(np.abs(at[:, None] - along[None, :]), axis=1) < _ADVANCE,
+    )
+
+
+def own_strand(samples: LineSamples, sidewalk: int) -> Strand:
+    """Returns a sidewalk as the axis of a road of its own, whatever its bends are.
+
+    Args:
+        samples: samples of the sidewalk, whose curve is the axis.
+        sidewalk: id of the sidewalk.
+    """
+    return Strand(
+        lane=None,
+        sidewalk=sidewalk,
+        forward=True,
+        begin=0.0,
+        end=float(samples.along[-1]),
+        stations=samples.along,
+        aside=np.zeros(len(samples.along)),
+        heights=samples.heights,
+        widths=samples.widths,
+        given=samples.given,
     )
 
 
