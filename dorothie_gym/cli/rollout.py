@@ -172,7 +172,7 @@ def rollout(
         except ValueError as error:
             fail(str(error))
         drives = read_references(references)
-        result = _play(settings, out, workers or available_processors(), ray, drives, quiet=as_json)
+        result = _play(settings, out, workers or available_processors(), ray, drives, seal, quiet=as_json)
     warn_of_usage(closed_loop.usage_warnings(result.usage()))
     if as_json:
         print_json(result.to_json())
@@ -196,6 +196,7 @@ def _play(
     workers: int,
     ray: str | None,
     drives: dict[str, ReferenceDrive],
+    seal: Path | None,
     *,
     quiet: bool,
 ) -> closed_loop.RolloutResult:
@@ -209,7 +210,7 @@ def _play(
                 settings, folder, workers=workers, ray=ray, on_session=on_session, drives=drives
             )
     except KeyboardInterrupt:
-        _exit_interrupted(folder, settings)
+        _exit_interrupted(folder, closed_loop.command_of(settings.to_json(), seal or ""), settings.sessions)
     except ProcessError as error:
         fail(f"{error}; the finished sessions are kept in {folder}", FAILED)
     if out is None:
@@ -217,10 +218,9 @@ def _play(
     return result
 
 
-def _exit_interrupted(folder: Path, settings: closed_loop.RolloutSettings) -> None:
+def _exit_interrupted(folder: Path, command: str, sessions: int) -> None:
     done = len(closed_loop.read_result(folder).rows) if (folder / closed_loop.RESULT_FILE).is_file() else 0
-    command = f"{closed_loop.command_of(settings.to_json())} --out {shlex.quote(str(folder))}"
     exit_interrupted(
-        f"Interrupted with {done} of {settings.sessions} sessions finished; their results are in "
-        f"{folder / closed_loop.RESULT_FILE}; resume with: {command}"
+        f"Interrupted with {done} of {sessions} sessions finished; their results are in "
+        f"{folder / closed_loop.RESULT_FILE}; resume with: {command} --out {shlex.quote(str(folder))}"
     )

@@ -381,7 +381,8 @@ def print_result(result: RolloutResult, console: Console) -> None:
         console.print(usage_table(usage, table.sessions))
     seeds = [str(row.seed) for row in result.rows]
     more = "" if len(seeds) <= MAX_PRINTED_SEEDS else f", ... ({len(seeds)} in all, see --json)"
-    console.print(f"Seeds (of --seed {settings['seed']}): {', '.join(seeds[:MAX_PRINTED_SEEDS])}{more}", soft_wrap=True)
+    source = "the beacon" if settings.get("beacon") else f"--seed {settings['seed']}"
+    console.print(f"Seeds (of {source}): {', '.join(seeds[:MAX_PRINTED_SEEDS])}{more}", soft_wrap=True)
     for row in result.rows:
         if row.error is not None:
             console.print(f"Session {row.number} ({row.town}, seed {row.seed}): {row.error}", markup=False)

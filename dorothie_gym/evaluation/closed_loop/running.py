@@ -206,10 +206,12 @@ class RolloutSettings:
         }
 
 
-def command_of(settings: Mapping[str, Any]) -> str:
-    """Returns the command that reproduces a rollout, from the output of `RolloutSettings.to_json`.
+def command_of(settings: Mapping[str, Any], seal: Path | str = "FILE") -> str:
+    """Returns the command that reproduces a rollout; settings of the engine without an option are left out.
 
-    Settings of the engine without a command-line option are left out.
+    Args:
+        settings: output of `RolloutSettings.to_json`.
+        seal: file of the seal, if the rollout has one.
     """
     config, usual = settings["config"], usual_settings(settings)["config"]
     words = ["dorothie-gym", "rollout"]
@@ -224,7 +226,7 @@ def command_of(settings: Mapping[str, Any]) -> str:
     beacon, sessions = settings.get("beacon"), ["--sessions", str(settings["sessions_planned"])]
     if beacon:
         words += ["--beacon", str(beacon["text"]), "--beacon-date", str(beacon["date"])]
-        words += [*(["--seal", "FILE"] if settings.get("seal") else []), *sessions]
+        words += [*(["--seal", str(seal)] if settings.get("seal") else []), *sessions]
     else:
         words += ["--towns", towns_text(settings["towns"]), *sessions, "--seed", str(settings["seed"])]
     for option, name in (("--max-seconds", "max_seconds"), ("--word-errors", "word_error_rate")):

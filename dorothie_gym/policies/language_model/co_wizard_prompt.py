@@ -29,6 +29,7 @@ from dorothie_gym.policies.language_model.role_interface import (
 )
 from dorothie_gym.policies.language_model.sight_words import object_lines, sight_lines
 from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
+from dorothie_gym.policies.town_tables import kept_with_town
 from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.session.spaces.observations import ExitColumn
 from dorothie_gym.sim.ego.limits import may_change_cruise
@@ -177,7 +178,7 @@ def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | No
     return nearest, town.lanes[nearest].length / 2
 
 
-@lru_cache(maxsize=256)
+@kept_with_town
 def _middles(town: Town, streets: frozenset[int]) -> tuple[tuple[int, tuple[float, float]], ...]:
     """Returns the lanes of streets outside junctions, each with its centre [m]."""
     lanes = (lane for lane in town.lanes if lane.street in streets and not lane.in_junction)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import re
+import shlex
 import shutil
 import sys
 from dataclasses import replace
@@ -19,6 +20,7 @@ from dorothie_gym.errors import RolloutError
 from dorothie_gym.evaluation.closed_loop import (
     Beacon,
     RolloutSettings,
+    command_of,
     leaderboard_page,
     read_entries,
     read_result,
@@ -77,6 +79,12 @@ def test_a_sealed_rollout_is_played_again_and_submitted(honest: Path) -> None:
     assert page["part"] == "sealed ask-first"
     assert page["settings"]["beacon"] == {"text": "pulse 1B7E", "date": "2026-12-01"}
     assert page["settings"]["seal"]["date"] == "2026-11-30"
+
+
+def test_the_command_names_the_beacon_and_the_file_of_the_seal(honest: Path) -> None:
+    words = shlex.split(command_of(read_result(honest).settings, "my seal.json"))
+    assert words[words.index("--seal") + 1] == "my seal.json"
+    assert "--beacon" in words and "--seed" not in words and "--towns" not in words
 
 
 def test_the_header_of_each_session_has_the_beacon(honest: Path, copy: Path) -> None:
