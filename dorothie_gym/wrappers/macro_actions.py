@@ -145,7 +145,9 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
     def __init__(
         self, env: gym.Env[Any, Any], seconds: float = 5.0, kinds: Collection[MacroKind | str] | None = None
     ) -> None:
-        RecordConstructorArgs.__init__(self, seconds=seconds, kinds=kinds)
+        kept = set(MacroKind) if kinds is None else _checked_kinds(kinds)
+        recorded = None if kinds is None else sorted(map(str, kept))  # a list, as specifications are written as JSON
+        RecordConstructorArgs.__init__(self, seconds=seconds, kinds=recorded)
         gym.Wrapper.__init__(self, env)
         self._inner: SingleRole = env.unwrapped  # type: ignore[assignment]  # checked next
         if getattr(env.unwrapped, "role", None) is not Role.CO_WIZARD:
@@ -156,7 +158,6 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         if not seconds > 0.0:
             raise ValueError(f"seconds is {seconds}; it must be above 0")
         self._seconds = seconds
-        kept = set(MacroKind) if kinds is None else _checked_kinds(kinds)
         self.actions = tuple(action for action in MACRO_ACTIONS if action.kind in kept)
         self.action_space: spaces.Space[Any] = spaces.Discrete(len(self.actions))
         self.observation_space: spaces.Space[Any] = spaces.Dict(

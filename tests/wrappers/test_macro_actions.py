@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import dorothie_gym
@@ -183,3 +184,10 @@ def test_the_place_that_was_mentioned_becomes_the_goal() -> None:
             assert not info["action_mask"][NUMBERS["goal_heard"]] or observation["heard_moves"].any()
             followed += 1
     assert followed >= 2
+
+
+def test_specification_with_kinds_is_json_and_makes_the_same_actions() -> None:
+    env = MacroActions(gym.make("dorothie_gym/CoWizard-v0", town="brookside"), kinds={"goal", "ask"})
+    assert env.spec is not None
+    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.get_wrapper_attr("actions") == env.actions
