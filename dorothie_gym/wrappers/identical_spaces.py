@@ -29,6 +29,9 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
     of an entry is the maximum over the roles. Values that a role does not have count as 0, and surplus entries are
     ignored. `info["action_mask"]` is flat, with one entry per value.
 
+    The infos of the last step say in `TimeLimit.truncated` whether the session was cut short. SuperSuit merges both kinds
+    of end, and stable-baselines3 reads this key to add the value of the last observation to the reward.
+
     Args:
         env: the environment.
         fields: action fields to keep, by role; the other fields do nothing. All fields except texts are kept for None
@@ -112,7 +115,11 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
         """
         taken = {agent: self.unflatten(agent, action) for agent, action in actions.items()}
         observations, rewards, terminations, truncations, infos = self.env.step(taken)
-        return self._flatten(observations), rewards, terminations, truncations, self._pad(infos)
+        padded = self._pad(infos)
+        for agent, info in padded.items():
+            if not self._only_masks and (terminations[agent] or truncations[agent]):
+                info["TimeLimit.truncated"] = not terminations[agent]
+        return self._flatten(observations), rewards, terminations, truncations, padded
 
     def unflatten(self, agent: str, action: Flat) -> ActionDict:
         """Returns the action of the role for a flat one; raises `ValueError` for a wrong shape."""

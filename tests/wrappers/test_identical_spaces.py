@@ -78,6 +78,18 @@ def test_masked_actions_of_all_roles_are_carried_out() -> None:
     assert all(truncations.values())
 
 
+@pytest.mark.parametrize("only_masks", [False, True])
+def test_infos_of_the_last_step_tell_a_time_limit_from_an_end(only_masks: bool) -> None:
+    env = IdenticalSpaces(make(2), FEW, only_masks=only_masks)
+    env.reset(seed=0)
+    nothing = {agent: np.zeros(len(env.nvec), dtype=np.int64) for agent in env.agents}
+    *_, infos = env.step(nothing)
+    assert not any("TimeLimit.truncated" in info for info in infos.values())
+    *_, truncations, infos = env.step(nothing)
+    assert all(truncations.values())
+    assert [info.get("TimeLimit.truncated") for info in infos.values()] == [None if only_masks else True] * 3
+
+
 def test_invalid_arguments_raise_error() -> None:
     with pytest.raises(ValueError, match="fields: 'driver'"):
         IdenticalSpaces(make(), {"driver": ["move"]})
