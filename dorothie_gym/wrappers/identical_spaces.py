@@ -29,8 +29,8 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
     of an entry is the maximum over the roles. Values that a role does not have count as 0, and surplus entries are
     ignored. `info["action_mask"]` is flat, with one entry per value.
 
-    The infos of the last step say in `TimeLimit.truncated` whether the session was cut short. SuperSuit merges both kinds
-    of end, and stable-baselines3 reads this key to add the value of the last observation to the reward.
+    The infos of the last step say in `TimeLimit.truncated` whether the session was cut short. SuperSuit merges both
+    kinds of end, and stable-baselines3 reads this key to add the value of the last observation to the reward.
 
     Args:
         env: the environment.
