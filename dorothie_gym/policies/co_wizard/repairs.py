@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.goals import believed_destination, doubt
+from dorothie_gym.policies.co_wizard.destinations import believed_destination, doubt
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend, repeated
 

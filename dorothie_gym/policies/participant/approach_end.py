@@ -14,7 +14,7 @@ from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.maps.whereabouts import is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
-from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby
+from dorothie_gym.policies.participant.target_hints import corner_fact, famous_nearby
 from dorothie_gym.policies.place_looks import distinguishing_look
 from dorothie_gym.policies.speech import Remark, intend
 

@@ -21,7 +21,7 @@ from dorothie_gym.policies.speech import Remark, repeated
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
-    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _OPEN_QUESTIONS: Final[Mapping[SlotValue, tuple[Predicate, ...]]] = MappingProxyType(
