@@ -454,7 +454,7 @@ def _confirm(state: CoWizardState, steps: Sequence[PlanStep], *, joined: bool = 
 
 
 def corrected_step(state: CoWizardState, heard: HeardUtterance) -> PlanStep | None:
-    """Returns the present step as an utterance corrects it; None of an utterance that corrects nothing.
+    """Returns the present step with the correction of an utterance; None if the utterance corrects nothing.
 
     A turn with another direction corrects the present turn if the words repair something: "not left, right".
     """
