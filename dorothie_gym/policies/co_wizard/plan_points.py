@@ -46,7 +46,7 @@ _OFFSETS: Final[Mapping[ConditionRelation, float]] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class Objection:
-    """What the map holds against a step.
+    """Reason why the map contradicts a step.
 
     Attributes:
         reason: statement of it.

@@ -28,7 +28,7 @@ _BESIDE = 40.0
 
 
 class _Mark(NamedTuple):
-    """What stands beside the place: the fact, the topic of its words, and the arguments that are not spoken."""
+    """Mark beside the place: the fact, the topic of its words, and the arguments that are not spoken."""
 
     fact: Proposition
     topic: str
