@@ -191,7 +191,7 @@ def hear_wrong_way(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def check_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Checks a destination against whose route instructions were given; if they continue, gives up its place.
+    """Checks the destination after instructions that lead away from its route; gives up its place if more follow.
 
     The name may be right and the place wrong: there are several houses.
     """

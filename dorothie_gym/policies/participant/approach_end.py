@@ -66,7 +66,7 @@ def side_fact(state: ParticipantState, goal: SeenLandmark) -> tuple[Remark, ...]
 def ending_behind(
     state: ParticipantState, view: ParticipantView, last: StepKey, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
-    """Returns the remark on the end of the way behind a turn, if that is the last one of the route."""
+    """Returns the remark on the end of the way behind a turn, if that turn is the last one of the route."""
     progress = state.route.progress
     turns = [] if progress is None else list(progress.crossings(state.town, view.station))
     if not turns or (turns[-1].lane, turns[-1].exit.connector) != last[1:]:
