@@ -15,9 +15,9 @@ from gymnasium.vector import AutoresetMode
 from benchmarks.highway_reference import StockIntersection
 from benchmarks.metadrive_reference import MetaDriveReference, metadrive_reference
 from benchmarks.timing import Figures, Progress, ignore_progress, rounded, wall_seconds
-from dorothie_gym.envs.navigation.arrays import row_of
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DrivingCameras
+from dorothie_gym.envs.navigation.decision_state import row_of
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.sim.batch.worlds import VectorWorld

@@ -28,7 +28,7 @@ _QUIET: Final[Mapping[str, str]] = MappingProxyType({"ad_wizard": "silent"})
 
 
 class Split(enum.StrEnum):
-    """What tasks are for."""
+    """Purpose of tasks: training or tests."""
 
     TRAIN = "train"
     TEST = "test"

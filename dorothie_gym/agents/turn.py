@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 
 @dataclass(frozen=True, kw_only=True)
 class Turn:
-    """What an agent is shown at one turn.
+    """Turn of an agent: the page, the choices, and the reward since the last turn.
 
     Attributes:
         page: observation of the role in words, or its changes, or after a fault what was wrong.

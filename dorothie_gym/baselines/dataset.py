@@ -104,7 +104,7 @@ class Dataset:
     def seeing(
         self, objects: Objects, on_session: Callable[[], object] | None = None, detector: Path | None = None
     ) -> Dataset:
-        """Returns the dataset with the objects of a source; of this one if that is the record.
+        """Returns the dataset with the objects of another source; this dataset itself if that is the record.
 
         Args:
             objects: the source.

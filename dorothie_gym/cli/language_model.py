@@ -19,7 +19,7 @@ _PANEL = "Language models (llm:MODEL)"
 
 
 class AnswerTime(enum.StrEnum):
-    """What happens to the session while the model answers: `SimulatedTime`, whose import takes long."""
+    """Progress of the session while the model answers: `SimulatedTime`, whose import takes long."""
 
     WAITS = "waits"
     CHARGED = "charged"

@@ -14,7 +14,7 @@ from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress
 from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.roles.learned_role.rounds import FinishedFit
+    from dorothie_gym.baselines.roles.learned_role.dagger import FinishedFit
 
 OnStage = Callable[[str, int, int], None]
 
@@ -60,7 +60,7 @@ class RoleReport:
 def _train_co_wizard(request: Request) -> RoleReport:
     from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining
     from dorothie_gym.baselines.roles.co_wizard.training import train_co_wizard
-    from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS
+    from dorothie_gym.baselines.roles.learned_role.dagger import LESSONS
 
     folder = request.folder("co-wizard")
     settings = CoWizardTraining(corpus=request.corpus, seed=request.seed)
@@ -71,7 +71,7 @@ def _train_co_wizard(request: Request) -> RoleReport:
 
 
 def _train_participant(request: Request) -> RoleReport:
-    from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS, RoundSettings
+    from dorothie_gym.baselines.roles.learned_role.dagger import LESSONS, RoundSettings
     from dorothie_gym.baselines.roles.participant.training import train_participant
 
     folder = request.folder("participant")

@@ -174,5 +174,5 @@ class DirectionReader(TokenReader):
 
 
 def begins_direction(word: str, grammar: RouteGrammar) -> bool:
-    """Returns whether a word that counts nothing may begin what `DirectionReader.read_direction` reads."""
+    """Returns whether a word other than a number may begin a direction, see `DirectionReader.read_direction`."""
     return word in SIDES or word in _SIDE_WORDS or word in _DEGREES or word in grammar.determiners

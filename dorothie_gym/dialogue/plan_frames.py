@@ -104,7 +104,7 @@ class Frame:
 
     @property
     def starts(self) -> bool:
-        """Whether a verb of moving off stands alone, or with what it waits for: "go until the lights let you"."""
+        """Whether a verb of moving off stands alone, or only with its condition: "go until the lights let you"."""
         waits = self.relation is ConditionRelation.UNTIL or (self.ends and self.at is None)
         return self.action is None and self.verb in _STARTING and self.place is None and waits
 

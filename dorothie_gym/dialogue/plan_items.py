@@ -78,7 +78,7 @@ class DistanceItem(NamedTuple):
 
 
 class SpeedItem(NamedTuple):
-    """Speed [km/h]; `unit` says whether its unit was named."""
+    """Speed [km/h]; `unit` is true if the unit was named."""
 
     speed: int
     unit: bool

@@ -1,8 +1,8 @@
 """`DuoWizard-v0`: a participant, a Co-Wizard and an Ad-Wizard in a town (paper, section 3).
 
-The environment is PettingZoo's face of a session: it hands the actions of the three agents to a `SessionEngine` and
-returns what the roles observe. Users make it (`parallel_env(town="brookside")`); rollouts and the console play the
-engine itself. The docstring of the class states the contract of a session.
+The environment is PettingZoo's interface to a session: it hands the actions of the three agents to a `SessionEngine`
+and returns what the roles observe. Users make it (`parallel_env(town="brookside")`); rollouts and the console play
+the engine itself. The docstring of the class states the contract of a session.
 
 First of the five files that explain the package (docs/architecture.md). Next: `session/session_engine.py`.
 """

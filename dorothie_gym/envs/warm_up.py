@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.envs.navigation.steps import act_share, guide_share
+from dorothie_gym.envs.navigation.compiled_decision import act_share, guide_share
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.session.warm_up import TOWN, Progress, reporting
 from dorothie_gym.support.compilation.dispatcher import CompiledFunction

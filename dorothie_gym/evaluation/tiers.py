@@ -18,7 +18,7 @@ from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.briefs import TalkFamily
 
 HELD_OUT_PERSONAS: Final = ("scripted:talkativeness=0.8..1", "scripted:certainty=0..0.2")
-"""Participants with traits that no learned role has met in training (`learned_role.practice.TRAINED`)."""
+"""Participants with traits that no learned role has met in training (`learned_role.dagger_sessions.TRAINED`)."""
 
 POOL_SEPARATOR: Final = "+"
 """Separator of the names of players who take turns."""

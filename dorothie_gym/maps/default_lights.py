@@ -40,7 +40,7 @@ _KEY: Final = "lights"
 
 
 class Lights(enum.StrEnum):
-    """Where the traffic lights of an imported map come from."""
+    """Source of the traffic lights of an imported map."""
 
     MAP = "map"
     """The map file: a map without signals has no lights."""

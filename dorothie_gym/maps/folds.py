@@ -32,7 +32,7 @@ DEFAULT_TOWN = "millbrook"
 
 
 class TownFold(enum.StrEnum):
-    """What a town is for."""
+    """Purpose of a town: training, choice of models, or tests."""
 
     SEEN = "seen"
     DEVELOPMENT = "development"

@@ -15,7 +15,7 @@ _log = logging.getLogger(__name__)
 
 
 class NoteAction(enum.StrEnum):
-    """What the import did with an element."""
+    """Treatment of an element by the import."""
 
     DROPPED = "dropped"
     REPAIRED = "repaired"

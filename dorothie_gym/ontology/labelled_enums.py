@@ -59,7 +59,7 @@ def check_complete(found: Collection[Key], members: Iterable[Key], table: str, m
     if missing:
         raise OntologyError(
             f"{table} of {module.replace('.', '/')}.py has no entry for {', '.join(missing)}; every member needs one "
-            "(CONTRIBUTING.md, What a change costs)"
+            "(docs/changes.md lists the files)"
         )
 
 

@@ -97,7 +97,7 @@ def named_landmarks(act: DialogueAct) -> tuple[LandmarkName, ...]:
 
 
 def arguments_of(content: Proposition, *kept: str) -> tuple[str, ...]:
-    """Returns the names of the arguments of a content, except some: those that a short answer omits."""
+    """Returns the names of a content's arguments except `kept`: those that a short answer omits."""
     return tuple(name for name, _ in content.arguments if name not in kept)
 
 

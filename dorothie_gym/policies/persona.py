@@ -40,7 +40,7 @@ class Driving(enum.StrEnum):
     """Slowly, and slower before turns and places."""
     USUAL = "usual"
     BRISK = "brisk"
-    """As fast as is usual, without slowing down early."""
+    """At the usual speed, without slowing down early."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,7 +46,7 @@ def look_of(town: Town, mark: SeenLandmark) -> Appearance | None:
 
 
 def distinguishing_look(town: Town, mark: SeenLandmark, marks: Iterable[SeenLandmark]) -> Appearance | None:
-    """Returns the attributes by which a house or person is told from the others of its kind on the map."""
+    """Returns the attributes that distinguish a house or person from the others of its kind on the map."""
     look = look_of(town, mark)
     if look is None:
         return None

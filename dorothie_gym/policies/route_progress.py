@@ -265,7 +265,7 @@ class RouteProgress:
         return self._at(station).left()
 
     def _at(self, station: float) -> _WayAhead:
-        """Returns what the route has ahead of a station, which is looked for once, whoever asks for it."""
+        """Returns the contents of the route ahead of a station; they are computed once for all callers."""
         found: _WayAhead | None = self.__dict__.get(_AHEAD)
         if found is None or not found.is_of(self, station):
             found = self.__dict__[_AHEAD] = _WayAhead(self.route, self.leg, station)
@@ -371,7 +371,7 @@ _AHEAD: Final = "_ahead"
 
 
 class _WayAhead:
-    """What a route has ahead of a station, found when it is first asked for.
+    """Contents of a route ahead of a station, computed at the first request.
 
     Args:
         route: the route; None if there is none.

@@ -58,8 +58,8 @@ def reach_at(distance: float, speed: float, town: Town) -> float:
 NUDGE_DISTANCE = 3.0
 """Distance meant by "a bit further" [m], of which a car stops half a metre short.
 
-Two of them lead to a goal from `participant.arriving.FURTHER` before it. One does not lead past the stretch around the
-goal that counts as arrived.
+Two of them lead to a goal from `participant.final_approach.FURTHER` before it. One does not lead past the stretch
+around the goal that counts as arrived.
 """
 
 

@@ -98,7 +98,7 @@ class TalkDriver(TypedPolicy[DriverState]):
 
 @dataclass(frozen=True, kw_only=True)
 class _View:
-    """What a driver knows: the landmarks on its map, and whether something stands on the road ahead."""
+    """Knowledge of a driver: the landmarks on its map, and whether something stands on the road ahead."""
 
     marks: tuple[SeenLandmark, ...]
     closed: bool

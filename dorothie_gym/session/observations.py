@@ -215,7 +215,7 @@ class ObservationBuilder(CachedViews):
         return {_NAMES[role]: arrays.observation(role, row) for role in roles}
 
     def view(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
-        """As `build`, as views that are valid until the next decision, see `RowView`."""
+        """Returns the result of `build` as views that are valid until the next decision, see `RowView`."""
         self._views.observe(roles)
         self.write(delivered)
         return {_NAMES[role]: self._views.view(role) for role in roles}
@@ -414,7 +414,7 @@ class SessionObserver:
         return observations
 
     def views(self, roles: Sequence[Role], decision: int) -> dict[str, Observation]:
-        """As `observations`, as views that are valid until the next decision, see `RowView`."""
+        """Returns `observations` as views that are valid until the next decision, see `RowView`."""
         if self.camera_perception is not None or self.sensors is not None:
             return self.observations(roles, decision)
         return self._builder.view(self.delivered, roles)

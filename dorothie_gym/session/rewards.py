@@ -112,9 +112,10 @@ class RewardWeights:
 def _disagreement(computes: str, terms: Iterable[str], names: Iterable[str]) -> NotImplementedError:
     """Returns the error for terms that are not those that have a weight and a name."""
     found, wanted = set(terms), set(names)
-    lacks, extra = ", ".join(sorted(wanted - found)) or "none", ", ".join(sorted(found - wanted)) or "none"
+    faults = [f"lacks {', '.join(sorted(wanted - found))}"] if wanted - found else []
+    faults += [f"has {', '.join(sorted(found - wanted))} without a weight"] if found - wanted else []
     path = f"{__name__.replace('.', '/')}.py"
-    return NotImplementedError(f"{computes} of {path} and the weights disagree: it lacks {lacks}, and has {extra} more")
+    return NotImplementedError(f"{computes} of {path} does not agree with the weights: it {' and '.join(faults)}")
 
 
 _NAMES = {role: frozenset(term_names(role)) for role, _ in _SIGNS}

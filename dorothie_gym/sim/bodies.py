@@ -50,8 +50,11 @@ if TYPE_CHECKING:
 VEHICLE, PEDESTRIAN, PROP = (record_dtype(kind) for kind in (VehicleRecord, PedestrianRecord, PropRecord))
 
 _KIND_OF_SIZE = {(kind.length, kind.width): kind for kind in PropKind}
-if len(_KIND_OF_SIZE) != len(PropKind):
-    raise ImportError("two kinds of props have the same size, which distinguish their views")
+if _alike := [kind for kind in PropKind if _KIND_OF_SIZE[kind.length, kind.width] is not kind]:
+    raise ImportError(
+        f"PropKind of dorothie_gym/ontology/world_exceptions.py: {_alike[0].name} has the length and width of "
+        f"{_KIND_OF_SIZE[_alike[0].length, _alike[0].width].name}; every prop needs its own, by which it is recognised"
+    )
 
 
 class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):

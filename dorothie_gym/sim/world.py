@@ -50,7 +50,7 @@ _step_share = fixed(step_share)
 
 
 def parts_of(frames: int) -> list[int]:
-    """Returns the frames of the parts in which a step is played: the log of the ego has room for `MAX_SUBSTEPS`."""
+    """Divides the frames of a step into parts of at most `MAX_SUBSTEPS`, for which the log of the ego has room."""
     return [min(MAX_SUBSTEPS, frames - first) for first in range(0, max(frames, 1), MAX_SUBSTEPS)]
 
 

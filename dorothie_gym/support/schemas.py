@@ -27,6 +27,6 @@ def decoder(kind: type[_T]) -> msgspec.json.Decoder[_T]:
 
 
 def convert(value: object, kind: type[_T]) -> _T:
-    """Returns a value of JSON as a type; raises `msgspec.ValidationError` if it does not fit."""
+    """Converts a JSON value to a type; raises `msgspec.ValidationError` if it does not fit."""
     decoder(kind)
     return msgspec.convert(value, kind)

@@ -14,7 +14,13 @@ EDITS = (
     Edit(
         "dorothie_gym/ontology/world_exceptions.py",
         '    TRAFFIC_SIGN = "trafficsign", 0.10, 0.76, 2.89\n',
-        '    TRAFFIC_SIGN = "trafficsign", 0.10, 0.76, 2.89\n    BENCH = "bench", 0.55, 1.80, 0.85\n',
+        '    TRAFFIC_SIGN = "trafficsign", 0.10, 0.76, 2.89\n    BENCH = "bench", 0.40, 0.40, 0.85\n',
+    ),
+    Edit(
+        "dorothie_gym/ontology/world_exceptions.py",
+        '"bench", 0.40, 0.40, 0.85\n',
+        '"bench", 0.55, 1.80, 0.85\n',
+        r"PropKind of dorothie_gym/ontology/world_exceptions\.py: CONSTRUCTION_CONE has .* of BENCH;",
     ),
     Edit(
         "dorothie_gym/dialogue/data/talk/36_surroundings.talk",

@@ -6,7 +6,7 @@ import gymnasium as gym
 import pytest
 
 import dorothie_gym  # registers the environments
-from dorothie_gym.baselines.roles.learned_role.practice import TRAINED
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import TRAINED
 from dorothie_gym.evaluation.tiers import HELD_OUT_PERSONAS, ROUGH, STANDARD, STRANGERS, TIERS, Tier, find_tier
 from dorothie_gym.maps.folds import SEEN_TOWNS, UNSEEN_TOWNS, TownFold, fold_of
 from dorothie_gym.ontology import Role

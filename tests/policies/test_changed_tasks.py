@@ -5,7 +5,7 @@ import pytest
 
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.ontology import DialogueMove, GoalStatus
-from dorothie_gym.policies.participant.goals import announcement, choose_target, note_tasks, route_length
+from dorothie_gym.policies.participant.subgoals import announcement, choose_target, note_tasks, route_length
 from dorothie_gym.policies.participant.view import ParticipantView
 from tests.policies.test_repairs import Human
 

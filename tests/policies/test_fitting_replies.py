@@ -11,12 +11,12 @@ from dorothie_gym.dialogue import Predicate, Proposition, understand, word_act
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Role
 from dorothie_gym.policies.co_wizard.answers import answer_yes_no
-from dorothie_gym.policies.co_wizard.goals import postpone
-from dorothie_gym.policies.co_wizard.initiative import take_initiative
+from dorothie_gym.policies.co_wizard.destinations import postpone
 from dorothie_gym.policies.co_wizard.proposition_truth import believes
-from dorothie_gym.policies.participant.hints import hint, is_in_mind
+from dorothie_gym.policies.co_wizard.unprompted_remarks import take_initiative
+from dorothie_gym.policies.participant.dialogue_update import listen
 from dorothie_gym.policies.participant.messages import message_remark
-from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.target_hints import hint, is_in_mind
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.sim.state.codes import Motion
 from tests.policies.said import with_words

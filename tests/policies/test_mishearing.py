@@ -18,7 +18,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, note_contradiction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.dialogue_update import listen
 from dorothie_gym.policies.speech import IN_A_ROW, remark
 from dorothie_gym.session.spaces import Speech
 from tests.policies.said import with_words

@@ -12,12 +12,12 @@ from dorothie_gym.dialogue.looks import read_look
 from dorothie_gym.dialogue.realization_context import WordingContext
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, ObjectClass, Role
+from dorothie_gym.policies.co_wizard.answer_merging import in_one_breath, still_due
 from dorothie_gym.policies.co_wizard.beliefs import BeliefState
-from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, still_due
 from dorothie_gym.policies.co_wizard.places_ahead import JUST_AHEAD, distance_ahead
 from dorothie_gym.policies.co_wizard.small_remarks import passes_over
 from dorothie_gym.policies.participant.messages import _HERE, _POINTS
-from dorothie_gym.policies.participant.reactions import _passenger
+from dorothie_gym.policies.participant.unprompted_remarks import _passenger
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.tasks.purposes import Purpose
 

@@ -8,8 +8,8 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, Role
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.participant.config import ParticipantStyle
+from dorothie_gym.policies.participant.dialogue_update import listen
 from dorothie_gym.policies.participant.repairs import correction, has_missed
-from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import remark
 from tests.policies.said import heard, with_words

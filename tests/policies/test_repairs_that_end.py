@@ -12,8 +12,8 @@ from dorothie_gym.dialogue import Direction, Wording, WordingContext, guess_span
 from dorothie_gym.dialogue.conversation import resembles_request_to_repeat
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
-from dorothie_gym.policies.participant.reconsidering import own_up
-from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.contradictory_orders import own_up
+from dorothie_gym.policies.participant.dialogue_update import listen
 from dorothie_gym.policies.participant.state import NUDGED, GuidanceState
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.route_state import WORN_OUT, RouteState, section

@@ -10,21 +10,21 @@ import pytest
 from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Role, StreetName
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, sign_of_hearing
+from dorothie_gym.policies.co_wizard.answer_merging import in_one_breath, still_due
+from dorothie_gym.policies.co_wizard.destinations import set_goal
 from dorothie_gym.policies.co_wizard.errand_memory import note_friend, without_purposes
-from dorothie_gym.policies.co_wizard.goals import set_goal
-from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, still_due
 from dorothie_gym.policies.heard_utterance import heard_utterance
 from dorothie_gym.policies.notable_conditions import Noticed
-from dorothie_gym.policies.participant.given_orders import note_said, rounds_told, turned_round_lately
-from dorothie_gym.policies.participant.orders import order
-from dorothie_gym.policies.participant.reconsidering import own_up
-from dorothie_gym.policies.participant.replies import listen
-from dorothie_gym.policies.participant.retrying import remark_on_miss, stop_circling
-from dorothie_gym.policies.participant.telling_way import take_up_confirmation
+from dorothie_gym.policies.participant.advance_directions import take_up_confirmation
+from dorothie_gym.policies.participant.contradictory_orders import own_up
+from dorothie_gym.policies.participant.dialogue_update import listen
+from dorothie_gym.policies.participant.failed_guidance import remark_on_miss, stop_circling
+from dorothie_gym.policies.participant.order_history import note_said, rounds_told, turned_round_lately
+from dorothie_gym.policies.participant.order_wording import order
 from dorothie_gym.policies.speech import Remark, intend
+from tests.policies.participant.test_final_approach import Guide
 from tests.policies.said import with_words
 from tests.policies.test_acknowledgement import start
-from tests.policies.test_arriving import Guide
 
 M, A, F = DialogueMove, ActionValue, CommunicativeFunction
 LEFT, RIGHT = Direction.LEFT, Direction.RIGHT

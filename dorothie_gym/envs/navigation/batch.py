@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.ad_wizard_trigger import AdWizardTrigger, permits_changes
-from dorothie_gym.envs.navigation.arrays import EVENTS, Event, Stage, row_of
+from dorothie_gym.envs.navigation.batch_arrays import DrivingFace, DrivingRows, RowHolder
 from dorothie_gym.envs.navigation.cameras import DriverObservation, DrivingCameras
-from dorothie_gym.envs.navigation.rows import DrivingFace, DrivingRows, RowHolder
+from dorothie_gym.envs.navigation.compiled_decision import act_share, guide_share
+from dorothie_gym.envs.navigation.decision_state import EVENTS, Event, Stage, row_of
 from dorothie_gym.envs.navigation.start import write_scenario
-from dorothie_gym.envs.navigation.steps import act_share, guide_share
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName

@@ -25,8 +25,8 @@ from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation.records import plain
 
 if TYPE_CHECKING:
+    from dorothie_gym.envs.navigation.batch_arrays import DrivingFace, DrivingRows
     from dorothie_gym.envs.navigation.config import NavigationConfig
-    from dorothie_gym.envs.navigation.rows import DrivingFace, DrivingRows
     from dorothie_gym.sim.batch.threads import ThreadPool
 
 DriverObservation: TypeAlias = "NDArray[np.float32] | NDArray[np.uint8]"

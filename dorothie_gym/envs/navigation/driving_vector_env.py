@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.navigation.batch import DrivingBatch
+from dorothie_gym.envs.navigation.batch_arrays import INFRACTIONS, REFUSED
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.episode import Ending
 from dorothie_gym.envs.navigation.render import DrivingView
-from dorothie_gym.envs.navigation.rows import INFRACTIONS, REFUSED
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import Role

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.batch import DrivingBatch
+from dorothie_gym.envs.navigation.batch_arrays import INFRACTIONS
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.episode import Ending
 from dorothie_gym.envs.navigation.render import DrivingView
-from dorothie_gym.envs.navigation.rows import INFRACTIONS
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps.catalogue import town_at
 from dorothie_gym.maps.generated.specification import parse_series

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.ad_wizard_trigger import PlansRecord
-from dorothie_gym.envs.navigation.arrays import DriveArrays, DriveRecord, Stage, row_of
 from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELDS
+from dorothie_gym.envs.navigation.decision_state import DriveArrays, DriveRecord, Stage, row_of
 from dorothie_gym.envs.navigation.episode import EpisodeArrays, episode_arrays
 from dorothie_gym.policies.ad_wizard import AdWizardConfig
 from dorothie_gym.policies.navigation.actions import ACTIONS

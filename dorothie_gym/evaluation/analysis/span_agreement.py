@@ -191,7 +191,7 @@ def alpha_of(annotators: Sequence[Sequence[LabelledUtterance | None]]) -> Alpha:
 
 
 def nominal_alpha(units: Sequence[Sequence[str | None]]) -> float | None:
-    """Returns Krippendorff's alpha of labels (units, annotators), None for missing ones; None if it is undefined."""
+    """Returns Krippendorff's alpha of labels (units, annotators), where None is missing; None if it is undefined."""
     import krippendorff
 
     labels = sorted({label for unit in units for label in unit if label is not None})

@@ -1,7 +1,7 @@
 """Seal of a model: hashes of policy and code, the settings of a run, and the date, written before a beacon is known.
 
 A seal shows that a model was finished before its test scenarios could be known: the scenarios follow from a `Beacon` of
-a later date. The date is that of the computer that seals; whoever must not rely on it publishes the hash of the seal.
+a later date. The date is that of the computer that seals; to prove it, publish the hash of the seal.
 """
 
 from __future__ import annotations

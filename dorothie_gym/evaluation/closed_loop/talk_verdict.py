@@ -90,7 +90,7 @@ class TalkVerdict:
 
 
 class _Deed(NamedTuple):
-    """What happens at a time [s]: words of a speaker, a goal, a mark, or a turn of the car."""
+    """Occurrence at a time [s]: words of a speaker, a goal, a mark, or a turn of the car."""
 
     time: float
     what: str

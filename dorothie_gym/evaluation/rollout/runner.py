@@ -149,7 +149,7 @@ class SessionMaker:
         )
 
     def _policy(self, player: Player, role: Role, limits: SpaceLimits) -> AnyPolicy:
-        """Returns the policy of a role: a `BatchPolicy` is made once for all sessions, others anew for each."""
+        """Returns the policy of a role: a `BatchPolicy` is made once for all sessions, another policy once for each."""
         key = player.name, role, limits
         if key in self._shared:
             return self._shared[key]

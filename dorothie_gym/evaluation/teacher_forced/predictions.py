@@ -48,7 +48,7 @@ class ActPredictions:
         return len(self.moves)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> ActPredictions:
-        """Returns those in the given rows: their numbers, or a mask (n,)."""
+        """Returns the predictions of the given rows, which are numbers or a mask (n,)."""
         return ActPredictions(moves=self.moves[rows], slots=self.slots[rows])
 
 
@@ -77,7 +77,7 @@ class ActionPredictions:
         return len(self.actions)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> ActionPredictions:
-        """Returns those in the given rows: their numbers, or a mask (n,)."""
+        """Returns the predictions of the given rows, which are numbers or a mask (n,)."""
         return ActionPredictions(actions=self.actions[rows], angles=self.angles[rows])
 
 

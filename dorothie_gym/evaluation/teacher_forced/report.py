@@ -90,7 +90,7 @@ def write_report(table: ResultsTable, folder: Path | str, *, pictures: bool = Tr
 
 
 def file_name(model: str) -> str:
-    """Returns a model's name as a part of a file's name: "toto-action-history" is "TOTO (- Action History)"."""
+    """Returns a model's name as a part of a file name: "toto-action-history" for "TOTO (- Action History)"."""
     signs = model.replace("(+", "with ").replace("(-", "without ")
     return re.sub(r"[^a-z0-9]+", "-", signs.casefold()).strip("-") or "model"
 

@@ -202,7 +202,7 @@ class Progress:
                 self.records.set_outcome(name, Outcome.LEFT)
 
     def dissolve(self, place: OpenRoom) -> None:
-        """Returns the people of a session that did not begin, because some did not come, to the waiting room."""
+        """Sends the people of a session that did not begin, because some did not come, back to the waiting room."""
         row = place.session
         assert row is not None
         logger.info("session %s did not begin: not everybody came", row.id)

@@ -45,7 +45,7 @@ class TownStyle(enum.StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class TownSpecification:
-    """What determines a generated town.
+    """Specification of a generated town: all that determines it.
 
     Attributes:
         seed: seed, from 0 to `MOST_SEED` - 1.

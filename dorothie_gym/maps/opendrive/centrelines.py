@@ -185,7 +185,7 @@ def _fault(dense: Array) -> str:
 
 
 def _cut(records: OpenDriveRecords, topology: Topology, lane: int, dense: Array) -> Array:
-    """Returns a centre line (n, 4) without loops, with a note; one that turns back for good stays as it is."""
+    """Returns a centre line (n, 4) without loops, with a note; one that never turns forward again stays as it is."""
     line = without_loops(dense)
     if line is None or line is dense:
         return dense

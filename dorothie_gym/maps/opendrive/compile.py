@@ -96,7 +96,7 @@ def _without(
     links: tuple[LaneLink, ...],
     records: OpenDriveRecords,
 ) -> tuple[Topology, tuple[Lane, ...], tuple[LaneLink, ...]]:
-    """Drops lanes that lead nowhere, with notes; the others are numbered anew."""
+    """Drops lanes that lead nowhere, with notes; the others are renumbered."""
     for lane in (lanes[k] for k in sorted(trapped)):
         if not lane.in_junction:
             where = f"road {records.roads[lane.road_id].name} / lane {lane.lane_id}"

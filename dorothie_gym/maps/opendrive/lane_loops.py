@@ -37,7 +37,7 @@ def without_loops(line: Array) -> Array | None:
     parts before and after the loop meet, which are joined by a bend.
 
     Returns:
-        The line, the same object if it has no loop; None if it turns back for good.
+        The line, the same object if it has no loop; None if it never turns forward again.
     """
     before = len(line)
     while True:

@@ -127,7 +127,7 @@ class CameraFrame:
 
 @dataclass(frozen=True)
 class EarlierView:
-    """What optical flow is measured from.
+    """Reference of optical flow.
 
     Attributes:
         pose: pose of the camera in the earlier picture.

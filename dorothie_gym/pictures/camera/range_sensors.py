@@ -37,7 +37,7 @@ _scan_scene, _read_scan = fixed(scan_scene), fixed(read_scan)
 
 
 class CarState(NamedTuple):
-    """What a sensor needs of the car.
+    """State of the car that a sensor needs.
 
     Attributes:
         x: x coordinate of its centre [m].

@@ -63,7 +63,7 @@ def sky_noise() -> NDArray[np.float32]:
 def add_sky(
     optics: Optics, light: Daylight, noise: NDArray[np.float32], samples: Samples, first: int, count: int
 ) -> None:
-    """Writes colours of samples from `first` on that see the sky."""
+    """Writes the colours of those samples, from number `first` on, that see the sky."""
     values = samples.values[first:]
     _place_sky(optics, light, values, count)
     _add_clouds(light, noise, values, count)

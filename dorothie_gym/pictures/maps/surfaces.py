@@ -104,7 +104,7 @@ def tunnel_floors(
 
 
 def tunnel_pavements(town: Town, covered: LevelLookup) -> Iterator[Shape]:
-    """Yields the pavements in tunnels, up to the walls; a lookup holds the lanes there."""
+    """Yields the pavements in tunnels, up to the walls; `covered` finds the lanes in tunnels."""
     for walk in town.sidewalks:
         middle = cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]
         for run in _runs(covered.beside(middle, _LEVEL_REACH)):

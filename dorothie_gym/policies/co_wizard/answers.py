@@ -15,10 +15,10 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
-from dorothie_gym.policies.co_wizard.asking_back import ask_back
+from dorothie_gym.policies.co_wizard.clarification_requests import ask_back
+from dorothie_gym.policies.co_wizard.destinations import set_goal
 from dorothie_gym.policies.co_wizard.drive_answers import drive_answer
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.goals import set_goal
 from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.proposition_truth import (
     believes,

@@ -15,7 +15,7 @@ from dorothie_gym.dialogue.routes import DrivingPlan, PlanStep, StepAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
-from dorothie_gym.policies.co_wizard.goals import aim
+from dorothie_gym.policies.co_wizard.destinations import aim
 from dorothie_gym.policies.observation_parser import IN_VIEW, SeenLandmark, landmarks_in_view, scalar
 from dorothie_gym.policies.place_looks import look_of
 from dorothie_gym.policies.policy import replace

@@ -16,6 +16,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import STEERING_AWAY, acknowledge, sign_of_hearing, what_keeps
+from dorothie_gym.policies.co_wizard.answer_merging import in_one_breath, is_plain_sign, still_due
 from dorothie_gym.policies.co_wizard.answers import (
     answer_check,
     answer_open,
@@ -23,10 +24,9 @@ from dorothie_gym.policies.co_wizard.answers import (
     asks_to_act,
     switch_lights_on,
 )
-from dorothie_gym.policies.co_wizard.asking_back import ask_back, explain_differently
+from dorothie_gym.policies.co_wizard.clarification_requests import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.described_looks import looks_heard, take_up_look, without_looks
-from dorothie_gym.policies.co_wizard.errand_memory import note_friend, note_owner, remember, without_purposes
-from dorothie_gym.policies.co_wizard.goals import (
+from dorothie_gym.policies.co_wizard.destinations import (
     abandon,
     accept_offer,
     accept_street,
@@ -39,12 +39,12 @@ from dorothie_gym.policies.co_wizard.goals import (
     postpone,
     set_goal,
 )
+from dorothie_gym.policies.co_wizard.errand_memory import note_friend, note_owner, remember, without_purposes
 from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn, limit_remark
 from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
-from dorothie_gym.policies.co_wizard.one_breath import in_one_breath, is_plain_sign, still_due
 from dorothie_gym.policies.co_wizard.places_ahead import distance_ahead
-from dorothie_gym.policies.co_wizard.plan_hearing import planned_acts, settle_with_order, take_plan
+from dorothie_gym.policies.co_wizard.plan_acceptance import planned_acts, settle_with_order, take_plan
 from dorothie_gym.policies.co_wizard.refusals import answer_in_any_case, refuse_unmet
 from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,

@@ -41,7 +41,7 @@ _DRIVES = re.compile(
     r"(turn|stop|go|get|be|drive|head|pull|park|take (me|us|the|a|that|this)|bring (me|us)|switch|change|slow|speed"
     r"|keep|make|move|merge|follow|stay|continue|wait|find|swing|flip|double)\b"
 )
-"""What a passenger needs from the driver; other business is the passenger's own."""
+"""Needs of a passenger that concern the driver; other business is the passenger's own."""
 
 _CUT_OFF = re.compile(r"\b(of|for|to|and|a|an|the|with|some|his|her|their)$")
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
+from dorothie_gym.policies.co_wizard.destinations import aim, known_landmark
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest
-from dorothie_gym.policies.co_wizard.goals import aim, known_landmark
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, update_route
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.session.spaces.actions import CoWizardAction

@@ -16,7 +16,7 @@ from dorothie_gym.ontology.actions import SPEED_STEP
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, StreetName
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.goals import approach_stop
+from dorothie_gym.policies.co_wizard.destinations import approach_stop
 from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.proposition_truth import speed_limit
 from dorothie_gym.policies.co_wizard.state import CoWizardState

@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ActionValue, ObjectClass
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.goals import plan_route
+from dorothie_gym.policies.co_wizard.destinations import plan_route
 from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
 from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
 from dorothie_gym.policies.speech import intend

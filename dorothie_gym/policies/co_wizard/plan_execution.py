@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.routes import MAX_STEPS, Anaphor, ConditionRelation, 
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.goals import adopt_unknown, aim, known_landmark, plan_route, seek_street
+from dorothie_gym.policies.co_wizard.destinations import adopt_unknown, aim, known_landmark, plan_route, seek_street
 from dorothie_gym.policies.co_wizard.instructed_actions import asked_speed
 from dorothie_gym.policies.co_wizard.intentions import Directive, Wish
 from dorothie_gym.policies.co_wizard.plan_memory import NO_JUNCTION, STEERING, StepStage

@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceRefere
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies.co_wizard.goals import known_landmark
+from dorothie_gym.policies.co_wizard.destinations import known_landmark
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING, DuePoint
 from dorothie_gym.policies.road_ahead import Crossing, RoadAhead
 from dorothie_gym.policies.route_progress import Choice, find_exit, streets_named
@@ -46,7 +46,7 @@ _OFFSETS: Final[Mapping[ConditionRelation, float]] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class Objection:
-    """What the map holds against a step.
+    """Reason why the map contradicts a step.
 
     Attributes:
         reason: statement of it.

@@ -13,15 +13,15 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.described_looks import compare_looks
+from dorothie_gym.policies.co_wizard.destinations import note_plan, recognise_goal, search_on
 from dorothie_gym.policies.co_wizard.dialogue_update import listen
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, junction_ahead, rest
-from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
-from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.intentions import Intentions
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.plan_execution import keep_plan
 from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
 from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.unprompted_remarks import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import TypedPolicy, replace

@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.goals import believed_destination, doubt
+from dorothie_gym.policies.co_wizard.destinations import believed_destination, doubt
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend, repeated
 
@@ -191,7 +191,7 @@ def hear_wrong_way(state: CoWizardState, view: CoWizardView) -> None:
 
 
 def check_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Checks a destination against whose route instructions were given; if they continue, gives up its place.
+    """Checks the destination after instructions that lead away from its route; gives up its place if more follow.
 
     The name may be right and the place wrong: there are several houses.
     """

@@ -44,7 +44,7 @@ REJECTIONS = frozenset({Fault.REJECTED, Fault.NO_CONNECTION})
 
 
 class CallError(Exception):
-    """A call has brought no usable answer.
+    """Call without a usable answer.
 
     Attributes:
         fault: kind of the fault.

@@ -1,4 +1,4 @@
-"""What a role sees, in words of a prompt: range of sight with its cause, and the nearest objects."""
+"""View of a role in the words of a prompt: range of sight with its cause, and the nearest objects."""
 
 from __future__ import annotations
 

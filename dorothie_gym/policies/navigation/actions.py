@@ -206,7 +206,7 @@ class EstimatedActionMask:
         self._town = town
 
     def mask(self, driver: DriverArrays) -> NDArray[np.bool_]:
-        """Returns which actions would be carried out now (18,), by a driver's view."""
+        """Returns which actions are feasible now (18,), judged from a driver's view."""
         town, view = self._town, plain(driver.inputs)[0]
         held, manoeuvre = view["motion"] == Motion.STOPPED, int(view["manoeuvre"])
         lane, station = town.lanes[int(view["lane"])], float(view["station"])

@@ -236,7 +236,7 @@ def _encode_objects(view: DriverView, vector: Vector, k: int) -> int:
 
 @compiled
 def measure_costs(town: TownArrays, lanes: RecordArray[RoutingLane], costs: Array, driver: DriverArrays) -> None:
-    """Writes the costs of the routes to the goal from where a driver believes to be.
+    """Writes the costs of the routes to the goal from the place at which the driver believes the car to be.
 
     Args:
         town: arrays of the town.

@@ -10,8 +10,8 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, SIGNS_OF_HEARING, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.participant.arriving import about_to_arrive
-from dorothie_gym.policies.participant.short_answers import addition, checked
+from dorothie_gym.policies.participant.answer_parts import addition, checked
+from dorothie_gym.policies.participant.final_approach import about_to_arrive
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.maps.whereabouts import is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
-from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby
+from dorothie_gym.policies.participant.target_hints import corner_fact, famous_nearby
 from dorothie_gym.policies.place_looks import distinguishing_look
 from dorothie_gym.policies.speech import Remark, intend
 
@@ -28,7 +28,7 @@ _BESIDE = 40.0
 
 
 class _Mark(NamedTuple):
-    """What stands beside the place: the fact, the topic of its words, and the arguments that are not spoken."""
+    """Mark beside the place: the fact, the topic of its words, and the arguments that are not spoken."""
 
     fact: Proposition
     topic: str
@@ -66,7 +66,7 @@ def side_fact(state: ParticipantState, goal: SeenLandmark) -> tuple[Remark, ...]
 def ending_behind(
     state: ParticipantState, view: ParticipantView, last: StepKey, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
-    """Returns the remark on the end of the way behind a turn, if that is the last one of the route."""
+    """Returns the remark on the end of the way behind a turn, if that turn is the last one of the route."""
     progress = state.route.progress
     turns = [] if progress is None else list(progress.crossings(state.town, view.station))
     if not turns or (turns[-1].lane, turns[-1].exit.connector) != last[1:]:

@@ -163,7 +163,7 @@ class ParticipantStyle:
         foresight: largest number of steps of the way that are described at once.
         manner: manner of giving directions.
         endings: probability that the end of an approach is described by what stands there.
-        corrects: probability that a car that approaches its turn too fast is told so.
+        corrects: probability of a remark to a car that approaches its turn too fast.
         recalls: probability that a destination is introduced by what happened there, or close to it, on this trip.
     """
 

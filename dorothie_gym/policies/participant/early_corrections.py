@@ -11,8 +11,8 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.participant.arriving import BRAKING
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.final_approach import BRAKING
+from dorothie_gym.policies.participant.order_wording import order
 from dorothie_gym.policies.participant.route_steps import RouteStep, route_step
 from dorothie_gym.policies.route_progress import lanes_beside
 from dorothie_gym.policies.turn_lanes import turn_lanes

@@ -10,15 +10,15 @@ import numpy as np
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
+from dorothie_gym.policies.participant.contradictory_orders import admit_repetition, own_up
+from dorothie_gym.policies.participant.dialogue_update import listen
 from dorothie_gym.policies.participant.early_corrections import correct_early
-from dorothie_gym.policies.participant.given_orders import drop_repetition, note_said
-from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
-from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
-from dorothie_gym.policies.participant.reactions import react, scene_of
-from dorothie_gym.policies.participant.reconsidering import admit_repetition, own_up
-from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.order_history import drop_repetition, note_said
 from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
+from dorothie_gym.policies.participant.subgoals import announce_target, choose_target, note_tasks, resume_after_wait
+from dorothie_gym.policies.participant.turn_by_turn_guidance import follow_route, guide, watch
+from dorothie_gym.policies.participant.unprompted_remarks import react, scene_of
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import TypedPolicy, replace

@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.policies.participant.arriving import about_to_arrive
+from dorothie_gym.policies.participant.final_approach import about_to_arrive
 from dorothie_gym.policies.participant.route_steps import route_step
 from dorothie_gym.policies.route_progress import first_new_street
 

@@ -13,9 +13,9 @@ from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import SIGNS_OF_HEARING, DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.participant.given_orders import times_told
-from dorothie_gym.policies.participant.guidance import next_step, note_step
-from dorothie_gym.policies.participant.retrying import IN_VAIN
+from dorothie_gym.policies.participant.failed_guidance import IN_VAIN
+from dorothie_gym.policies.participant.order_history import times_told
+from dorothie_gym.policies.participant.turn_by_turn_guidance import next_step, note_step
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
 

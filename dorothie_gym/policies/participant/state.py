@@ -18,7 +18,7 @@ from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
-from dorothie_gym.policies.participant.given_orders import GivenOrder
+from dorothie_gym.policies.participant.order_history import GivenOrder
 from dorothie_gym.policies.participant.trip_memory import TripMemory
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_state import RouteState

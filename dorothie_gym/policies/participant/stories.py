@@ -77,7 +77,7 @@ def as_afterthought(item: Remark) -> Remark:
 
 
 def picks_up(purpose: Purpose | None) -> bool:
-    """Returns whether the purpose of an errand is to pick somebody up."""
+    """Returns whether the purpose of an errand is to pick up a person."""
     return purpose is not None and purpose.action is not None and purpose.action.lower().startswith("pick up")
 
 

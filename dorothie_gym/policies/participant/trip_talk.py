@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
-from dorothie_gym.policies.participant.hints import FAMOUS
+from dorothie_gym.policies.participant.target_hints import FAMOUS
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.support import portable_math as pm
 

@@ -442,7 +442,7 @@ class InlinedFunction(CompiledFunction):
 
 
 def portable(function: F) -> F:
-    """As `inlined`; called from Python, the function runs as Python, with the same result.
+    """Decorates like `inlined`; called from Python, the function runs as Python, with the same result.
 
     For short arithmetic that Python calls rarely: reading machine code at the start would take longer than it saves.
     Integers count as floating-point numbers.

@@ -10,7 +10,7 @@ from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies import ScriptedCoWizard
-from dorothie_gym.policies.co_wizard.plan_hearing import take_plan
+from dorothie_gym.policies.co_wizard.plan_acceptance import take_plan
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.policy import replace

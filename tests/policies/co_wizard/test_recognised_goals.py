@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from dorothie_gym.ontology import LandmarkName, StreetName
-from dorothie_gym.policies.co_wizard.goals import recognise_goal
+from dorothie_gym.policies.co_wizard.destinations import recognise_goal
 from dorothie_gym.policies.policy import replace
 from tests.policies.co_wizard.rides import Ride
 from tests.policies.co_wizard.test_described_looks import beside_houses

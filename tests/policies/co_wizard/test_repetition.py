@@ -18,17 +18,17 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.acknowledgement import what_keeps
 from dorothie_gym.policies.co_wizard.answers import answer_yes_no, asks_to_act
-from dorothie_gym.policies.co_wizard.driving import drive
-from dorothie_gym.policies.co_wizard.goals import (
+from dorothie_gym.policies.co_wizard.destinations import (
     aim,
     believed_destination,
     is_on_another_street,
     search_on,
     seek_street,
 )
+from dorothie_gym.policies.co_wizard.driving import drive
 from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED
 from dorothie_gym.policies.co_wizard.intentions import Wish
-from dorothie_gym.policies.co_wizard.plan_hearing import take_plan
+from dorothie_gym.policies.co_wizard.plan_acceptance import take_plan
 from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
 from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.view import CoWizardView

@@ -16,12 +16,12 @@ from dorothie_gym.maps.whereabouts import is_on_right
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies.participant.approach_end import ending
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn, correct_early
-from dorothie_gym.policies.participant.hints import looks_remark
-from dorothie_gym.policies.participant.reactions import _chat_options
+from dorothie_gym.policies.participant.target_hints import looks_remark
 from dorothie_gym.policies.participant.trip_memory import TripMemory
 from dorothie_gym.policies.participant.trip_talk import recollection, trip_questions, trip_remarks
+from dorothie_gym.policies.participant.unprompted_remarks import _chat_options
 from dorothie_gym.policies.place_looks import look_of
-from tests.policies.participant.test_way_ahead import Drive
+from tests.policies.participant.test_route_description import Drive
 
 P = Predicate
 

@@ -21,7 +21,7 @@ from dorothie_gym.policies.speech import Remark, repeated
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
-    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _OPEN_QUESTIONS: Final[Mapping[SlotValue, tuple[Predicate, ...]]] = MappingProxyType(
@@ -33,7 +33,7 @@ _OPEN_QUESTIONS: Final[Mapping[SlotValue, tuple[Predicate, ...]]] = MappingProxy
         StreetName.QUERIED: (Predicate.ON_STREET,),
     }
 )
-"""What answers to open questions are about, by a slot value of the question; a reason is about its effect."""
+"""Subjects of answers to open questions, by a slot value of the question; the subject of a reason is its effect."""
 
 QUESTIONS: Final = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK)
 

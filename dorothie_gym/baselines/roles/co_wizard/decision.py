@@ -24,8 +24,8 @@ from dorothie_gym.baselines.roles.co_wizard.features import (
 )
 from dorothie_gym.baselines.roles.co_wizard.memory import Update, WorkingMemory
 from dorothie_gym.baselines.roles.learned_role.decision import Attention, Inputs, Percept, just_heard, kept_utterances
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE, word_rows
 from dorothie_gym.baselines.roles.learned_role.remark_forms import topic_of
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import KEPT, UTTERANCE_SIZE, word_rows
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView

@@ -1,4 +1,4 @@
-"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+"""Demonstrations of the scripted Co-Wizard, in recorded sessions and in practice sessions of the learned one."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory, initial
 from dorothie_gym.baselines.roles.co_wizard.policy import LearnedCoWizard, LearnedDecision, LearnedState
 from dorothie_gym.baselines.roles.co_wizard.remarks import sources
 from dorothie_gym.baselines.roles.co_wizard.teacher import CALM, Lesson, Teacher
-from dorothie_gym.baselines.roles.learned_role.decision import Attention
-from dorothie_gym.baselines.roles.learned_role.practice import (
+from dorothie_gym.baselines.roles.learned_role.dagger import RoundSettings
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import (
     TRAINED,
     PracticeSession,
     observed,
     play_in_turns,
     play_together,
 )
-from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
+from dorothie_gym.baselines.roles.learned_role.decision import Attention
 from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard

@@ -42,7 +42,7 @@ from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.support.compilation import compiled, fixed
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
     from dorothie_gym.maps.model import Exit
     from dorothie_gym.policies.co_wizard.view import CoWizardView
     from dorothie_gym.policies.language_model.navigator import RouteStep

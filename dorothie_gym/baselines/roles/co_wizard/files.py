@@ -7,7 +7,7 @@ from typing import Final
 
 from dorothie_gym.baselines.roles.co_wizard.network import CoWizardLayout, CoWizardNetwork
 from dorothie_gym.baselines.roles.co_wizard.remarks import check_form
-from dorothie_gym.baselines.roles.learned_role.files import ModelFiles, RoleModelPage
+from dorothie_gym.baselines.roles.learned_role.model_files import ModelFiles, RoleModelPage
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,6 @@ from torch import Tensor, nn
 
 from dorothie_gym.baselines.roles.co_wizard.features import COMMAND_SIZE, PLACE_SIZE, STATE
 from dorothie_gym.baselines.roles.co_wizard.memory import FRESH, STATUSES, VARIABLES, GoalEvent
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
 from dorothie_gym.baselines.roles.learned_role.inference import (
     Dense,
     Floats,
@@ -29,6 +28,7 @@ from dorothie_gym.baselines.roles.learned_role.network import (
     hidden_layers,
     without_missing,
 )
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import KEPT, UTTERANCE_SIZE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

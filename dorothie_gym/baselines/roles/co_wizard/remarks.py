@@ -22,8 +22,8 @@ from dorothie_gym.policies.view_range import sight, suitable_speed
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
-    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
     from dorothie_gym.baselines.roles.learned_role.remark_forms import Sources
+    from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 _WHOLES: Final = ("answer", "again")

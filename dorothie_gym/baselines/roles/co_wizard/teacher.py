@@ -20,7 +20,7 @@ from dorothie_gym.baselines.roles.co_wizard.memory import (
     Update,
     speed_index,
 )
-from dorothie_gym.baselines.roles.learned_role.practice import new_remarks
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import new_remarks
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.roles.learned_role.hearing import (
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import (
     KEPT,
     UTTERANCE_SIZE,
     Utterance,

@@ -14,7 +14,7 @@ AWAY: Final = 300.0
 """Time that stands for "never" or "long ago" [s]."""
 
 TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
-"""What remarks are about: their predicate or, without content, their move."""
+"""Subjects of remarks: their predicate or, without content, their move."""
 
 TIME_SCALES: Final = (1.0, 4.0, 15.0)
 """Scales of times [s]."""

@@ -34,7 +34,7 @@ class FieldKind(enum.IntEnum):
     """One input, the number."""
 
     CHOICE = 1
-    """As many inputs as there are choices: 1 at the number; none at a number outside."""
+    """One input for each choice: 1 at the number of the choice, 0 elsewhere; all are 0 for a number outside."""
 
     TIME = 2
     """A time [s] on several scales, see `time_scales`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.roles.learned_role.hearing import WORD_BUCKETS
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import WORD_BUCKETS
 
 WORD_WIDTH, WIDTH, REMARK_WIDTH = 24, 256, 48
 """Widths of the word embedding, of the hidden layers, and of an embedded remark."""

@@ -13,10 +13,7 @@ import torch
 from torch import nn
 
 from dorothie_gym.archive.corpus import Corpus
-from dorothie_gym.baselines.roles.learned_role.examples import ExampleBatch, forms_in
-from dorothie_gym.baselines.roles.learned_role.files import ModelFiles
-from dorothie_gym.baselines.roles.learned_role.practice import PracticeSession, is_held_out
-from dorothie_gym.baselines.roles.learned_role.rounds import (
+from dorothie_gym.baselines.roles.learned_role.dagger import (
     CorpusPlan,
     FinishedFit,
     FitPlan,
@@ -26,6 +23,9 @@ from dorothie_gym.baselines.roles.learned_role.rounds import (
     processor_seconds,
     train_in_rounds,
 )
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import PracticeSession, is_held_out
+from dorothie_gym.baselines.roles.learned_role.examples import ExampleBatch, forms_in
+from dorothie_gym.baselines.roles.learned_role.model_files import ModelFiles
 from dorothie_gym.baselines.roles.learned_role.supervised import fit
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
@@ -81,7 +81,7 @@ def train_role(
 
 @dataclass(frozen=True, kw_only=True)
 class RoleLearner(Generic[Network, Batch, Example, Settings]):
-    """Functions of the training of a role, see `rounds.Learner`.
+    """Functions of the training of a role, see `dagger.Learner`.
 
     Attributes:
         role: the role.

@@ -1,4 +1,4 @@
-"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+"""Demonstrations of the scripted participant, in recorded sessions and in practice sessions of the learned one."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import (
+    PracticeSession,
+    observed,
+    play_in_turns,
+    play_together,
+)
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
-from dorothie_gym.baselines.roles.learned_role.practice import PracticeSession, observed, play_in_turns, play_together
 from dorothie_gym.baselines.roles.participant.decision import (
     ParticipantPercept,
     choosing_inputs,
@@ -28,7 +33,7 @@ from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.roles.learned_role.rounds import RoundSettings
+    from dorothie_gym.baselines.roles.learned_role.dagger import RoundSettings
     from dorothie_gym.baselines.roles.participant.network import ParticipantNetwork
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.recording.session import Session

@@ -25,17 +25,17 @@ from dorothie_gym.maps.whereabouts import is_on_right
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenSubgoal, is_dark, is_foggy, is_rainy, street_of
-from dorothie_gym.policies.participant.arriving import about_to_arrive, room_to_stop
-from dorothie_gym.policies.participant.hints import famous_nearby
+from dorothie_gym.policies.participant.final_approach import about_to_arrive, room_to_stop
 from dorothie_gym.policies.participant.proposition_truth import believes, is_elsewhere
 from dorothie_gym.policies.participant.route_steps import is_last_stretch
 from dorothie_gym.policies.participant.stories import purpose_of_target
+from dorothie_gym.policies.participant.target_hints import famous_nearby
 from dorothie_gym.policies.route_progress import light_ahead, next_choice
 from dorothie_gym.policies.turn_lanes import turn_lanes
 from dorothie_gym.policies.view_range import camera_fault, sight, suitable_speed
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
     from dorothie_gym.policies.participant.view import ParticipantView
 
 MAX_ERRANDS: Final = 12

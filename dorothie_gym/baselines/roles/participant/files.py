@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.baselines.roles.learned_role.files import ModelFiles, RoleModelPage
+from dorothie_gym.baselines.roles.learned_role.model_files import ModelFiles, RoleModelPage
 from dorothie_gym.baselines.roles.participant.network import ParticipantLayout, ParticipantNetwork
 from dorothie_gym.baselines.roles.participant.remarks import check_form
 

@@ -19,14 +19,14 @@ from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, Slot
-from dorothie_gym.policies.participant.arriving import prepare_stop
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
-from dorothie_gym.policies.participant.guidance import follow_route
-from dorothie_gym.policies.participant.reactions import note_blocked
-from dorothie_gym.policies.participant.retrying import stop_circling
+from dorothie_gym.policies.participant.failed_guidance import stop_circling
+from dorothie_gym.policies.participant.final_approach import prepare_stop
 from dorothie_gym.policies.participant.route_steps import is_last_stretch
 from dorothie_gym.policies.participant.standstill import TURN_TIME, excuse_at_light
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
+from dorothie_gym.policies.participant.turn_by_turn_guidance import follow_route
+from dorothie_gym.policies.participant.unprompted_remarks import note_blocked
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, SpeechState

@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
 from dorothie_gym.baselines.roles.learned_role.inference import Dense, Floats, FollowingRemark, HiddenLayers, Scorer
 from dorothie_gym.baselines.roles.learned_role.network import (
     REMARK_WIDTH,
@@ -21,6 +20,7 @@ from dorothie_gym.baselines.roles.learned_role.network import (
     option_scorer,
     option_scores,
 )
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import KEPT, UTTERANCE_SIZE
 from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, STATE_SIZE
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ from dorothie_gym.baselines.roles.participant.remarks import (
     stop_remark,
 )
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.participant.reactions import scene_of
+from dorothie_gym.policies.participant.unprompted_remarks import scene_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.session.spaces.actions import ParticipantAction, Speech
 

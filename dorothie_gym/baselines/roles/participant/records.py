@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
-from dorothie_gym.policies.participant.arriving import about_to_arrive
-from dorothie_gym.policies.participant.given_orders import note_said
-from dorothie_gym.policies.participant.guidance import note_step
+from dorothie_gym.policies.participant.final_approach import about_to_arrive
+from dorothie_gym.policies.participant.order_history import note_said
 from dorothie_gym.policies.participant.route_steps import RouteStep, route_step
+from dorothie_gym.policies.participant.turn_by_turn_guidance import note_step
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.participant.state import ParticipantState

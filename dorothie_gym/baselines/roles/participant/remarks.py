@@ -22,10 +22,10 @@ from dorothie_gym.maps.whereabouts import corner_of
 from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
-from dorothie_gym.policies.participant.hints import famous_nearby
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.order_wording import order
 from dorothie_gym.policies.participant.route_steps import RouteStep, is_last_stretch
 from dorothie_gym.policies.participant.stories import purpose_of_target
+from dorothie_gym.policies.participant.target_hints import famous_nearby
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
@@ -33,7 +33,7 @@ from dorothie_gym.policies.view_range import sight, suitable_speed
 from dorothie_gym.tasks.landmark_designs import features_of
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
+    from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
     from dorothie_gym.policies.participant.view import ParticipantView
 
 TEXTS: Final = ("person", "item", "purpose", "reason", "feature")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dorothie_gym.baselines.roles.learned_role.practice import new_remarks
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import new_remarks
 from dorothie_gym.baselines.roles.participant.memory import KEEP_TARGET, SessionMemory, TargetChoice
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.policy import replace

@@ -181,7 +181,7 @@ def mean_look(
 
 @inlined
 def noise_place(x: float, y: float, density: float) -> int:
-    """Returns the entry of the noise at a position [m] for points of a density [1/m]."""
+    """Returns the index into the noise table at a position [m]; `density` is the number of its entries per metre."""
     return (int(y * density + _SHIFT) & _MASK) * NOISE_SIZE + (int(x * density + _SHIFT) & _MASK)
 
 

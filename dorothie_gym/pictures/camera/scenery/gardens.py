@@ -54,7 +54,7 @@ class Plot(NamedTuple):
 
 
 def add_garden(builder: MeshBuilder, garden: Garden, plot: Plot, ground: Heights, *, fine: bool) -> None:
-    """Adds what grows or stands in front of a house; nothing for a tree, which stands beside it.
+    """Adds plants and objects in front of a house; a tree adds nothing, because it stands beside the house.
 
     Args:
         builder: receives the triangles.

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.co_wizard_ablation import make
 from dorothie_gym.baselines.roles.co_wizard.memory import WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.policy import LearnedDecision
-from dorothie_gym.baselines.roles.learned_role.practice import observed
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import observed
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy, pretrained_folder
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed

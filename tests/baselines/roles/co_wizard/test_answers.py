@@ -3,8 +3,8 @@ import pytest
 from dorothie_gym.baselines.roles.co_wizard.answers import SAID_AGAIN_AFTER, answer_to, is_sayable, said_again
 from dorothie_gym.baselines.roles.co_wizard.memory import VARIABLES, Update, WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.remarks import form_of, sources
-from dorothie_gym.baselines.roles.learned_role.hearing import Utterance
 from dorothie_gym.baselines.roles.learned_role.remark_forms import filled
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import Utterance
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName

@@ -6,12 +6,12 @@ from dorothie_gym.baselines.roles.co_wizard.decision import CoWizardPercept, bla
 from dorothie_gym.baselines.roles.co_wizard.examples import correcting_example
 from dorothie_gym.baselines.roles.co_wizard.memory import GoalEvent, Update, WorkingMemory
 from dorothie_gym.baselines.roles.co_wizard.teacher import Lesson
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import observed
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
-from dorothie_gym.baselines.roles.learned_role.practice import observed
 from dorothie_gym.ontology import LandmarkName, Role
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import CoWizardAction
-from tests.baselines.roles.learned_role.test_hearing import heard
+from tests.baselines.roles.learned_role.test_utterance_inputs import heard
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraining, practise
 from dorothie_gym.baselines.roles.co_wizard.examples import CoWizardExamples, Example
 from dorothie_gym.baselines.roles.co_wizard.files import FILES
+from dorothie_gym.baselines.roles.learned_role.dagger_sessions import PracticeSession
 from dorothie_gym.baselines.roles.learned_role.examples import forms_in
-from dorothie_gym.baselines.roles.learned_role.practice import PracticeSession
 from dorothie_gym.policies.pretrained import pretrained_folder
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine

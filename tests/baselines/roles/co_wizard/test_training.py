@@ -9,8 +9,8 @@ from dorothie_gym.baselines.roles.co_wizard.demonstrations import CoWizardTraini
 from dorothie_gym.baselines.roles.co_wizard.features import STATE
 from dorothie_gym.baselines.roles.co_wizard.files import FILES
 from dorothie_gym.baselines.roles.co_wizard.training import train_co_wizard
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE
-from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS
+from dorothie_gym.baselines.roles.learned_role.dagger import LESSONS
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import KEPT, UTTERANCE_SIZE
 from dorothie_gym.errors import ModelFileError, SessionError
 from dorothie_gym.evaluation.rollout import generate_corpus
 from dorothie_gym.evaluation.rollout.play import play_session

@@ -4,9 +4,9 @@ import torch
 from dorothie_gym.baselines.roles.learned_role.decision import InputBatch, Inputs, kept_utterances
 from dorothie_gym.baselines.roles.learned_role.encoding import AWAY, age_scales, distance_scales, one_hot, time_scales
 from dorothie_gym.baselines.roles.learned_role.examples import reals
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, word_rows
 from dorothie_gym.baselines.roles.learned_role.policy import drawn
-from tests.baselines.roles.learned_role.test_hearing import heard
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import KEPT, word_rows
+from tests.baselines.roles.learned_role.test_utterance_inputs import heard
 
 
 def test_inputs_in_play_are_those_of_an_example():

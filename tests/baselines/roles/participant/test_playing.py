@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from dorothie_gym.baselines.roles.learned_role.decision import Attention
-from dorothie_gym.baselines.roles.learned_role.hearing import KEPT, UTTERANCE_SIZE, Utterance
+from dorothie_gym.baselines.roles.learned_role.utterance_inputs import KEPT, UTTERANCE_SIZE, Utterance
 from dorothie_gym.baselines.roles.participant.decision import choosing_inputs, perceive
 from dorothie_gym.baselines.roles.participant.demonstrations import Pupil
 from dorothie_gym.baselines.roles.participant.features import ERRAND_SIZE, STATE_SIZE, answer_to
@@ -19,7 +19,7 @@ from dorothie_gym.dialogue import Direction, Wording, guess_spans, load_lexicon,
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, act_builders
 from dorothie_gym.policies.heard_utterance import HeardUtterance
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.order_wording import order
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.config import EnvConfig

@@ -15,7 +15,7 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.order_wording import order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from dorothie_gym.baselines.roles.learned_role.rounds import LESSONS, RoundSettings
+from dorothie_gym.baselines.roles.learned_role.dagger import LESSONS, RoundSettings
 from dorothie_gym.baselines.roles.participant.files import FILES
 from dorothie_gym.baselines.roles.participant.training import train_participant
 from dorothie_gym.errors import ModelFileError, SessionError
