@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from dorothie_gym.cli.output import Facts
+from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.pictures.views.exception_words import exception_words
@@ -58,12 +59,15 @@ class ScriptLine:
     acts: str = ""
 
 
-def script_lines(events: Iterable[Event], task: Callable[[int], str]) -> list[ScriptLine]:
+def script_lines(
+    events: Iterable[Event], task: Callable[[int], str], titles: StreetTitles = NO_TITLES
+) -> list[ScriptLine]:
     """Returns the lines for the events of a decision; internal events have none.
 
     Args:
         events: the events.
         task: returns the description of a subgoal by its number.
+        titles: names of the map for the streets.
     """
     lines: list[ScriptLine] = []
     last: int | None = None
@@ -77,12 +81,12 @@ def script_lines(events: Iterable[Event], task: Callable[[int], str]) -> list[Sc
                 lines.append(ScriptLine(time=event.time, speaker=event.source, text=text, style=style))
             continue
         move = move_record(event, -1)
-        act = str(move.act).removesuffix("()")
+        act = titles.shown(str(move.act).removesuffix("()"))
         if move.utterance == last:  # a further act of the same utterance
             before = lines.pop()
             act = f"{before.acts} {act}"
         last = move.utterance
-        lines.append(ScriptLine(time=event.time, speaker=event.source, text=move.text, acts=act))
+        lines.append(ScriptLine(time=event.time, speaker=event.source, text=titles.shown(move.text), acts=act))
     return lines
 
 
@@ -215,7 +219,8 @@ class LiveShow:
         if begun is None:
             begun = self._begun = time.perf_counter()
             self._console.print(_opening(engine.session, self._console, self._width))
-        lines = script_lines(engine.last_events, engine.session.task.description)
+        session = engine.session
+        lines = script_lines(engine.last_events, session.task.description, session.scenario.titles)
         if lines:
             self._console.print(_script(lines, self._width))
         if self._live is not None:

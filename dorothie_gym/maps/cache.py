@@ -42,7 +42,7 @@ from dorothie_gym.support.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, r
 from dorothie_gym.support.schemas import convert
 from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, remove, write_signed
 
-ARCHIVE_FORMAT = 2
+ARCHIVE_FORMAT = 3
 """Version of the archive format; raise it when the same town would be written differently."""
 
 MAX_ARCHIVE = 512 * MIB
@@ -80,8 +80,13 @@ def pack(town: Town, key: str) -> bytes:
     """
     arrays: list[Array] = []
     document: dict[str, object] = {
-        "format": ARCHIVE_FORMAT, "key": key, "name": town.name, "traffic": town.traffic, "cruise": town.cruise
-    }  # fmt: skip
+        "format": ARCHIVE_FORMAT,
+        "key": key,
+        "name": town.name,
+        "traffic": town.traffic,
+        "cruise": town.cruise,
+        "titled": town.titled,
+    }
     for part, kind in PARTS.items():
         elements = getattr(town, part)
         document[part] = {
@@ -114,7 +119,7 @@ def unpack(data: bytes, key: str) -> Town:
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
             raise TownArchiveError("it is of another format or another town")
-        return _town(document["name"], DrivingSide(document["traffic"]), document["cruise"], document, floats)
+        return _town(document, floats)
     except TownArchiveError:
         raise
     except (
@@ -146,17 +151,14 @@ def _plain(value: object) -> object:
     raise TypeError(f"a town cannot be archived with a {type(value).__name__} in it: {value!r}")
 
 
-def _town(
-    name: str,
-    traffic: DrivingSide,
-    cruise: float | None,
-    document: Mapping[str, Mapping[str, _Column]],
-    floats: Array,
-) -> Town:
+def _town(document: Mapping[str, Any], floats: Array) -> Town:
+    name, traffic, cruise, titled = (document[key] for key in ("name", "traffic", "cruise", "titled"))
     if not isinstance(name, str) or floats.dtype != np.float64 or floats.ndim != 1:
         raise TownArchiveError("its name is no text, or its numbers are no floats")
     if cruise is not None and not isinstance(cruise, float):
         raise TownArchiveError("its cruise speed is no number")
+    if not isinstance(titled, bool):
+        raise TownArchiveError("whether its streets have titles is no truth value")
     numbers = _ArrayReader(floats)
     parts: dict[str, list[Any]] = {}
     for part, kind in PARTS.items():
@@ -166,7 +168,7 @@ def _town(
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
         raise TownArchiveError("it holds more numbers than its town has")
-    town = Town(name=name, traffic=traffic, cruise=cruise, **parts)
+    town = Town(name=name, traffic=DrivingSide(traffic), cruise=cruise, titled=titled, **parts)
     if fault := next(_faults(town), None):
         raise TownArchiveError(f"it holds no sound town: {fault}")
     return town

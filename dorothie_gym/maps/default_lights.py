@@ -136,6 +136,7 @@ def with_default_lights(town: Town, notes: ImportNotes) -> Town:
         programmes=derive_programmes(town.lanes, town.links, town.junctions, signals, town.traffic),
         traffic=town.traffic,
         cruise=town.cruise,
+        titled=town.titled,
     )
 
 

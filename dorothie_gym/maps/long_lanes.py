@@ -86,6 +86,7 @@ def cut_long_lanes(town: Town, notes: ImportNotes | None = None) -> Town:
         sidewalks=town.sidewalks,
         programmes=town.programmes,
         cruise=town.cruise,
+        titled=town.titled,
         traffic=town.traffic,
     )
 

@@ -30,6 +30,7 @@ def mirrored(town: Town) -> Town:
         programmes=town.programmes,
         traffic=town.traffic.opposite,
         cruise=town.cruise,
+        titled=town.titled,
     )
 
 

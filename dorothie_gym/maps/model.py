@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -215,6 +216,16 @@ class Street:
     id: int
     name: str
     lanes: tuple[int, ...]
+
+    @staticmethod
+    def placeholder(number: int) -> str:
+        """Returns the name of a street that the map does not name."""
+        return f"Street {number}"
+
+    @property
+    def is_inferred(self) -> bool:
+        """Whether the map does not name the street."""
+        return re.fullmatch(r"Street \d+", self.name) is not None
 
 
 @shared

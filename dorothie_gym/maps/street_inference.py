@@ -32,7 +32,9 @@ class _Joint:
     crosses: bool  # through a junction
 
 
-def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tuple[Lane, ...], tuple[Street, ...]]:
+def name_streets(
+    lanes: Sequence[Lane], links: Sequence[LaneLink], fewest: int = FEWEST_STREETS
+) -> tuple[tuple[Lane, ...], tuple[Street, ...]]:
     """Joins roads that continue straight across junctions to streets.
 
     Two roads for the two directions of a street, as SUMO writes them, count as one. Every lane outside junctions
@@ -43,6 +45,7 @@ def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tupl
     Args:
         lanes: lanes of the town; `street` is ignored.
         links: links between them.
+        fewest: number of streets below which the longest are divided.
 
     Returns:
         The lanes with `street` set, and the streets, longest first, with placeholder names.
@@ -54,7 +57,7 @@ def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tupl
             length[ways[lane.road_id].road] += lane.length
     joints = _joints(lanes, links, ways)
     streets = _chains(sorted(length), joints)
-    streets = _divide(streets, joints, length)
+    streets = _divide(streets, joints, length, fewest)
     streets = _gather(streets, joints, length)
     number_of = {road: k for k, roads in enumerate(streets) for road in roads}
     street_of = {road: number_of[way.road] for road, way in ways.items() if way.road in number_of}
@@ -68,7 +71,7 @@ def name_streets(lanes: Sequence[Lane], links: Sequence[LaneLink]) -> tuple[tupl
     rank = {NO_STREET: NO_STREET} | {k: place for place, k in enumerate(order)}
     named = tuple(replace(lane, street=rank[number]) for lane, number in zip(lanes, numbers, strict=True))
     return named, tuple(
-        Street(id=k, name=f"Street {k + 1}", lanes=tuple(lane.id for lane in named if lane.street == k))
+        Street(id=k, name=Street.placeholder(k + 1), lanes=tuple(lane.id for lane in named if lane.street == k))
         for k in range(len(streets))
     )
 
@@ -147,7 +150,7 @@ def _pair(a: int, b: int) -> tuple[int, int]:
     return min(a, b), max(a, b)
 
 
-def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, float]) -> list[list[int]]:
+def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, float], fewest: int) -> list[list[int]]:
     """Divides streets until there are enough or the parts become too short.
 
     The longest street that crosses a junction is cut at the junction nearest its centre; if there is none, the longest
@@ -155,7 +158,7 @@ def _divide(streets: list[list[int]], joints: list[_Joint], length: dict[int, fl
     """
     streets = [list(roads) for roads in streets]
     unbroken = _unbroken(joints)
-    while len(streets) < FEWEST_STREETS:
+    while len(streets) < fewest:
         cuts = []
         for k, roads in enumerate(streets):
             before = np.cumsum([length[road] for road in roads]).tolist()

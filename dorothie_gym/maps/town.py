@@ -166,10 +166,11 @@ class Town:
         traffic: side of the road on which vehicles drive.
         cruise: cruise speed of the ego without a request [km/h], in a town with slow traffic like the paper's; None for
             a town where all drive as fast as lane, sight and weather allow.
+        titled: whether people are to see and hear the names that the map has for its streets.
 
     Attributes:
-        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, traffic, cruise: the
-            arguments; sequences as tuples.
+        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, traffic, cruise,
+            titled: the arguments; sequences as tuples.
     """
 
     def __init__(
@@ -187,6 +188,7 @@ class Town:
         programmes: Sequence[LightProgramme] = (),
         traffic: DrivingSide = DrivingSide.RIGHT,
         cruise: float | None = SLOW_CRUISE,
+        titled: bool = False,
     ) -> None:
         self.name = name
         self.lanes = tuple(lanes)
@@ -200,6 +202,7 @@ class Town:
         self.programmes = tuple(programmes)
         self.traffic = traffic
         self.cruise = cruise
+        self.titled = titled
 
     @cached_property
     def identity(self) -> TownIdentity:
@@ -207,7 +210,13 @@ class Town:
         parts = [self.lanes, self.links, self.junctions, self.streets, self.sites]
         beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes, self.cruise]
         side = [] if self.traffic is DrivingSide.RIGHT else [self.traffic]
+        side += ["titled"] if self.titled else []
         return TownIdentity(name=self.name, content=digest_of([*parts, *beside, *side]))
+
+    @cached_property
+    def street_titles(self) -> tuple[str, ...]:
+        """Name of each street in the map, for towns whose names people are to see; otherwise empty texts."""
+        return tuple(street.name if self.titled and not street.is_inferred else "" for street in self.streets)
 
     @property
     def kilometres(self) -> float:

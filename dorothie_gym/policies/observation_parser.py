@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies.lane_bounds import may_be_near
@@ -127,6 +128,16 @@ def street_of(observation: ObservationMapping, town: Town, lane: int) -> StreetN
     street = town.lanes[lane].street
     names = observation["street_names"]
     return StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN
+
+
+def titles_of(observation: ObservationMapping, town: Town) -> StreetTitles:
+    """Returns the names that the map has for the streets, for texts that people or language models read."""
+    return _titles(tuple(observation["street_names"].tolist()), town) if any(town.street_titles) else NO_TITLES
+
+
+@lru_cache(maxsize=64)
+def _titles(street_names: tuple[int, ...], town: Town) -> StreetTitles:
+    return StreetTitles([StreetName(name) for name in street_names], town.street_titles)
 
 
 def read_landmarks(observation: ObservationMapping, town: Town) -> tuple[SeenLandmark, ...]:

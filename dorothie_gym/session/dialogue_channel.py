@@ -95,6 +95,7 @@ class DialogueChannel:
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
         self._seeds = words, ears, styles
         self._rate = config.word_error_rate
+        self._titles = scenario.titles
         self._spoken: SpokenChannel | None = None
         if config.channel is ChannelKind.SPEECH:
             self._misheard = True
@@ -128,7 +129,7 @@ class DialogueChannel:
 
     def say(self, role: Role, speech: Speech, now: float) -> str | None:
         """Starts or continues an utterance at a time [s]; returns the reason of a refusal."""
-        text = speech.text.strip() or self._worded(speech.act, role)
+        text = self._titles.heard(speech.text.strip()) or self._worded(speech.act, role)
         span = Span(text, speech.act, speech.meaning)
         if self._spoken is None:
             return self._conversation.say(role, span, now, speech.onset, speech.pace)

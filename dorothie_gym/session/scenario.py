@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, TypeAlias, TypedDict
 
@@ -12,10 +14,12 @@ import numpy as np
 from msgspec import Meta
 
 from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
+from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
 from dorothie_gym.errors import SessionError, StoryboardError, did_you_mean, short_repr
 from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
+from dorothie_gym.session.recording.street_titles import STREET_TITLES
 from dorothie_gym.session.talk_kinds import draw_talk_task
 from dorothie_gym.session.talk_tasks import storyboard_of
 from dorothie_gym.support.copying import shared
@@ -97,6 +101,7 @@ class Scenario:
         storyboard: the task, bound to places of the town.
         street_names: name of each street of the town.
         departure: lane of the parked ego and the distance along it [m].
+        street_titles: name of each street in the map, for towns whose names people see (`Town.street_titles`).
         reference: effort of the reference pair; None if it was not measured. It has no effect but on
             `EnvConfig.time_factor`.
     """
@@ -105,7 +110,18 @@ class Scenario:
     storyboard: Storyboard
     street_names: tuple[StreetName, ...]
     departure: tuple[int, float]
+    street_titles: tuple[str, ...] = ()
     reference: ReferenceDrive | None = None
+
+    @cached_property
+    def titles(self) -> StreetTitles:
+        """Names of the map for the streets; towns without have none."""
+        return StreetTitles(self.street_names, self.street_titles) if self.street_titles else NO_TITLES
+
+    @property
+    def street_labels(self) -> list[str]:
+        """What maps and boards call each street."""
+        return self.titles.labels([name.label for name in self.street_names])
 
 
 ResetOptions: TypeAlias = Mapping[str, object]
@@ -191,6 +207,7 @@ def draw_scenario(
         storyboard=storyboard,
         street_names=_name_streets(town, streets),
         departure=(start.lane, start.station),
+        street_titles=_titles(town),
     )
 
 
@@ -209,6 +226,7 @@ def _talk_scenario(
         storyboard=storyboard,
         street_names=names,
         departure=task.departure or (start.lane, start.station),
+        street_titles=_titles(town),
     )
 
 
@@ -248,8 +266,14 @@ def _with_stops(
 
 
 def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...]:
-    """Returns shuffled names; a street named Highway keeps its name, streets beyond the fourteenth have no name."""
+    """Returns shuffled names; a street named Highway keeps its name, streets beyond the fourteenth have no name.
+
+    In a town with titles, the longest streets with titles are named first; a title with a name of the vocabulary in it,
+    such as "N Broadway", gets this one.
+    """
     shuffled = [STREET_NAMES[int(i)] for i in rng.permutation(len(STREET_NAMES))]
+    if any(town.street_titles):
+        return _name_titled(town, shuffled)
     names: list[StreetName] = []
     for street in town.streets:
         if street.name == StreetName.HIGHWAY.label:
@@ -257,6 +281,28 @@ def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...
         else:
             names.append(shuffled.pop() if shuffled else StreetName.UNKNOWN)
     return tuple(names)
+
+
+def _name_titled(town: Town, shuffled: list[StreetName]) -> tuple[StreetName, ...]:
+    titles = town.street_titles
+    length = [sum(town.lanes[lane].length for lane in street.lanes) for street in town.streets]
+    order = sorted(range(len(titles)), key=lambda k: (not titles[k], -length[k], k))
+    found: dict[int, StreetName] = {}
+    for k in order:
+        words = re.findall(r"\w+", titles[k].lower())
+        same = next((name for name in shuffled if name.label.lower() in words), None)
+        if same is not None:
+            found[k] = same
+            shuffled.remove(same)
+    for k in order:
+        if k not in found and shuffled:
+            found[k] = shuffled.pop()
+    return tuple(found.get(k, StreetName.UNKNOWN) for k in range(len(titles)))
+
+
+def _titles(town: Town) -> tuple[str, ...]:
+    """Returns the titles of the streets of a town; empty if none has one."""
+    return town.street_titles if any(town.street_titles) else ()
 
 
 def session_seeds(scenario: Scenario) -> list[np.random.SeedSequence]:
@@ -301,8 +347,13 @@ def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader
         story=storyboard.story,
         departure=scenario.departure,
         config=config.record(),
-        extra={} if scenario.reference is None else {REFERENCE: scenario.reference.to_json()},
+        extra=_extra_of(scenario),
     )
+
+
+def _extra_of(scenario: Scenario) -> dict[str, object]:
+    reference = {} if scenario.reference is None else {REFERENCE: scenario.reference.to_json()}
+    return {**reference, **({STREET_TITLES: list(scenario.street_titles)} if scenario.street_titles else {})}
 
 
 def _row_of(subgoal: Subgoal) -> SubgoalRow:

@@ -10,6 +10,8 @@ from typing import Final, TypeAlias
 
 from lxml import etree
 
+from tests.malformed.map_faults import FAULTS, encode
+
 Element: TypeAlias = etree._Element
 
 VALUES: Final = (
@@ -38,8 +40,9 @@ def mutate_map(content: bytes, random: Random) -> bytes:
     except (etree.XMLSyntaxError, ValueError):
         return content
     for _ in range(random.choice((1, 1, 1, 2, 3, 8))):
-        random.choice(_MUTATIONS)(root, random)
-    return etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+        random.choice(FAULTS if random.random() < 0.4 else _MUTATIONS)(root, random)
+    written = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return encode(written, random) if random.random() < 0.1 else written
 
 
 def _pick(root: Element, random: Random) -> Element:

@@ -15,8 +15,10 @@ from dorothie_gym.evaluation.analysis.units import Units
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.recording.events import INFRACTIONS, Event, EventType, UtteranceRecord, action_record
+from dorothie_gym.session.recording.street_titles import recorded_titles
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.street_titles import StreetTitles
     from dorothie_gym.session.recording.session import Session
 
 NAMES: Final[Mapping[Role, str]] = {
@@ -53,13 +55,14 @@ class TranscriptLine:
 
 
 def transcript_lines(session: Session) -> tuple[TranscriptLine, ...]:
-    """Returns the lines of a session in order of their starts.
+    """Returns the lines of a session in order of their starts; streets have the names of the map, if it names them.
 
     Exchanges and transactions are those that the rules derive. Actions of the car between two utterances share a line.
     """
     units = Units(session)
     kinds = handling(units)
-    said = [_said(utterance, units, kinds) for utterance in units.utterances]
+    titles = recorded_titles(session.header)
+    said = [_said(utterance, units, kinds, titles) for utterance in units.utterances]
     happened = [line for event in session.events for line in _happened(event, session)]
     ordered = sorted([*said, *happened], key=lambda line: line.time)
     return tuple(_together(ordered))
@@ -104,7 +107,9 @@ def _facts(session: Session) -> Iterator[str]:
 # --- Lines -----------------------------------------------------------------------------------------------------------
 
 
-def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]) -> TranscriptLine:
+def _said(
+    utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled], titles: StreetTitles
+) -> TranscriptLine:
     numbers = [units.exchange_of(move) for move in utterance.moves]
     known = list(dict.fromkeys(number for number in numbers if number is not None))
     transaction = units.transaction_of(utterance.moves[0])
@@ -117,7 +122,7 @@ def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]
     return TranscriptLine(
         time=utterance.start,
         speaker=utterance.speaker,
-        text=text,
+        text=titles.shown(text),
         said=True,
         exchanges=", ".join(f"{number}{_HANDLED[kinds[number]]}" for number in known),
         transaction="" if transaction is None else str(transaction),

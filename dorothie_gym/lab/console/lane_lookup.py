@@ -24,11 +24,15 @@ FARTHEST: Final = 60.0
 class LaneLookup:
     """Nearest places on the lanes of a town outside junctions, and on all lanes.
 
+    Attributes:
+        town: the map.
+
     Args:
         town: the map.
     """
 
     def __init__(self, town: Town) -> None:
+        self.town = town
         self._lanes = town.lanes
         rows, points, headings = [], [], []
         for lane in town.lanes:

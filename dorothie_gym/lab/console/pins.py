@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from dorothie_gym.ontology.slots import LandmarkName, StreetName
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.tasks.catalogue import catalogue, map_label
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Pin(NamedTuple):
 
 
 def pin_rows(
-    pins: Sequence[Pin], streets: Sequence[StreetName], places: LaneLookup
+    pins: Sequence[Pin], streets: Sequence[str], places: LaneLookup
 ) -> list[tuple[str, float, float, str, float, float, int]]:
     """Returns the pins in JSON types.
 
@@ -40,7 +40,7 @@ def pin_rows(
 
     Args:
         pins: landmarks that the role knows; the names depend only on them, so they reveal no other landmarks.
-        streets: name of each street.
+        streets: name of each street on the map; empty where it has none.
         places: lanes of the town.
     """
     rows = []
@@ -51,7 +51,7 @@ def pin_rows(
     return rows
 
 
-def _names(pins: Sequence[Pin], streets: Sequence[StreetName]) -> list[str]:
+def _names(pins: Sequence[Pin], streets: Sequence[str]) -> list[str]:
     """Returns the names on the map: of houses and people with their street, and with a number if that is not enough."""
     named = [
         f"{map_label(pin.name)}, {street}" if (street := _street(pin, streets)) else map_label(pin.name) for pin in pins
@@ -67,12 +67,11 @@ def _numbered(names: Sequence[str]) -> Iterable[str]:
         yield name if total[name] == 1 else f"{kind} {seen[name]}{comma}{street}"
 
 
-def _street(pin: Pin, streets: Sequence[StreetName]) -> str:
+def _street(pin: Pin, streets: Sequence[str]) -> str:
     """Returns the street of a landmark that may occur several times in a town; "" for others and unnamed streets."""
     if not catalogue()[pin.name].repeatable:
         return ""
-    name = streets[pin.street] if 0 <= pin.street < len(streets) else StreetName.UNKNOWN
-    return "" if name is StreetName.UNKNOWN else name.label
+    return streets[pin.street] if 0 <= pin.street < len(streets) else ""
 
 
 def _metres(value: float) -> float:

@@ -28,7 +28,7 @@ from dorothie_gym.lab.console.seat import EXPERIMENTER, SPECTATOR, Outgoing, Pau
 from dorothie_gym.lab.console.seat_frames import RoomStatus, SeatFrames
 from dorothie_gym.lab.console.seating import Occupancy, SeatPlan, plan_labels
 from dorothie_gym.lab.console.spectator_view import event_rows
-from dorothie_gym.lab.console.speech_input import act_json, read_act, read_typed
+from dorothie_gym.lab.console.speech_input import act_json, read_act, read_typed, with_session_names
 from dorothie_gym.lab.console.talk_log import TalkLog
 from dorothie_gym.lab.console.windscreen import Windscreen
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
@@ -204,7 +204,7 @@ class Room:
             engine.reset(seed=self._seed)
         self._players.begin(self._seed)
         for seat in self._all():
-            seat.talk = TalkLog(seat.role)
+            seat.talk = TalkLog(seat.role, engine.scenario.titles)
             seat.taken_over, seat.refused = False, []
             seat.recordings.clear()
             if seat.inbox is not None:
@@ -402,7 +402,8 @@ class Room:
             self._note(SeatEventKind.LEFT, seat.role, {})
 
     def _obey(self, call: Receipt, out: list[Outgoing]) -> None:
-        seat, connection, message = call.seat, call.connection, call.message
+        titles = self.engine.scenario.titles
+        seat, connection, message = call.seat, call.connection, with_session_names(call.message, titles)
         if connection not in seat.connections:
             return  # it was replaced
         if isinstance(message, m.Ping):
@@ -414,7 +415,8 @@ class Room:
         elif isinstance(message, m.Announce):
             self._announce(seat, message)
         elif isinstance(message, m.Parse):
-            spans = [{"text": each.text, **act_json(each.act)} for each in read_typed(message.text, seat.talk.awaiting)]
+            read = read_typed(message.text, seat.talk.awaiting)
+            spans = [{"text": titles.shown(each.text), **act_json(each.act)} for each in read]
             out.append(Outgoing(connection, encode({"k": "parsed", "c": message.c, "spans": spans})))
         elif isinstance(message, m.Correct):
             self._correct(seat, message, out)

@@ -154,7 +154,7 @@ class SeatFrames:
             "vocabulary": vocabulary(),
             "stop": {"within": ARRIVAL_DISTANCE, "braking": PLANNED_BRAKING},
             "camera": self._camera(),
-            **static_view(observed, len(town.streets)),
+            **static_view(observed, town),
         }
 
     def _camera(self) -> dict[str, float]:

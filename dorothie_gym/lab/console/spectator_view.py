@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.lab.console.pins import Pin, pin_rows
 from dorothie_gym.lab.console.views import KMH, RoleView, weather_shares
-from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass, StreetName
 from dorothie_gym.pictures.views.exception_words import exception_words
 from dorothie_gym.session.recording.events import Event, EventType
 
@@ -32,9 +32,7 @@ def spectator_view(session: LiveSession, places: LaneLookup) -> RoleView:
         "speed": round(float(world.car.speed) * KMH, 1),
         "lights": bool(world.ego.lights),
         "hazard": None if hazard is None else [hazard.kind.label, 0],
-        "landmarks": [
-            list(row) for row in pin_rows(_pins(task.storyboard.landmarks), session.scenario.street_names, places)
-        ],
+        "landmarks": [list(row) for row in pin_rows(_pins(task.storyboard.landmarks), _streets(session), places)],
         "hidden": [landmark.hidden for landmark in task.storyboard.landmarks],
         "tasks": [
             {
@@ -60,6 +58,12 @@ def spectator_view(session: LiveSession, places: LaneLookup) -> RoleView:
         "weather": weather_shares(world.weather.values),
         "faults": [sensor.value for sensor in world.faults],
     }
+
+
+def _streets(session: LiveSession) -> list[str]:
+    """Returns the name of each street on the map; empty for streets without one."""
+    names = ["" if name is StreetName.UNKNOWN else name.label for name in session.scenario.street_names]
+    return session.scenario.titles.labels(names)
 
 
 def _pins(landmarks: Sequence[Landmark]) -> list[Pin]:

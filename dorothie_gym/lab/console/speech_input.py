@@ -6,13 +6,19 @@ import enum
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from msgspec import structs
 
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act, guess_spans
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.lab.console.messages import MessageError, Say, TypedSpan
+from dorothie_gym.lab.console.messages import Incoming, MessageError, Parse, Say, TypedSpan
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.spellings import parse_act
 from dorothie_gym.session.spaces.fields import UTTERANCE_LENGTH, plain_text
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.street_titles import StreetTitles
 
 
 class ActSource(enum.StrEnum):
@@ -63,6 +69,16 @@ def read_act(move: str, slots: dict[str, list[str]]) -> DialogueAct:
         return parse_act(move, slots)
     except OntologyError as error:
         raise MessageError(str(error)) from None
+
+
+def with_session_names(message: Incoming, titles: StreetTitles) -> Incoming:
+    """Returns a message with the session's names of streets in what was typed, in the place of those of the map."""
+    if not titles or not isinstance(message, Say | Parse):
+        return message
+    if isinstance(message, Parse) or message.spans is None:
+        return structs.replace(message, text=titles.heard(message.text))
+    spans = [structs.replace(span, text=titles.heard(span.text)) for span in message.spans]
+    return structs.replace(message, text=titles.heard(message.text), spans=spans)
 
 
 def read_typed(text: str, after: DialogueMove | None) -> tuple[TypedAct, ...]:

@@ -110,7 +110,7 @@ def _recognise(room: Room, seat: Seat, content: bytes) -> dict[str, object]:
     samples = np.frombuffer(content, "<i2").astype(np.float32) / np.float32(32768.0)
     if len(samples) < SHORTEST_TURN * SAMPLE_RATE:
         return {"text": "", "confidence": None, "audio": None}
-    streets = [name.label for name in room.engine.scenario.street_names]
+    streets = room.engine.scenario.street_labels
     heard = find_recognizer().recognize(samples, SAMPLE_RATE, hints=streets)
     sure = [word.confidence for word in heard.words if not math.isnan(word.confidence)]
     text = readable(heard.text) if heard.text else ""

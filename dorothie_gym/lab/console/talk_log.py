@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
 from dorothie_gym.lab.console.speech_input import act_json
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
@@ -29,10 +30,11 @@ class TalkLog:
 
     Args:
         role: role of the seat; None for spectators, who hear all utterances with their acts.
+        titles: names of the map for the streets, which the lines have.
     """
 
-    def __init__(self, role: Role | None) -> None:
-        self.role = role
+    def __init__(self, role: Role | None, titles: StreetTitles = NO_TITLES) -> None:
+        self.role, self._titles = role, titles
         self.entries: list[Entry] = []
         self.awaiting: DialogueMove | None = None
         self._read = self._messages = 0
@@ -44,7 +46,8 @@ class TalkLog:
             text = observation.get(f"{speaker}_text", "")
             if text:
                 acts = heard_acts(observation, speaker)
-                self.entries.append({"t": time, "who": speaker.value, "text": text, **_places_in(acts or ())})
+                named = _places_in(acts or (), self._titles)
+                self.entries.append({"t": time, "who": speaker.value, "text": self._titles.shown(text), **named})
                 self.awaiting = acts[-1].move if acts else None
         if message := observation.get("message", ""):
             self.entries.append({"t": time, "who": Role.AD_WIZARD.value, "text": message})
@@ -59,7 +62,7 @@ class TalkLog:
         for number in range(self._read, len(said)):
             utterance = said[number]
             if self.role is None or utterance.speaker is self.role:
-                self.entries.append(own_entry(utterance, number, time))
+                self.entries.append(own_entry(utterance, number, time, self._titles))
                 if self.role is not None:
                     self.awaiting = None
         self._read = len(said)
@@ -75,22 +78,22 @@ class TalkLog:
         self.entries.append({"t": round(time, 1), "who": who, "text": text})
 
 
-def _places_in(acts: Sequence[DialogueAct]) -> Entry:
-    """Returns the labels of the landmarks and streets that were heard, in order, if there are landmarks."""
+def _places_in(acts: Sequence[DialogueAct], titles: StreetTitles) -> Entry:
+    """Returns the landmarks and streets that were heard, by their names on the map, if there are landmarks."""
     unknown = (LandmarkName.UNKNOWN, LandmarkName.QUERIED, StreetName.UNKNOWN, StreetName.QUERIED)
     heard = [value for act in acts for value in act.ordered if value not in unknown]
     landmarks = [value.label for value in heard if isinstance(value, LandmarkName)]
-    streets = [value.label for value in heard if isinstance(value, StreetName)]
+    streets = [titles.shown(value.label) for value in heard if isinstance(value, StreetName)]
     return {"places": list(dict.fromkeys(landmarks)), "streets": list(dict.fromkeys(streets))} if landmarks else {}
 
 
-def own_entry(utterance: Utterance, number: int, time: float) -> Entry:
+def own_entry(utterance: Utterance, number: int, time: float, titles: StreetTitles = NO_TITLES) -> Entry:
     """Returns the line of an utterance with its acts."""
-    spans = [{"text": span.text, **act_json(span.act)} for span in utterance.spans]
+    spans = [{"text": titles.shown(span.text), **act_json(span.act)} for span in utterance.spans]
     return {
         "t": round(time, 1),
         "who": utterance.speaker.value,
-        "text": utterance.text,
+        "text": titles.shown(utterance.text),
         "utterance": number,
         "spans": spans,
     }

@@ -14,6 +14,7 @@ from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
+from dorothie_gym.policies.observation_parser import titles_of
 from dorothie_gym.session.spaces.observations import (
     MESSAGE_KINDS,
     ExitColumn,
@@ -28,6 +29,7 @@ from dorothie_gym.sim.state.codes import Motion
 
 if TYPE_CHECKING:
     from dorothie_gym.lab.console.lane_lookup import LaneLookup
+    from dorothie_gym.maps.town import Town
 
 RoleView: TypeAlias = dict[str, Any]
 """View of a role in JSON types; the same fields at each decision, so that a browser needs the changed ones only."""
@@ -49,16 +51,21 @@ def role_view(role: Role, observation: ObservationMapping, mask: Mapping[str, An
     return {**_common(observation, places), **_VIEWS[role](observation, mask, places)}
 
 
-def static_view(observation: ObservationMapping, streets: int) -> RoleView:
+def static_view(observation: ObservationMapping, town: Town) -> RoleView:
     """Returns the constant data of a session: names of the streets, and the story if the role observes it.
+
+    In a town whose map names its streets, `titles` has the name in the map of each name in the session.
 
     Args:
         observation: observation of the role.
-        streets: number of streets of the town.
+        town: the map.
     """
-    names = [StreetName(int(i)) for i in observation["street_names"][:streets]]
+    names = [StreetName(int(i)) for i in observation["street_names"][: len(town.streets)]]
+    labels = ["" if name is StreetName.UNKNOWN else name.label for name in names]
+    titles = titles_of(observation, town).labels(labels)
     return {
-        "streets": ["" if name is StreetName.UNKNOWN else name.label for name in names],
+        "streets": titles,
+        "titles": {label: title for label, title in zip(labels, titles, strict=True) if label and label != title},
         "story": observation.get("story", ""),
     }
 
@@ -192,7 +199,9 @@ def _landmarks(observation: ObservationMapping, places: LaneLookup) -> list[list
         for row in observation["landmarks"]
         if row[LandmarkColumn.NAME]
     ]
-    streets = [StreetName(int(name)) for name in observation["street_names"]]
+    names = [StreetName(int(name)) for name in observation["street_names"]]
+    labels = ["" if name is StreetName.UNKNOWN else name.label for name in names]
+    streets = titles_of(observation, places.town).labels(labels[: len(places.town.streets)])
     return [list(row) for row in pin_rows(pins, streets, places)]
 
 

@@ -203,7 +203,8 @@ KERB_SLACK = 0.15
 """Tolerance of the side of the car beyond a kerb [m]: kerbs are estimates, and curves are polylines."""
 
 LOOP = np.radians(190.0)
-"""Smallest turn of a loop [rad]; some U-turns turn slightly more than a half circle."""
+"""Smallest turn of a loop, in both directions together [rad]; some U-turns turn slightly more than a half circle. The
+ground of a loop is that of its lane, as at the end of a dead-end street, where cars swing out to turn round."""
 
 _SIDES = HALF_WIDTH * np.array([-1.0, 0.0, 1.0])
 
@@ -244,7 +245,7 @@ def _junction_faults(
         rows = samples.rows(number)
         sides = _car_sides(samples, rows).reshape(-1, 2)  # (3 n, 2)
         off = np.zeros(len(sides))
-        if abs(float(town.lanes[number].headings[-1] - town.lanes[number].headings[0])) <= LOOP:
+        if float(np.abs(np.diff(town.lanes[number].headings)).sum()) <= LOOP:
             off = outside(edges, end_of(town, number, 0), end_of(town, number, -1), HALF_WIDTH, sides)
         if off.max() > KERB_SLACK:
             off[_on_lanes(town, samples, sides, samples.heights[rows])] = 0.0

@@ -85,6 +85,7 @@ def import_opendrive(path: str | Path) -> tuple[Town, ImportNotes]:
         programmes=_programmes(records, derive_programmes(lanes, links, junctions, signals, traffic), signals),
         traffic=traffic,
         cruise=None,
+        titled=not records.own,
     )
     return cut_long_lanes(town, records.notes), records.notes
 

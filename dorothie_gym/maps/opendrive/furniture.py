@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from dorothie_gym.maps.import_notes import NoteKind
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
 from dorothie_gym.maps.opendrive.elements import MAX_NUMBER
@@ -46,7 +47,8 @@ def place_signals(records: OpenDriveRecords, topology: Topology, lanes: tuple[La
     """Returns the signals of a file, one for each `signal` element, in order of their ids.
 
     `Signal.lanes` are the lanes at whose end it applies (for speed limits: on which it applies): those that lead into
-    its junction, and if the file lists connectors, those that lead into them.
+    its junction, and if the file lists connectors, those that lead into them. Lights and signs are dropped with a note
+    if none of their lanes is for cars.
     """
     ways = _Ways(topology, lanes)
     ruled: defaultdict[int, dict[int, None]] = defaultdict(dict)
@@ -57,11 +59,25 @@ def place_signals(records: OpenDriveRecords, topology: Topology, lanes: tuple[La
             controls = _kind(owners[record.id][1]) in _CONTROLS
             for lane in ways.ruled(road, record, controls):
                 ruled[record.id].update(dict.fromkeys(ways.approaches(lane, controls)))
-    return tuple(_signal(number, *owners[number], tuple(sorted(ruled[number])), lanes) for number in sorted(owners))
+    others = {number for number, (road, record) in owners.items() if not ruled[number] and _is_for_others(road, record)}
+    for road, record in (owners[number] for number in sorted(others)):
+        where = f"road {road.name} / signal {record.id}"
+        records.notes.dropped(NoteKind.ACCESS, where, "is for lanes that are not for cars")
+    kept = sorted(owners.keys() - others)
+    return tuple(_signal(number, *owners[number], tuple(sorted(ruled[number])), lanes) for number in kept)
 
 
 def _kind(record: SignalRecord) -> SignalKind:
     return SIGNAL_TYPES.get(record.type, SignalKind.TRAFFIC_LIGHT if record.dynamic else SignalKind.OTHER)
+
+
+def _is_for_others(road: RoadRecord, record: SignalRecord) -> bool:
+    """Returns whether a light or sign lists lanes, none of which is for cars."""
+    if not record.lanes or _kind(record) not in _CONTROLS:
+        return False
+    lanes = [lane for section in road.sections for lane in section.lanes.values()]
+    listed = [lane for lane in lanes if any(min(span) <= lane.id <= max(span) for span in record.lanes) and lane.id]
+    return bool(listed) and not any(lane.drives for lane in listed)
 
 
 class _Ways:

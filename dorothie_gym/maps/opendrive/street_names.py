@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dorothie_gym.maps.model import NO_STREET, Lane, LaneLink, Street
-from dorothie_gym.maps.street_inference import common_streets, name_streets
+from dorothie_gym.maps.street_inference import FEWEST_STREETS, common_streets, name_streets
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.opendrive.records import OpenDriveRecords
@@ -70,7 +70,7 @@ def find_streets(
             index.setdefault(road.street, len(index))
     street_of = {lane.id: index[name] for lane, name in zip(lanes, names, strict=True) if name}
     titles = [*index]
-    for members in _inferred(lanes, links, names):
+    for members in _inferred(lanes, links, names, FEWEST_STREETS - len(titles)):
         number = len(titles)
         street_of |= dict.fromkeys(members, number)
         titles.append(_title(titles))
@@ -92,13 +92,13 @@ def _name(records: OpenDriveRecords, lane: Lane) -> str:
 def _title(titles: Sequence[str]) -> str:
     """Returns the placeholder name of the next inferred street."""
     number = 1
-    while f"Street {number}" in titles:
+    while Street.placeholder(number) in titles:
         number += 1
-    return f"Street {number}"
+    return Street.placeholder(number)
 
 
-def _inferred(lanes: Sequence[Lane], links: Sequence[LaneLink], names: Sequence[str]) -> list[list[int]]:
-    """Returns the lanes of each street inferred from the roads without a name."""
+def _inferred(lanes: Sequence[Lane], links: Sequence[LaneLink], names: Sequence[str], fewest: int) -> list[list[int]]:
+    """Returns the lanes of each street inferred from the roads without a name; below `fewest`, streets are divided."""
     rest = [lane for lane, name in zip(lanes, names, strict=True) if lane.in_junction or not name]
     if all(lane.in_junction for lane in rest):
         return []
@@ -109,5 +109,5 @@ def _inferred(lanes: Sequence[Lane], links: Sequence[LaneLink], names: Sequence[
         for link in links
         if link.source in place and link.target in place
     ]
-    _, streets = name_streets(part, within)
+    _, streets = name_streets(part, within, fewest)
     return [[rest[k].id for k in street.lanes if not rest[k].in_junction] for street in streets]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dorothie_gym.maps.import_notes import NoteKind
-from dorothie_gym.maps.model import Lane, LaneLink, LinkType
+from dorothie_gym.maps.model import NO_JUNCTION, Lane, LaneLink, LinkType
 from dorothie_gym.maps.opendrive.parse import refuse_empty
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support.portable_math import wrap_degrees
@@ -64,7 +64,8 @@ def runs_forward(road: RoadRecord, section: int, lane: int) -> bool:
 def build_topology(records: OpenDriveRecords) -> Topology:
     """Returns the lanes of a file and their links.
 
-    Links to missing lanes or against the traffic are errors of exporters: they are dropped with a note.
+    Links to missing lanes or against the traffic are errors of exporters: they are dropped with a note. So are paths
+    across junctions on which only lanes lead that are not for cars.
 
     Raises:
         TownError: the file has no driving lanes.
@@ -77,6 +78,7 @@ def build_topology(records: OpenDriveRecords) -> Topology:
                     graph.add(LanePiece(road.id, k, lane.id), section.end - section.start)
     for source, target in (*_lane_links(records, graph), *_connection_links(records, graph)):
         graph.link(source, target)
+    _drop_paths_of_others(records, graph)
     for piece in [p for p, length in graph.length.items() if length < JOINT_LENGTH]:
         graph.contract(piece)
     for piece in [p for p in graph.length if records.roads[p.road].sections[p.section].lanes[p.lane].is_closed]:
@@ -103,6 +105,7 @@ class _Graph:
         self.length: dict[LanePiece, float] = {}
         self.after: dict[LanePiece, dict[LanePiece, None]] = {}
         self.before: dict[LanePiece, dict[LanePiece, None]] = {}
+        self.after_others: dict[LanePiece, None] = {}  # pieces behind lanes that are not for cars
 
     def add(self, piece: LanePiece, length: float) -> None:
         self.length[piece] = length
@@ -209,13 +212,27 @@ def _joined(
             records.notes.dropped(NoteKind.LANE_LINK, where, reason)
             return
         pieces.append(LanePiece(touch.road, touch.section, number))
-    if any(piece not in graph.length for piece in pieces):
-        return
     leaves = [runs_forward(records.roads[t.road], t.section, number) != t.at_start for t, number in (a, b)]
+    driven = [piece in graph.length for piece in pieces]
+    if not all(driven):
+        if any(driven) and not leaves[driven.index(True)]:
+            graph.after_others[pieces[driven.index(True)]] = None
+        return
     if leaves[0] == leaves[1]:
         records.notes.dropped(NoteKind.LANE_LINK, where, "links lanes of opposite directions")
     else:
         yield (pieces[0], pieces[1]) if leaves[0] else (pieces[1], pieces[0])
+
+
+def _drop_paths_of_others(records: OpenDriveRecords, graph: _Graph) -> None:
+    """Drops lanes of junctions that no car enters, because only lanes for others, such as buses, lead on them."""
+    waiting = list(graph.after_others)
+    while waiting:
+        piece = waiting.pop()
+        if piece in graph.length and not graph.before[piece] and records.roads[piece.road].junction != NO_JUNCTION:
+            where = f"road {records.roads[piece.road].name} / laneSection {piece.section} / lane {piece.lane}"
+            records.notes.dropped(NoteKind.ACCESS, where, "begins behind a lane that is not for cars")
+            waiting += graph.remove(piece)[1]
 
 
 def _connection_links(records: OpenDriveRecords, graph: _Graph) -> Iterator[tuple[LanePiece, LanePiece]]:

@@ -28,6 +28,7 @@ from dorothie_gym.pictures.camera.session_camera import EarlierWorld, SessionCam
 from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes, solid_boxes
 from dorothie_gym.pictures.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.session.recording.events import EventType
+from dorothie_gym.session.recording.street_titles import recorded_labels
 from dorothie_gym.session.recording.surroundings import LIGHT_STATES, ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
@@ -103,7 +104,7 @@ class RecordedPictures:
         self._car_heights = self._find_car_heights()
         self._switches, self._faults = light_switches(session), _fault_switches(session)
         self._weathers: dict[bytes, Weather] = {}
-        names = session.header.street_names if len(session.header.street_names) == len(town.streets) else ()
+        names = recorded_labels(session.header) if len(session.header.street_names) == len(town.streets) else ()
         lots, landmarks = _placed_landmarks(session.header.landmarks, town, town_scene(town))
         self.camera = SessionCamera(SessionScene(lots, names, landmarks), config)
 

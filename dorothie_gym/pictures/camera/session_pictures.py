@@ -34,8 +34,7 @@ def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCa
 
 def scene_of(town: Town, scenario: Scenario) -> SessionScene:
     """Returns the scene of a session."""
-    names = [name.label for name in scenario.street_names]
-    return SessionScene(town_scene(town), names, scenario.storyboard.landmarks)
+    return SessionScene(town_scene(town), scenario.street_labels, scenario.storyboard.landmarks)
 
 
 def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: tuple[int, int]) -> SessionCamera:

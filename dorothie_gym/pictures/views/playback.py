@@ -24,6 +24,7 @@ from dorothie_gym.pictures.views.scene import (
     SubgoalState,
 )
 from dorothie_gym.session.recording.events import EventType
+from dorothie_gym.session.recording.street_titles import recorded_labels, recorded_titles
 from dorothie_gym.session.recording.surroundings import ActorKind
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.catalogue import map_labels
@@ -135,7 +136,7 @@ class Playback:
 
     def _street_names(self) -> list[str] | None:
         """Returns the recorded street names; None if they do not match the town."""
-        names = list(self._session.header.street_names)
+        names = recorded_labels(self._session.header)
         return names if len(names) == len(self._town.streets) else None
 
     def _car(self, frame: int) -> CarView:
@@ -225,12 +226,13 @@ def _waypoint(row: LandmarkRow, town: Town) -> tuple[float, float]:
 
 def _lines(session: Session) -> list[SpokenLine]:
     """Returns all utterances and messages in the order in which they were heard."""
+    titles = recorded_titles(session.header)
     lines = [
         SpokenLine(
             time=said.frame / FRAME_RATE,
             speaker=said.speaker,
-            text=said.text,
-            acts=" ".join(_short(move.act) for move in said.moves),
+            text=titles.shown(said.text),
+            acts=titles.shown(" ".join(_short(move.act) for move in said.moves)),
             start=said.start,
         )
         for said in session.utterances()

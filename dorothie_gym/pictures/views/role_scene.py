@@ -26,6 +26,7 @@ from dorothie_gym.pictures.views.scene import (
     SpokenLine,
     SubgoalState,
 )
+from dorothie_gym.policies.observation_parser import titles_of
 from dorothie_gym.session.spaces.observations import (
     GuessColumn,
     LandmarkColumn,
@@ -40,6 +41,7 @@ from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.tasks.catalogue import map_label, map_labels
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.street_titles import StreetTitles
     from dorothie_gym.maps.town import Town
 
 _KINDS: dict[ObjectClass, FigureKind] = {ObjectClass.VEHICLES: "vehicle", ObjectClass.PEDESTRIAN: "pedestrian"}
@@ -77,8 +79,9 @@ class RoleView:
         time = float(seen["time"][0])
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
             if text := seen.get(f"{speaker}_text", ""):
-                acts = heard_acts(seen, speaker) or ()
-                self.add(SpokenLine(time=time, speaker=speaker, text=text, acts=" ".join(_short(act) for act in acts)))
+                acts, titles = " ".join(_short(act) for act in heard_acts(seen, speaker) or ()), self._titles(seen)
+                line = SpokenLine(time=time, speaker=speaker, text=titles.shown(text), acts=titles.shown(acts))
+                self.add(line)
         if message := seen.get("message", ""):
             self.add(SpokenLine(time=time, speaker=Role.AD_WIZARD, text=message))
         if "tasks" in seen:
@@ -114,7 +117,7 @@ class RoleView:
             time=float(seen["time"][0]),
             town=self._town,
             car=CarView(x=x, y=y, heading=heading, speed=float(seen["speed"][0]), lights=bool(seen.get("lights", 0))),
-            street_names=[StreetName(int(k)).label for k in seen["street_names"][: len(self._town.streets)]],
+            street_names=self._titles(seen).labels([name.label for name in self._names(seen)]),
             trail=np.array(self._trail),
             waypoints=waypoints[waypoints.any(axis=1)],
             others=[*self._objects(seen), *_props(seen)],
@@ -126,6 +129,12 @@ class RoleView:
             estimates=estimates,
             caption=_caption(self.role, seen),
         )
+
+    def _names(self, seen: ObservationMapping) -> list[StreetName]:
+        return [StreetName(int(k)) for k in seen["street_names"][: len(self._town.streets)]]
+
+    def _titles(self, seen: ObservationMapping) -> StreetTitles:
+        return titles_of(seen, self._town)
 
     def _subgoals(self, seen: ObservationMapping) -> list[tuple[int, str, SubgoalState]]:
         """Returns landmark, description and state of the subgoals that the role observes."""

@@ -35,12 +35,12 @@ def utterances_of(session: LiveSession) -> list[SpokenLine]:
 
 
 def _line(utterance: Utterance, session: LiveSession) -> SpokenLine:
-    rate = session.config.decision_frequency
+    rate, titles = session.config.decision_frequency, session.scenario.titles
     return SpokenLine(
         time=math.ceil(utterance.end * rate - 1e-6) / rate,  # the decision at which it is delivered
         speaker=utterance.speaker,
-        text=utterance.text,
-        acts=" ".join(str(act).removesuffix("()") for act in utterance.acts),
+        text=titles.shown(utterance.text),
+        acts=titles.shown(" ".join(str(act).removesuffix("()") for act in utterance.acts)),
         start=utterance.start,
     )
 
@@ -81,7 +81,7 @@ def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine
             speed=float(car.speed),
             lights=world.ego.lights,
         ),
-        street_names=[name.label for name in session.scenario.street_names],
+        street_names=session.scenario.street_labels,
         trail=np.array(session.trail),
         waypoints=np.array([planner.path.position_at(float(s)) for s in stations]).reshape(-1, 2),
         others=others,

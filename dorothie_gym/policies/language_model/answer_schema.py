@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
 from dorothie_gym.errors import InputFileError, short_repr
 from dorothie_gym.policies.language_model.faults import CallError, Fault
 from dorothie_gym.session.spaces.fields import plain_text
@@ -36,17 +37,19 @@ class ChoiceField:
         labels: what it may be.
         meaning: meaning of the field.
         listed: where the labels of the moment are found, such as in the page; empty if they are always the same.
+        values: value of each label, which an answer may have in its place; empty if each label is its value.
     """
 
     name: str
     labels: tuple[str, ...]
     meaning: str
     listed: str = ""
+    values: tuple[str, ...] = ()
 
     @property
     def default(self) -> str:
         """Value of an answer that leaves the field out."""
-        return self.labels[0]
+        return (self.values or self.labels)[0]
 
     def schema(self) -> dict[str, Any]:
         """Returns the JSON schema of the field."""
@@ -63,6 +66,8 @@ class ChoiceField:
         if value is None:
             return self.default
         if isinstance(value, str) and value in self.labels:
+            return self.values[self.labels.index(value)] if self.values else value
+        if isinstance(value, str) and value in self.values:
             return value
         shown = ", ".join(map(json.dumps, self.labels[:40]))
         raise CallError(Fault.WRONG_SCHEMA, f"{self.name} is {short_repr(value)}; it must be one of {shown}")
@@ -70,11 +75,19 @@ class ChoiceField:
 
 @dataclass(frozen=True, kw_only=True)
 class WordsField:
-    """Field of free words; longer texts are cut after a whole word, or within a word that is longer than the field."""
+    """Field of free words; longer texts are cut after a whole word, or within a word that is longer than the field.
+
+    Attributes:
+        name: name of the field.
+        length: largest length [characters].
+        meaning: meaning of the field.
+        titles: names of the map for the streets, which become those of the session.
+    """
 
     name: str
     length: int
     meaning: str
+    titles: StreetTitles = NO_TITLES
 
     @property
     def default(self) -> str:
@@ -95,7 +108,7 @@ class WordsField:
             return ""
         if not isinstance(value, str):
             raise CallError(Fault.WRONG_SCHEMA, f"{self.name} is {short_repr(value)}; it must be a text")
-        words = " ".join(plain_text(" ".join(value.split()), MAX_ANSWER).split())
+        words = " ".join(plain_text(self.titles.heard(" ".join(value.split())), MAX_ANSWER).split())
         if len(words) <= self.length:
             return words
         whole = words[: self.length + 1].rpartition(" ")[0]
@@ -111,6 +124,10 @@ class AnswerSchema:
 
     name: str
     fields: tuple[AnswerField, ...]
+
+    def titled(self, titles: StreetTitles) -> AnswerSchema:
+        """Returns the schema with the names of the map for the streets in its labels; `read` takes these names too."""
+        return replace(self, fields=tuple(_titled(field, titles) for field in self.fields)) if titles else self
 
     def json_schema(self, *, shared: bool = False) -> dict[str, Any]:
         """Returns the JSON schema of an answer, which requires every field.
@@ -155,6 +172,13 @@ class AnswerSchema:
         if not answer:
             raise CallError(Fault.WRONG_SCHEMA, f"the object is empty; the fields are {', '.join(names)}")
         return {field.name: field.read(answer.get(field.name)) for field in self.fields}
+
+
+def _titled(field: AnswerField, titles: StreetTitles) -> AnswerField:
+    if isinstance(field, WordsField):
+        return replace(field, titles=titles)
+    labels = tuple(titles.shown(label) for label in field.labels)
+    return field if labels == field.labels else replace(field, labels=labels, values=field.labels)
 
 
 def distinct(labels: Sequence[str]) -> tuple[str, ...]:

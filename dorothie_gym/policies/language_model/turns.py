@@ -17,7 +17,7 @@ from dorothie_gym.policies.language_model.co_wizard import CoWizardInterface
 from dorothie_gym.policies.language_model.config import QUIET_TIME, check_quiet_time
 from dorothie_gym.policies.language_model.participant import ParticipantInterface
 from dorothie_gym.policies.language_model.role_interface import Memory, RoleInterface
-from dorothie_gym.policies.observation_parser import scalar
+from dorothie_gym.policies.observation_parser import scalar, titles_of
 from dorothie_gym.policies.policy import replace
 
 if TYPE_CHECKING:
@@ -114,9 +114,14 @@ class RoleTurns:
         return now >= min(state.asked_at + self._interface.patience * self._quiet_time, state.memory.again_at)
 
     def page(self, observation: ObservationMapping, state: TurnState) -> tuple[str, AnswerSchema]:
-        """Returns the page of a turn, and the schema of its answer."""
+        """Returns the page of a turn, and the schema of its answer.
+
+        Both have the names that the map has for its streets; answers are read with those of the session.
+        """
         beginning = "The session begins." if state.asked_at is None else "Nothing new."
-        return self._interface.prompt(observation, state.memory, state.events or (beginning,))
+        text, schema = self._interface.prompt(observation, state.memory, state.events or (beginning,))
+        titles = titles_of(observation, state.memory.town)
+        return titles.shown(text), schema.titled(titles)
 
     def answered(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.lab.console.config import AbsenceRules, ConsoleConfig
 from dorothie_gym.lab.console.connection import CloseCode, Connection
@@ -13,6 +13,9 @@ from dorothie_gym.lab.console.messages import decode_message
 from dorothie_gym.lab.console.room import Room
 from dorothie_gym.lab.console.seating import parse_roles
 from dorothie_gym.session.session_engine import SessionEngine
+
+if TYPE_CHECKING:
+    from dorothie_gym.maps import Town
 
 TOWN, SEED = "brookside", 7
 
@@ -89,9 +92,10 @@ class Table:
         pictures: bool = False,
         seed: int = SEED,
         storyboard: str | None = None,
+        town: Town | str = TOWN,
     ) -> None:
         config = ConsoleConfig(max_seconds=max_seconds, pictures=pictures, absence=absence or AbsenceRules())
-        engine = SessionEngine(TOWN, storyboard, config=config.environment())
+        engine = SessionEngine(town, storyboard, config=config.environment())
         self.room = Room(engine, parse_roles(roles), config, seed=seed, folder=folder)
         self.people: list[Person] = []
         self.now = 0.0

@@ -17,7 +17,7 @@ from dorothie_gym.session.spaces import LandmarkColumn
 from dorothie_gym.tasks import template_names
 from tests.lab.console.people import Person, Table
 
-STREETS = [StreetName(k) for k in range(1, 9)]
+STREETS = [StreetName(k).label for k in range(1, 9)]
 
 
 def rows(role: Role, table: Table) -> list[list[Any]]:
@@ -37,7 +37,7 @@ def house(street: int) -> Pin:
 
 
 def test_houses_are_named_by_their_street_and_numbered_only_where_that_is_not_enough() -> None:
-    first, second = STREETS[0].label, STREETS[1].label
+    first, second = STREETS[0], STREETS[1]
     assert names(house(0), house(1)) == [f"House, {first}", f"House, {second}"]
     assert names(house(0), house(1), house(0)) == [f"House 1, {first}", f"House, {second}", f"House 2, {first}"]
     assert names(house(-1), house(-1)) == ["House 1", "House 2"]

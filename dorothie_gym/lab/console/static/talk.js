@@ -136,12 +136,15 @@ export class Talk {
 
   // --- chips --------------------------------------------------------------------------------------------------------
 
+  /** Returns a value in words; streets that the map names have this name. */
+  name(value) { return this.link.hello.titles?.[value] ?? words(value); }
+
   chip(span, correct) {
-    const values = Object.values(span.slots).flat();
-    const text = [h('b', { text: span.move }), values.length ? ` ${values.map(words).join(', ')}` : ''];
+    const values = Object.values(span.slots).flat().map(value => this.name(value));
+    const text = [h('b', { text: span.move }), values.length ? ` ${values.join(', ')}` : ''];
     if (!correct) return h('span', { class: 'chip', title: span.text }, ...text);
     const chip = h('button', { type: 'button', class: `chip ${span.corrected ? 'corrected' : ''}`, title: `“${span.text}”: press to correct`, 'aria-haspopup': 'dialog',
-      'aria-label': `${span.move} ${values.map(words).join(', ')}: correct the act of “${span.text}”`, onclick: () => this.choose(chip, span, correct) }, ...text);
+      'aria-label': `${span.move} ${values.join(', ')}: correct the act of “${span.text}”`, onclick: () => this.choose(chip, span, correct) }, ...text);
     return chip;
   }
 
@@ -154,7 +157,7 @@ export class Talk {
         event.currentTarget.setAttribute('aria-pressed', String(kept));
         slots[slot] = kept ? [...slots[slot], value] : slots[slot].filter(other => other !== value);
         if (!slots[slot].length) delete slots[slot];
-      } }, `${slot}: ${words(value)}`)));
+      } }, `${slot}: ${this.name(value)}`)));
     popover(`Act of “${span.text}”`, close => [
       h('p', { class: 'quoted', text: `“${span.text}”` }),
       values.length ? h('div', { class: 'chips', role: 'group', 'aria-label': 'Values' }, values) : null,
