@@ -28,15 +28,26 @@ ROOT = Path(__file__).parents[2]
 QUICK = ("towns/brookside", "imported_maps/curved.xodr", "sessions/brookside text 0", "error_lines/unknown [st]*")
 
 BATCHES: dict[str, tuple[str, ...]] = {
-    **{f"sessions in {name}": (f"sessions/{name} *",) for name in town_names()},
-    "towns and console": ("towns/*", "imported_maps/*", "console/*", "role_exports/*"),
-    "environments": ("navigation_episodes/*", "batches/*", "environments/*", "camera_observation/*"),
-    "shipped models": ("shipped_models/*",),
-    "leaderboard": ("leaderboard/*",),
-    "predictions": ("predictions/*",),
+    "sessions in brookside and millbrook": ("sessions/brookside *", "sessions/millbrook *"),
+    **{
+        f"sessions in {name}": (f"sessions/{name} *",)
+        for name in town_names()
+        if name not in ("brookside", "millbrook")
+    },
+    "towns, console and environments": (
+        "towns/*",
+        "imported_maps/*",
+        "console/*",
+        "role_exports/*",
+        "navigation_episodes/*",
+        "batches/*",
+        "environments/*",
+        "camera_observation/*",
+    ),
+    "models, predictions and leaderboard": ("shipped_models/*", "predictions/*", "leaderboard/*"),
     "texts of the command line": ("help_texts/*", "error_lines/*"),
 }
-"""Parts that are computed together in one process, of at most a minute on one core."""
+"""Parts that are computed together in one process, which takes seconds to start, of at most a minute on one core."""
 
 SHARED = ("shared_maps/*",)
 
