@@ -11,7 +11,8 @@ import hashlib
 import numpy as np
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 for guidance in ("turns", "goals"):
-    env, rng = NavigationEnv(guidance=guidance, exceptions=4.0), np.random.default_rng(0)
+    env = NavigationEnv("brookside", guidance=guidance, exceptions=4.0)
+    rng = np.random.default_rng(0)
     observation, info = env.reset(seed=3)
     digest = hashlib.sha256()
     for _ in range(8):
