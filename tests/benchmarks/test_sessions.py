@@ -45,7 +45,7 @@ def test_parts_of_a_session_add_up() -> None:
         assert any(part.startswith(f"{role}: ") for part in found["parts"]), role
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_figures_of_this_build_are_consistent() -> None:
     figures = measure(["brookside"], co_wizards=["scripted"], sessions=1, max_seconds=30.0, repeats=1)
     assert json.loads(json.dumps(figures)) == figures
