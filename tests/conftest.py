@@ -76,6 +76,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Points the package's cache at a folder of this run, which the parallel workers share."""
     if not hasattr(config, "workerinput"):
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each of some hundred processes would compile the sources anew
         config.stash[_FOLDER] = tempfile.TemporaryDirectory(prefix="dorothie_gym-")
         folder = compiled_folder()
         if folder is not None:
@@ -97,8 +98,12 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts tests first that need little compilation: they run while the rest is compiled."""
-    items.sort(key=_stage)
+    """Puts tests first that need little compilation: they run while the rest is compiled.
+
+    Of those that need equally much, files with long tests come first, so that no worker waits for a long last test.
+    """
+    long = {item.path for item in items if item.get_closest_marker("long")}
+    items.sort(key=lambda item: (_stage(item), item.path not in long))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -16,7 +16,7 @@ from dorothie_gym.errors import SettingsError
 KEYS = ("batch", "kernel", "single", "end_to_end", "stock")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_speeds_and_shares_of_a_training_on_a_batch() -> None:
     figures = measure(environments=4, steps=512)
     assert set(figures["shares"]) == set(SHARES)

@@ -76,7 +76,7 @@ if warned:
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_prop(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 

@@ -60,7 +60,7 @@ assert engine.info(Role.CO_WIZARD, terms[Role.CO_WIZARD])["reward_terms"]["light
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_following_the_page_adds_a_reward_term(tmp_path: Path) -> None:
     follow(WorkingCopy(tmp_path), EDITS, PROBE)
 

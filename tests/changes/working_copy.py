@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "changes.md"
-IGNORED = shutil.ignore_patterns("__pycache__", "pretrained")
+IGNORED = shutil.ignore_patterns("pretrained", "*.pyc.*")  # byte code is copied, but what is being written now
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class WorkingCopy:
             code: Python source.
             compiled: whether compiled functions are compiled, or run as Python.
         """
-        variables = {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
+        variables = {**os.environ, "PYTHONPATH": str(self.folder)}
         if not compiled:
             variables["NUMBA_DISABLE_JIT"] = "1"
         return subprocess.run(

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import io
 import itertools
-import json
 import os
 import subprocess
 import sys
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import guess_spans
 from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans
-from dorothie_gym.dialogue.span_features import masked_words, span_features
-from dorothie_gym.dialogue.span_inputs import MARKS, SpanFeatures
+from dorothie_gym.dialogue.span_features import masked_words
+from dorothie_gym.dialogue.span_inputs import MARKS
 from dorothie_gym.dialogue.span_tagger import (
     DILATIONS,
     WEIGHTS_FILE,
@@ -27,33 +25,8 @@ from dorothie_gym.dialogue.span_tagger import (
     word_row,
 )
 from dorothie_gym.ontology import DialogueMove
-from tests.portability.test_equal_results import SETTINGS
-
-PEOPLE = Path(__file__).parents[2] / "benchmarks" / "people" / "sentences.jsonl"
-SAID = [
-    "Turn left.",
-    "it's so dark out here put your lights on would you",
-    "no not that one the next one",
-    "we take the second right and then my house is by the pond",
-    "well hello there, could you run me over to the Burger King?",
-    "hm",
-    "\u2014 \u2026 ?",
-    "I said Hubbard, not Beal!",
-]
-
-
-def features_of(text: str, after: DialogueMove | None = None) -> SpanFeatures:
-    return span_features(rule_spans(text, after))
-
-
-def sentences(number: int) -> list[tuple[str, list[str]]]:
-    """Returns sentences of the development half with their moves."""
-    rows = [json.loads(line) for line in PEOPLE.read_text(encoding="utf-8").splitlines()]
-    return [
-        (row["text"], [act["move"] for act in row["acts"]])
-        for row in rows
-        if row["split"] == "dev" and not row["before"]
-    ][:number]
+from tests.dialogue.tagged_sentences import PEOPLE, SAID, features_of, fingerprint, sentences
+from tests.portability.processors import SETTINGS, TOGETHER
 
 
 def scores_of(tagger: SpanTagger, inputs: np.ndarray) -> np.ndarray:
@@ -152,17 +125,10 @@ def test_weights_are_small_whole_numbers_without_pickles() -> None:
     assert largest * 4096 < 2**31
 
 
-def fingerprint() -> str:
-    """Returns the scores of sentences as text."""
-    tagger = load_tagger()
-    texts = [text for text, _ in sentences(120)] + SAID
-    return json.dumps([tagger.tag(features_of(text)) for text in texts])
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", [*TOGETHER, "machine code for any processor"])
 def test_scores_are_equal_on_other_processors(name: str) -> None:
-    command = [sys.executable, "-c", "from tests.dialogue import test_span_tagger as t; print(t.fingerprint())"]
+    command = [sys.executable, "-c", "from tests.dialogue.tagged_sentences import fingerprint; print(fingerprint())"]
     environment = {**os.environ, **SETTINGS[name], "PYTHONPATH": str(PEOPLE.parents[2])}
     done = subprocess.run(command, env=environment, cwd=PEOPLE.parents[2], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]

@@ -10,25 +10,32 @@ import numpy as np
 import pytest
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.wrappers.record_session import RecordSession
 from tests.envs.sessions_played import digest, play_at_random, play_by_script
 
 ROOT = Path(__file__).parents[2]
 
 CODE = """
 import sys
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.wrappers.record_session import RecordSession
-from tests.envs.sessions_played import digest, play_at_random, play_by_script
+from pathlib import Path
+from tests.envs.test_determinism import recorded
 
-env = RecordSession(DuoWizardEnv("brookside", max_cycles=40), sys.argv[1])
-for k, play in enumerate((play_at_random, play_by_script)):
-    for moment in play(env, seed=11 + k, decisions=40):
-        print(digest(moment))
+print(*recorded(Path(sys.argv[1])))
 """
 
 
-def play_in_a_process(folder: Path, hash_seed: str) -> list[str]:
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": hash_seed}
+def recorded(folder: Path) -> list[str]:
+    """Records two sessions; returns digests of all that is observed and done."""
+    env = RecordSession(DuoWizardEnv("brookside", max_cycles=40), folder)
+    return [
+        digest(moment)
+        for k, play in enumerate((play_at_random, play_by_script))
+        for moment in play(env, seed=11 + k, decisions=40)
+    ]
+
+
+def recorded_in_a_process(folder: Path) -> list[str]:
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "1"}
     done = subprocess.run(
         [sys.executable, "-c", CODE, str(folder)], env=variables, capture_output=True, text=True, check=True
     )
@@ -37,8 +44,8 @@ def play_in_a_process(folder: Path, hash_seed: str) -> list[str]:
 
 @pytest.mark.long
 def test_two_processes_observe_and_record_the_same(tmp_path: Path) -> None:
-    one = play_in_a_process(tmp_path / "one", "1")
-    other = play_in_a_process(tmp_path / "other", "2")
+    one = recorded(tmp_path / "one")
+    other = recorded_in_a_process(tmp_path / "other")
     assert len(one) == 2 * 41
     assert one == other
     files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file())

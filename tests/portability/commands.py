@@ -8,6 +8,7 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import chdir
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,14 @@ def leaderboard(part: str) -> Values:
 # --- Predictions ------------------------------------------------------------------------------------------------------
 
 
+@cache
+def _corpus() -> tuple[Path, tempfile.TemporaryDirectory[str]]:
+    """A small corpus, in a folder that is there until the end of the process."""
+    folder = tempfile.TemporaryDirectory()
+    generate_corpus(Path(folder.name), sessions=8, seed=5, config=EnvConfig(max_seconds=90.0))
+    return Path(folder.name), folder
+
+
 @group(*MODELS)
 def predictions(name: str) -> Values:
     """File with the predictions of a shipped model for a small corpus.
@@ -117,9 +126,8 @@ def predictions(name: str) -> Values:
     # imported here: torch is slow to import, and not needed for texts
     from tests.portability.predicted import predicted_file
 
+    corpus, _ = _corpus()
     with tempfile.TemporaryDirectory() as folder:
-        corpus = Path(folder) / "corpus"
-        generate_corpus(corpus, sessions=8, seed=5, config=EnvConfig(max_seconds=90.0))
         table = pq.read_table(predicted_file(name, corpus, Path(folder) / "predictions.parquet"))
         yield "columns", [(field.name, str(field.type)) for field in table.schema]
         yield "about", without_versions(json.loads(table.schema.metadata[b"dorothie_gym.about"]), "version")

@@ -9,13 +9,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy._core._multiarray_umath as numpy_features  # not public: numpy has no other list of its routines
 import pytest
 
 from dorothie_gym.support.compilation import compiled_folder
 from dorothie_gym.support.user_cache import CACHE_VARIABLE
 from tests.portability.digests import frozen
 from tests.portability.parts import part_names
+from tests.portability.processors import SETTINGS, TOGETHER
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,21 +25,6 @@ PARTS = (
     "environments/*", "role_exports/*", "shipped_models/* 0",
 )  # fmt: skip
 """Parts of every kind."""
-
-SIMD = [name for name in numpy_features.__cpu_dispatch__ if numpy_features.__cpu_features__[name]]
-"""Vector routines of numpy above its baseline that this processor has."""
-
-SETTINGS: dict[str, dict[str, str]] = {
-    "without AVX-512": {
-        "NPY_DISABLE_CPU_FEATURES": " ".join(name for name in SIMD if "512" in name or name == "X86_V4")
-    },
-    "numpy's baseline": {"NPY_DISABLE_CPU_FEATURES": " ".join(SIMD)},
-    "machine code for any processor": {"NUMBA_CPU_NAME": "generic"},
-    "C library and BLAS without FMA": {
-        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable",
-        "OPENBLAS_CORETYPE": "Prescott",
-    },
-}
 
 
 def digests(cache: Path, **variables: str) -> dict[str, dict[str, str]]:
@@ -59,7 +44,7 @@ def digests(cache: Path, **variables: str) -> dict[str, dict[str, str]]:
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings name abilities of x86-64")
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.slow) if "NUMBA_CPU_NAME" in SETTINGS[name] else name for name in SETTINGS],
+    [name if name in TOGETHER else pytest.param(name, marks=pytest.mark.slow) for name in SETTINGS],
 )
 def test_all_sessions_are_equal(name: str, tmp_path: Path) -> None:
     kept = frozen()["parts"]

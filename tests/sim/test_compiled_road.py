@@ -2,9 +2,6 @@ from __future__ import annotations
 
 import copy
 import math
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -21,6 +18,7 @@ from dorothie_gym.sim.road import CompiledRoad, TownRoad
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
+from tests.plain_python import printed_compiled_and_plain
 from tests.sim.network.towns import find_town, lane, straight_town, town
 
 DT = 1.0 / 15.0
@@ -227,10 +225,5 @@ print(hashlib.sha256(arrays.tobytes()).hexdigest())
 
 @pytest.mark.long
 def test_a_world_with_a_guest_is_the_same_bytes_compiled_and_in_plain_python() -> None:
-    told = []
-    for disabled in ("0", "1"):
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
-        run = subprocess.run([sys.executable, "-c", TWO_SECONDS], env=environment, capture_output=True, text=True)
-        assert run.returncode == 0, run.stderr
-        told.append(run.stdout)
-    assert told[0] == told[1] != ""
+    compiled, plain = printed_compiled_and_plain(TWO_SECONDS)
+    assert compiled == plain != ""

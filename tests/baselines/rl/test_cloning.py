@@ -1,8 +1,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,20 +23,19 @@ NAVIGATION = "dorothie_gym/Navigation-v0"
 SMALL = {"n_steps": 16, "batch_size": 32, "n_epochs": 1}
 
 
-@pytest.fixture(scope="module")
-def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Twenty-eight sessions of the scripted roles, two of them held out."""
-    root = tmp_path_factory.mktemp("corpus")
+def record(root: Path, *, training: int, held_out: int) -> Path:
+    """Records sessions of the scripted roles in two folds; returns the folder of the corpus."""
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=300.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
-    for seed in range(28):
-        fold = "train" if seed < 26 else "val/seen"
-        play_session(env, policies, seed=seed + 8, folder=root / fold / f"{seed:04}")
+    for number in range(training + held_out):
+        fold = "train" if number < training else "val/seen"
+        play_session(env, policies, seed=number + 8, folder=root / fold / f"{number:04}")
     return root
 
 
 @pytest.mark.slow
-def test_cloning_generalises_to_held_out_sessions(corpus: Path) -> None:
+def test_cloning_generalises_to_held_out_sessions(tmp_path: Path) -> None:
+    corpus = record(tmp_path / "corpus", training=26, held_out=2)
     training, held_out = read_demonstrations(corpus, "train"), read_demonstrations(corpus, "val")
     assert training.observations.shape == (len(training), 161) and training.masks.shape == (len(training), 18)
     settings = tuned_settings("maskable_ppo", NAVIGATION, parameters=SMALL | {"batch_size": 16})
@@ -49,10 +46,8 @@ def test_cloning_generalises_to_held_out_sessions(corpus: Path) -> None:
 
 
 @pytest.mark.long
-def test_warm_start_is_evaluated_before_training(corpus: Path, tmp_path: Path) -> None:
-    small = tmp_path / "corpus"
-    for session in ("train/0000", "val/seen/0026"):
-        shutil.copytree(corpus / session, small / session)
+def test_warm_start_is_evaluated_before_training(tmp_path: Path) -> None:
+    small = record(tmp_path / "corpus", training=1, held_out=1)
     settings = TrainingSettings(
         algorithm="ppo", env=NAVIGATION, steps=32, environments=2, evaluate_every=32, episodes=1, network=(8,),
         parameters=SMALL, env_settings={"max_seconds": 10.0, "traffic": "none"}, warm_start=str(small),

@@ -30,10 +30,10 @@ SMALL = FrameSampling(width=96, height=64, spacing=6.0, wait=3.0, most=5)
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two sessions of 15 seconds in the training fold."""
+    """Two sessions of 15 seconds in the training fold, in one town: the scene of another takes seconds to build."""
     made, folder = tmp_path_factory.mktemp("made"), tmp_path_factory.mktemp("corpus")
     config = EnvConfig(max_seconds=15.0, world=WorldConfig(vehicles=40, pedestrians=40))
-    generate_corpus(made, sessions=2, seed=6, config=config)
+    generate_corpus(made, sessions=2, seed=6, towns=("brookside",), config=config)
     for place, session in enumerate(sorted(made.rglob("session.json"))):
         shutil.copytree(session.parent, folder / "train" / f"{place}")
     return folder

@@ -40,9 +40,8 @@ from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.sim.state.town_arrays import town_arrays
 
-TOWNS = [
-    name if name in ("brookside", "midtown") else pytest.param(name, marks=pytest.mark.long) for name in town_names()
-]
+MARKS = {"brookside": (), "midtown": (), "northgate": pytest.mark.slow}  # the largest
+TOWNS = [pytest.param(name, marks=MARKS.get(name, pytest.mark.long)) for name in town_names()]
 
 
 @cache
@@ -158,7 +157,7 @@ def test_each_light_of_the_map_has_three_lenses_with_its_signal(name: str) -> No
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["midtown", "northgate"])
+@pytest.mark.parametrize("name", ["midtown", pytest.param("northgate", marks=pytest.mark.slow)])
 def test_the_first_car_in_a_queue_sees_its_light(name: str) -> None:
     """Most lanes that go straight on have a light in view from their stop line, which shows their signal."""
     layers, scenery = layers_of(name), scenery_of(name)
@@ -338,7 +337,7 @@ def test_rails_stand_where_the_ground_beside_a_road_is_much_lower() -> None:
     assert set(mesh.classes.tolist()) == {ObjectClass.GUARD_RAIL.value}
 
 
-@pytest.mark.parametrize("name", [*TOWNS, pytest.param("generated:5", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", [*TOWNS, pytest.param("generated:5", marks=pytest.mark.slow)])
 def test_two_houses_near_each_other_differ_in_two_of_colour_storeys_roof_and_garden(name: str) -> None:
     looks = [(house_look(row.tone), row) for row in buildings_of(name) if row.style is Style.HOUSE]
     described = [(look.wall, row.storeys, (look.roof, look.tiles), look.garden) for look, row in looks]

@@ -90,7 +90,7 @@ def seen_from(camera: SessionCamera, lane: Lane, station: float) -> CameraFrame:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["midtown", "generated:3"])
+@pytest.mark.parametrize("name", ["midtown", pytest.param("generated:3", marks=pytest.mark.slow)])
 def test_names_of_crossing_streets_are_legible_50_metres_before_the_line(name: str) -> None:
     town, camera = camera_in(name)
     stops, read = stop_stations(town), []
@@ -104,7 +104,7 @@ def test_names_of_crossing_streets_are_legible_50_metres_before_the_line(name: s
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["midtown", "generated:3"])
+@pytest.mark.parametrize("name", ["midtown", pytest.param("generated:3", marks=pytest.mark.slow)])
 def test_the_name_of_the_own_street_is_legible_20_metres_after_a_junction(name: str) -> None:
     town, camera = camera_in(name)
     read = []

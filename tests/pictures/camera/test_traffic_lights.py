@@ -106,7 +106,7 @@ def lanes_that_see_too_little(stage: Stage) -> Iterator[tuple[int, int, str, int
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["midtown", "generated:2"])
+@pytest.mark.parametrize("name", ["midtown", pytest.param("generated:2", marks=pytest.mark.slow)])
 def test_each_lane_sees_its_own_light_from_its_stop_line(name: str) -> None:
     stage = stage_of(name)
     assert len(stage.signals) > 20

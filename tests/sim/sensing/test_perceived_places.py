@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
+
+from tests.plain_python import printed_compiled_and_plain
 
 SENSES = """
 import hashlib
@@ -33,16 +30,7 @@ print(digest.hexdigest())
 """
 
 
-def run(disabled: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
-    root = Path(__file__).resolve().parents[3]
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-c", SENSES], env=environment, capture_output=True, text=True, cwd=root
-    )
-
-
 @pytest.mark.long
 def test_senses_are_the_same_bytes_compiled_and_in_plain_python() -> None:
-    compiled, plain = run("0"), run("1")
-    assert compiled.returncode == plain.returncode == 0, compiled.stderr + plain.stderr
-    assert compiled.stdout == plain.stdout
+    compiled, plain = printed_compiled_and_plain(SENSES)
+    assert compiled == plain != ""

@@ -100,7 +100,7 @@ def test_materials_around_a_point_are_those_of_the_corners(seed: int, count: int
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["brookside", "midtown", "Town01", "Town05"])
+@pytest.mark.parametrize("name", ["brookside", "midtown", "Town01", pytest.param("Town05", marks=pytest.mark.slow)])
 def test_ground_of_a_town_is_what_its_map_shows(name: str) -> None:
     town = load_town(name if name in town_names() else str(shared_map(name)))
     sheets = town_sheets(town)

@@ -77,7 +77,7 @@ def test_road_is_as_high_as_its_lanes(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*TOWNS, "northgate"])
+@pytest.mark.parametrize("name", [*TOWNS, pytest.param("northgate", marks=pytest.mark.slow)])
 def test_nothing_stands_in_the_way_of_a_car(name: str) -> None:
     places, headings = lane_points(town_of(name), 3000)
     eyes = places + [0.0, 0.0, 0.9]
