@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dorothie_gym.evaluation.closed_loop.running import RolloutPlan
-    from dorothie_gym.evaluation.tiers import Tier
+    from dorothie_gym.session.config import EnvConfig
     from dorothie_gym.session.scenario import ReferenceDrive
 
 
@@ -70,6 +70,7 @@ def reference_times(
                 seed=(seed or 0) if drawn is None else drawn.seed,
                 trials=trials,
             ).plans()
+            config = found.config if drawn is None else closed_loop.sealed_config(found.config)
         except ValueError as error:
             fail(str(error))
         known = rollouts.read_drives(out) if out.is_file() else {}
@@ -77,7 +78,7 @@ def reference_times(
         drives = dict(known)
         try:
             compile_first()
-            _measure(out, drives, plans, found, workers, quiet=as_json)
+            _measure(out, drives, plans, config, workers, quiet=as_json)
         except KeyboardInterrupt:
             exit_interrupted(f"Interrupted with {len(drives)} references in {out}; the same command measures the rest.")
     added = len(drives) - len(known)
@@ -91,7 +92,7 @@ def _measure(
     out: Path,
     drives: dict[str, ReferenceDrive],
     plans: Sequence[RolloutPlan],
-    tier: Tier,
+    config: EnvConfig,
     workers: int | None,
     *,
     quiet: bool,
@@ -100,7 +101,7 @@ def _measure(
     tasks = list(dict.fromkeys((plan.town, plan.seed) for plan in plans))
     with session_progress(quiet=quiet) as on_session:
         on_session(0, len(tasks))
-        measured = rollouts.measure_drives(tasks, tier.config.stops, drives, workers=workers or available_processors())
+        measured = rollouts.measure_drives(tasks, config, drives, workers=workers or available_processors())
         for number, (key, drive) in enumerate(measured, start=1):
             drives[key] = drive
             rollouts.write_drives(out, drives)

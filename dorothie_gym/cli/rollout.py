@@ -160,7 +160,7 @@ def rollout(
                 towns=_towns(towns, found) if drawn is None else drawn.towns,
                 sessions=sessions,
                 seed=(seed or 0) if drawn is None else drawn.seed,
-                config=config,
+                config=config if drawn is None else closed_loop.sealed_config(config),
                 pool=find_pool(pool, cast[Role.PARTICIPANT], asked),
                 trials=trials,
                 tier=tier,

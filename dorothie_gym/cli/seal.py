@@ -104,7 +104,7 @@ def seal(
                 cast=cast,
                 towns=found.towns,
                 sessions=closed_loop.usual_sessions(trials) if sessions is None else sessions,
-                config=env_config(None, None, pictures=llm_pictures, usual=found.config),
+                config=closed_loop.sealed_config(env_config(None, None, pictures=llm_pictures, usual=found.config)),
                 pool=find_pool(found.participants, cast[Role.PARTICIPANT], asked),
                 trials=trials,
                 tier=found.name,

@@ -16,6 +16,7 @@ from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.sim.config import AutomaticBraking, WorldConfig
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.briefs import TalkFamily
+from dorothie_gym.tasks.generated_storyboards import StoryboardSource
 
 HELD_OUT_PERSONAS: Final = ("scripted:talkativeness=0.8..1", "scripted:certainty=0..0.2")
 """Participants with traits that no learned role has met in training (`learned_role.dagger_sessions.TRAINED`)."""
@@ -34,7 +35,7 @@ class Tier:
 
     Attributes:
         name: name of the tier.
-        config: settings of the sessions: acts, words, channel, time, stops, traffic and braking.
+        config: settings of the sessions: acts, words, channel, time, storyboards, stops, traffic and braking.
         participants: players of the participant, who take turns, as for `policy_loader.find_player`.
         ad_wizard: player of the Ad-Wizard.
         towns: towns, which take turns.
@@ -111,6 +112,7 @@ STRANGERS: Final = Tier(
         channel=ChannelKind.SPEECH,
         time_factor=2.0,
         stops=(4, 6),
+        storyboards=StoryboardSource.GENERATED,
         max_seconds=_LONGEST,
         world=_CROWDED,
     ),
@@ -119,7 +121,7 @@ STRANGERS: Final = Tier(
     towns=UNSEEN_TOWNS,
     town=UNSEEN_TOWNS[0],
 )
-"""Spoken words, in generated towns that nothing was trained in; `--towns` adds imported maps."""
+"""Spoken words and generated storyboards, in generated towns that nothing was trained in; `--towns` adds maps."""
 
 
 def _talk_tier(family: TalkFamily) -> Tier:

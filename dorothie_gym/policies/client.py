@@ -96,6 +96,12 @@ def fits(reply: Reply, heard: str) -> bool:
 MOST_ATTEMPTS: Final = 20
 """Number of decisions in which a barrier may be placed; a vehicle may stand in its place at first."""
 
+BARRIER_SHIFTS: Final = (0, 7, -7)
+"""Places of a barrier, tried in turns, from that of the errand [m]: a vehicle in the way covers one of them.
+
+The street is so closed before the client speaks, and the barrier is in sight in each of them.
+"""
+
 
 class StreetCloser(TypedPolicy[int]):
     """Ad-Wizard of talk tasks: closes the street that its errands name, and does nothing else.
@@ -120,6 +126,6 @@ class StreetCloser(TypedPolicy[int]):
         action = AdWizardAction(
             exception=ExceptionKind.PLACE_PROP,
             prop=PropKind.STREET_BARRIER,
-            place=LanePosition(lane=lane, metres=metres),
+            place=LanePosition(lane=lane, metres=metres + BARRIER_SHIFTS[state % len(BARRIER_SHIFTS)]),
         )
         return action, state + 1

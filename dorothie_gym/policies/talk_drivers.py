@@ -7,6 +7,7 @@ but neither the kind nor the world of its session.
 from __future__ import annotations
 
 import enum
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -262,9 +263,8 @@ def _settled(last: str, there: tuple[SeenLandmark, ...], view: _View) -> tuple[S
     """Goes to the place that a reply names, or repeats what the map says."""
     streets, names = named_streets(last), named_places(last)
     fitting = tuple(mark for mark in there if mark.name in names) if names else there
-    if any(character.isdigit() for character in last):
-        numbered = [mark for mark in fitting if last.count(str(1 + fitting.index(mark)))]
-        return _go(numbered[0]) if numbered else ()
+    if number := _number_in(last, fitting):
+        return _go(fitting[number - 1]) if number <= len(fitting) else ()
     if streets:
         on_street = tuple(mark for mark in fitting if mark.street in streets)
         if not on_street:
@@ -274,6 +274,14 @@ def _settled(last: str, there: tuple[SeenLandmark, ...], view: _View) -> tuple[S
     if names or streets or agrees(last) or "take me there" in plain(last):
         return _go(fitting[0]) if fitting else ()
     return ()
+
+
+def _number_in(text: str, marks: tuple[SeenLandmark, ...]) -> int:
+    """Returns the number of the place that a text names as the map does, such as 2 of "House 2"; 0 for none."""
+    for label in {map_label(mark.name) for mark in marks}:
+        if found := re.search(rf"(?<!\w){re.escape(plain(label))} (\d+)(?!\w)", plain(text)):
+            return int(found[1])
+    return 0
 
 
 _PLANS: Final = {

@@ -21,6 +21,7 @@ from dorothie_gym.session.sensor_config import (
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.briefs import TalkFamily
+from dorothie_gym.tasks.generated_storyboards import StoryboardSource
 
 # --- First-person camera ----------------------------------------------------------------------------------------------
 
@@ -154,6 +155,7 @@ class EnvConfig:
         time_factor: time after which the session is truncated as a multiple of the reference time of its scenario
             (`Scenario.reference`); `max_seconds` is then an upper bound. None for `max_seconds` alone.
         stops: range of the number of stops, the subgoals at the start, of drawn storyboards; None draws from all.
+        storyboards: storyboards that are drawn: those of the package, or a generated one for each session.
         talk: family of talk tasks that replace drawn storyboards, see `dorothie_gym.session.talk_tasks`; None draws
             storyboards.
     """
@@ -172,6 +174,7 @@ class EnvConfig:
     channel: ChannelKind = ChannelKind.TEXT
     time_factor: float | None = None
     stops: tuple[int, int] | None = None
+    storyboards: StoryboardSource = StoryboardSource.SHIPPED
     talk: TalkFamily | None = None
 
     def __post_init__(self) -> None:
@@ -200,6 +203,9 @@ class EnvConfig:
             if self.talk not in (families := list(map(str, TalkFamily))):
                 raise ValueError(f"EnvConfig.talk is {self.talk!r}; it must be {' or '.join(families)}, or None")
             object.__setattr__(self, "talk", TalkFamily(self.talk))
+        if self.storyboards not in (sources := list(map(str, StoryboardSource))):
+            raise ValueError(f"EnvConfig.storyboards is {self.storyboards!r}; it must be {' or '.join(sources)}")
+        object.__setattr__(self, "storyboards", StoryboardSource(self.storyboards))
         self._check_stops()
 
     def _check_stops(self) -> None:
@@ -254,7 +260,7 @@ class EnvConfig:
         settings = {**asdict(self), "world": self.world.record()}
         for name in ("camera", "cameras", "sensors"):
             del settings[name]
-        for name in ("perception", "channel"):
+        for name in ("perception", "channel", "storyboards"):
             value = settings.pop(name)
             if value is not getattr(EnvConfig, name):
                 settings[name] = str(value)

@@ -24,6 +24,7 @@ from dorothie_gym.session.talk_kinds import draw_talk_task
 from dorothie_gym.session.talk_tasks import storyboard_of
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.input_files import checked, raising
+from dorothie_gym.tasks.generated_storyboards import MOST_SEED, STOPS, StoryboardSource, StoryboardSpecification
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 if TYPE_CHECKING:
@@ -172,15 +173,17 @@ def draw_scenario(
     seed: int,
     stops: tuple[int, int] | None = None,
     talk: TalkFamily | None = None,
+    storyboards: StoryboardSource = StoryboardSource.SHIPPED,
 ) -> Scenario:
     """Draws a scenario; equal arguments give equal scenarios.
 
     Args:
         town: the map, with at least one site for each landmark of the storyboard.
-        template: template of the storyboard; None draws one of the shipped templates that fit the town.
+        template: template of the storyboard; None draws one that fits the town.
         seed: any integer >= 0.
         stops: range of the number of stops of a drawn template, see `EnvConfig.stops`; None draws from all.
         talk: family of a talk task that replaces a drawn template, see `EnvConfig.talk`.
+        storyboards: templates from which one is drawn, see `EnvConfig.storyboards`.
 
     Raises:
         StoryboardError: the template cannot be bound to the town, or none fits it.
@@ -189,6 +192,8 @@ def draw_scenario(
     if talk is not None and template is None:
         return _talk_scenario(town, talk, seed, streets, departure)
     sites = connected_sites(town)
+    if template is None and storyboards is StoryboardSource.GENERATED:
+        template = _generated_template(town, stops or STOPS, task)
     if template is None and stops is not None:
         fitting = _with_stops(fitting_templates(town), stops, town)
         template = fitting[int(task.integers(len(fitting)))]
@@ -228,6 +233,30 @@ def _talk_scenario(
         departure=task.departure or (start.lane, start.station),
         street_titles=_titles(town),
     )
+
+
+_ATTEMPTS: Final = 20  # generated storyboards of each number of stops that are tried in a town with few places
+
+
+def _generated_template(town: Town, stops: tuple[int, int], rng: np.random.Generator) -> StoryboardTemplate:
+    """Draws a generated storyboard with a number of stops in a range: in a town with few places, with fewer.
+
+    Raises:
+        StoryboardError: no storyboard of that many stops is as small as the town.
+    """
+    low, high = max(stops[0], STOPS[0]), min(stops[1], STOPS[1])
+    if low > high:
+        reason = f"have {STOPS[0]} to {STOPS[1]} stops, not {stops[0]} to {stops[1]}; change EnvConfig.stops"
+        raise StoryboardError("generated", "subgoals", reason)
+    places, seed = len(connected_sites(town)), int(rng.integers(MOST_SEED))
+    for number in range(int(rng.integers(low, high + 1)), low - 1, -1):
+        for attempt in range(_ATTEMPTS):
+            named = StoryboardSpecification(seed=(seed + attempt) % MOST_SEED, stops=number)
+            template = tasks.load_template(str(named))
+            if tasks.needed_places(template) <= places:
+                return template
+    reason = f"with {low} stops need more than the {places} places of town {town.name}; use a larger town"
+    raise StoryboardError("generated", "landmarks", reason)
 
 
 def fitting_templates(town: Town) -> list[StoryboardTemplate]:

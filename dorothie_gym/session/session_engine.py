@@ -130,7 +130,8 @@ class SessionEngine(Restorable):
                 self._seeds = np.random.default_rng(seed)
             session_seed = seed if seed is not None else int(self._seeds.integers(2**31))
             town = self.town_of(session_seed)
-            scenario = draw_scenario(town, self.template, session_seed, self.config.stops, self.config.talk)
+            config = self.config
+            scenario = draw_scenario(town, self.template, session_seed, config.stops, config.talk, config.storyboards)
         else:
             town = self.town_of(scenario.seed)
         self._session = LiveSession(town, network_of(town), scenario, self.config, self.limits)

@@ -6,7 +6,11 @@ from .catalogue import LandmarkKind as LandmarkKind
 from .catalogue import catalogue as catalogue
 from .catalogue import map_label as map_label
 from .catalogue import map_labels as map_labels
+from .generated_storyboards import StoryboardSource as StoryboardSource
+from .generated_storyboards import StoryboardSpecification as StoryboardSpecification
+from .generated_storyboards import generate_template as generate_template
 from .parsing import is_shipped_story as is_shipped_story
+from .parsing import is_template_name as is_template_name
 from .parsing import load_template as load_template
 from .parsing import parse_template as parse_template
 from .parsing import template_names as template_names

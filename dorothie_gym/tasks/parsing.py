@@ -15,6 +15,7 @@ from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, parse_json, read_text
 from dorothie_gym.tasks.binding import cast, longest_values
 from dorothie_gym.tasks.catalogue import find_kind
+from dorothie_gym.tasks.generated_storyboards import generate_template, is_generated, parse_specification
 from dorothie_gym.tasks.storyboard import (
     MESSAGE_LENGTH,
     Channel,
@@ -303,6 +304,11 @@ def template_names() -> tuple[str, ...]:
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _SHIPPED.iterdir()))
 
 
+def is_template_name(name: str) -> bool:
+    """Returns whether `load_template` finds a template of a name without a file: a shipped or a generated one."""
+    return name in template_names() or is_generated(name)
+
+
 @functools.cache
 def _shipped_stories() -> re.Pattern[str]:
     """Returns a pattern of the stories of the package's templates; variables and marks stand for any text."""
@@ -329,17 +335,20 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
     """Loads a template.
 
     Args:
-        name_or_path: name of a template of the package, or path of a JSON file.
+        name_or_path: name of a template of the package, `generated:SEED` or `generated:SEED,stops=N`, or path of a
+            JSON file.
 
     Raises:
         StoryboardError: if the template does not exist or is invalid.
     """
     if isinstance(name_or_path, str) and name_or_path in template_names():
         return _shipped_template(name_or_path)
+    if isinstance(name_or_path, str) and is_generated(name_or_path):
+        return generate_template(parse_specification(name_or_path))
     path = Path(name_or_path)
     if isinstance(name_or_path, str) and path.suffix == "" and path.name == name_or_path and not path.exists():
         known, hint = ", ".join(template_names()), did_you_mean(name_or_path, template_names())
-        reason = f"there is no such template; {hint}use one of {known}, or a .json file"
+        reason = f"there is no such template; {hint}use one of {known}, generated:SEED, or a .json file"
         raise StoryboardError(name_or_path, "name", reason)
     try:
         text = read_text(path, MAX_SMALL_JSON)

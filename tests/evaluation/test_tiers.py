@@ -17,6 +17,7 @@ from dorothie_gym.session.scenario import ReferenceDrive, draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.time_allowed import reference_seconds, time_allowed, time_extended
 from dorothie_gym.sim.config import AutomaticBraking
+from dorothie_gym.tasks import StoryboardSource
 
 
 @pytest.mark.parametrize("tier", TIERS.values(), ids=list(TIERS))
@@ -47,6 +48,15 @@ def test_tiers_are_harder_one_after_the_other() -> None:
     assert errors == sorted(errors)
     assert STRANGERS.config.channel is ChannelKind.SPEECH and STRANGERS.towns == UNSEEN_TOWNS
     assert set(SEEN_TOWNS) < set(STANDARD.towns)
+
+
+def test_strangers_have_storyboards_of_their_own_and_other_tiers_keep_the_shipped_ones() -> None:
+    for tier in TIERS.values():
+        generated = tier.config.storyboards is StoryboardSource.GENERATED
+        assert generated is (tier is STRANGERS)
+        assert ("storyboards" in tier.config.record()) is generated
+    with pytest.raises(ValueError, match=r"EnvConfig\.storyboards is 'mine'; it must be shipped or generated"):
+        EnvConfig(storyboards="mine")
 
 
 def test_held_out_personas_are_outside_of_those_of_training() -> None:

@@ -13,9 +13,11 @@ from dorothie_gym.maps import Town, load_town, town_names
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.session.scenario import draw_scenario
+from dorothie_gym.tasks import StoryboardSource
 from tests.maps.opendrive_text import lane, opendrive, road, section
 
 DRAWS = 1000
+GENERATED = StoryboardSource.GENERATED
 
 
 @pytest.mark.long
@@ -68,6 +70,33 @@ def test_a_small_town_plays_storyboards_that_fit_it(count: int) -> None:
         scenario = draw_scenario(town, None, seed)
         assert len(scenario.storyboard.landmarks) <= count
         assert scenario.departure in {(site.lane, site.station) for site in town.sites}
+
+
+@pytest.mark.parametrize("name", town_names())
+def test_generated_storyboards_are_new_for_each_seed_and_have_the_wanted_stops(name: str) -> None:
+    town = load_town(name)
+    drawn = [draw_scenario(town, None, seed, (4, 6), None, GENERATED) for seed in range(40)]
+    assert drawn == [draw_scenario(town, None, seed, (4, 6), None, GENERATED) for seed in range(40)]
+    assert len({scenario.storyboard.name for scenario in drawn}) == 40
+    stops = {sum(not goal.trigger for goal in scenario.storyboard.subgoals) for scenario in drawn}
+    assert stops == {4, 5, 6}
+    shipped = draw_scenario(town, None, 0)
+    assert drawn[0].street_names == shipped.street_names and drawn[0].storyboard != shipped.storyboard
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 8])
+def test_a_small_town_gets_generated_storyboards_that_fit_it(count: int) -> None:
+    town = _with_sites(count)
+    for seed in range(10):
+        scenario = draw_scenario(town, None, seed, storyboards=GENERATED)
+        assert len(scenario.storyboard.landmarks) <= count
+
+
+def test_a_town_too_small_for_generated_storyboards_is_refused_with_numbers() -> None:
+    with pytest.raises(StoryboardError, match=r"with 4 stops need more than the 3 places of town few"):
+        draw_scenario(_with_sites(3), None, 3, (4, 6), None, GENERATED)
+    with pytest.raises(StoryboardError, match=r"have 2 to 6 stops, not 7 to 9; change EnvConfig\.stops"):
+        draw_scenario(_with_sites(3), None, 3, (7, 9), None, GENERATED)
 
 
 @pytest.mark.parametrize("count", [0, 1])

@@ -1,6 +1,7 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
 from .beacon import Beacon as Beacon
+from .beacon import sealed_config as sealed_config
 from .cross_play import RESULT_NAME as RESULT_NAME
 from .cross_play import CrossPlayResult as CrossPlayResult
 from .cross_play import CrossPlaySettings as CrossPlaySettings

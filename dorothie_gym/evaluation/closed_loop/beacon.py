@@ -10,12 +10,16 @@ from __future__ import annotations
 import datetime
 import hashlib
 import unicodedata
-from dataclasses import dataclass
-from typing import Final, TypedDict
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, TypedDict
 
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.generated.specification import FIRST_TEST_SEED, MOST_SEED, PREFIX
 from dorothie_gym.support.copying import shared
+from dorothie_gym.tasks.generated_storyboards import StoryboardSource
+
+if TYPE_CHECKING:
+    from dorothie_gym.session.config import EnvConfig
 
 TOWNS: Final = 10
 """Number of towns of a sealed test; each is a generated one, from the seeds for tests."""
@@ -102,6 +106,11 @@ class Beacon:
         text = unicodedata.normalize("NFC", self.text)
         content = "\0".join((_DOMAIN, text, purpose, str(index)))
         return int.from_bytes(hashlib.sha256(content.encode()).digest(), "big")
+
+
+def sealed_config(config: EnvConfig) -> EnvConfig:
+    """Returns the settings of a tier in a sealed test: storyboards are generated, since shipped ones are known."""
+    return config if config.talk is not None else replace(config, storyboards=StoryboardSource.GENERATED)
 
 
 def check_date(name: str, date: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from dorothie_gym.errors import one_line, short_repr
-from dorothie_gym.evaluation.closed_loop.beacon import Beacon
+from dorothie_gym.evaluation.closed_loop.beacon import Beacon, sealed_config
 from dorothie_gym.evaluation.closed_loop.running import (
     CONDITIONS,
     RolloutSettings,
@@ -142,12 +142,13 @@ class LeaderboardProtocol:
         pool = tuple(find_player(each, Role.PARTICIPANT) for each in tier.participants)
         cast = {**ALL_SCRIPTED, Role.PARTICIPANT: pool[0], Role.AD_WIZARD: find_player(tier.ad_wizard, Role.AD_WIZARD)}
         oracle = bool(settings.get("oracle"))
+        config = tier.oracle if oracle else tier.config
         return RolloutSettings(
             cast=cast,
             towns=tier.towns if beacon is None else beacon.towns,
             sessions=usual_sessions(trials, self.sessions),
             seed=self.seed if beacon is None else beacon.seed,
-            config=tier.oracle if oracle else tier.config,
+            config=config if beacon is None else sealed_config(config),
             pool=pool if len(pool) > 1 else (),
             trials=trials,
             tier=tier.name,

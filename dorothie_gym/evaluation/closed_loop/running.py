@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dorothie_gym.evaluation.closed_loop.beacon import BEACON, Beacon
+from dorothie_gym.evaluation.closed_loop.beacon import BEACON, Beacon, sealed_config
 from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, RolloutRow
 from dorothie_gym.evaluation.closed_loop.seal import Seal, faults_of_seal
 from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
@@ -136,6 +136,8 @@ class RolloutSettings:
             return
         if (self.towns, self.seed) != (self.beacon.towns, self.beacon.seed):
             raise ValueError("towns and seed are not those of the beacon; take Beacon.towns and Beacon.seed")
+        if self.config != sealed_config(self.config):
+            raise ValueError("config draws shipped storyboards, which are known; take sealed_config(config)")
         if self.seal is not None:
             fault = next(faults_of_seal(self.seal, self.beacon, self.to_json()), None)
             if fault is not None:

@@ -85,7 +85,8 @@ def scenario_with_reference(
 ) -> Scenario:
     """Returns the scenario that an engine draws from a seed, with its reference (`reference_of`)."""
     town = engine.town_of(seed)
-    drawn = draw_scenario(town, engine.template, seed, engine.config.stops, engine.config.talk)
+    config = engine.config
+    drawn = draw_scenario(town, engine.template, seed, config.stops, config.talk, config.storyboards)
     return replace(drawn, reference=reference_of(town, drawn, known))
 
 
@@ -110,7 +111,7 @@ def measure_drive(town: Town, scenario: Scenario) -> ReferenceDrive:
 
 def measure_drives(
     scenarios: Iterable[tuple[str, int]],
-    stops: tuple[int, int] | None,
+    config: EnvConfig,
     known: Mapping[str, ReferenceDrive],
     *,
     workers: int = 1,
@@ -119,26 +120,26 @@ def measure_drives(
 
     Args:
         scenarios: town and seed of each scenario.
-        stops: range of the number of stops of the storyboards, see `EnvConfig.stops`.
+        config: settings of the sessions, of which those of their storyboards count.
         known: references that need not be measured again, by `drive_key`.
         workers: number of processes; more than one needs an importable main module of the caller.
 
     Raises:
         ProcessError: a process died.
     """
-    yield from run_tasks(partial(_DriveTask, stops, dict(known)), scenarios, workers=workers)
+    yield from run_tasks(partial(_DriveTask, config, dict(known)), scenarios, workers=workers)
 
 
 class _DriveTask:
     """Measures references in one process."""
 
-    def __init__(self, stops: tuple[int, int] | None, known: Mapping[str, ReferenceDrive]) -> None:
-        self._stops, self._known = stops, known
+    def __init__(self, config: EnvConfig, known: Mapping[str, ReferenceDrive]) -> None:
+        self._config, self._known = config, known
 
     def __call__(self, task: tuple[str, int]) -> tuple[str, ReferenceDrive]:
         name, seed = task
         town = town_at(parse_series(name) or name, seed)
-        scenario = draw_scenario(town, None, seed, self._stops)
+        scenario = draw_scenario(town, None, seed, self._config.stops, storyboards=self._config.storyboards)
         key = drive_key(scenario, town.name)
         return key, self._known[key] if key in self._known else measure_drive(town, scenario)
 

@@ -27,7 +27,7 @@ from dorothie_gym.session.spaces.actions import ActionDict
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.speech.synthesizer import HIGHEST_PITCH, LOWEST_PITCH
 from dorothie_gym.support.input_files import checked, raising
-from dorothie_gym.tasks.parsing import load_template, template_names
+from dorothie_gym.tasks.parsing import is_template_name, load_template
 
 if TYPE_CHECKING:
     from dorothie_gym.archive.corpus import CorpusEntry
@@ -183,14 +183,16 @@ def _scenario(session: Session, seed: int, town: Town, storyboard: StoryboardTem
     """Returns the scenario of the session, drawn again with a drawn storyboard or with a given one."""
     header = session.header
     templates: list[StoryboardTemplate | None] = [storyboard]
-    if storyboard is None and header.storyboard in template_names():
+    if storyboard is None and is_template_name(header.storyboard):
         templates.append(load_template(header.storyboard))
     config = config_of(header)
-    drawn = [draw_scenario(town, template, seed, config.stops, config.talk) for template in templates]
+    drawn = [
+        draw_scenario(town, template, seed, config.stops, config.talk, config.storyboards) for template in templates
+    ]
     for scenario in drawn:
         if _fits(scenario, header):
             return scenario
-    if storyboard is None and header.storyboard not in template_names():
+    if storyboard is None and not is_template_name(header.storyboard):
         raise SessionError(f"{session.name}: the storyboard {header.storyboard!r} is not shipped; give its file")
     return drawn[-1]  # the comparison reports the difference of the headers
 

@@ -9,12 +9,14 @@ from collections import Counter
 
 import pytest
 
-from dorothie_gym.evaluation.closed_loop import Beacon, RolloutSettings
-from dorothie_gym.evaluation.tiers import ROUGH
+from dorothie_gym.evaluation.closed_loop import Beacon, RolloutSettings, sealed_config
+from dorothie_gym.evaluation.tiers import ROUGH, TIERS
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.folds import UNSEEN_TOWNS, TownFold, fold_of
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import find_player
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.tasks import StoryboardSource
 
 BEACON = Beacon(text="a word of an organiser", date="2026-12-01")
 
@@ -41,7 +43,7 @@ SEEDS = [1023962525, 520404350, 819050604]
 def plans_of(beacon: Beacon) -> tuple[tuple[str, int, str], ...]:
     pool = tuple(find_player(name, Role.PARTICIPANT) for name in ROUGH.participants[:2])
     settings = RolloutSettings(
-        towns=beacon.towns, seed=beacon.seed, sessions=12, pool=pool, config=ROUGH.config, beacon=beacon
+        towns=beacon.towns, seed=beacon.seed, sessions=12, pool=pool, config=sealed_config(ROUGH.config), beacon=beacon
     )
     return tuple((plan.town, plan.seed, str(plan.participant and plan.participant.name)) for plan in settings.plans())
 
@@ -114,3 +116,14 @@ def test_a_malformed_beacon_is_refused(text: str, date: str, message: str) -> No
 def test_towns_and_seed_of_a_rollout_are_those_of_its_beacon() -> None:
     with pytest.raises(ValueError, match="not those of the beacon"):
         RolloutSettings(towns=BEACON.towns, seed=BEACON.seed + 1, beacon=BEACON)
+
+
+def test_storyboards_of_a_sealed_test_are_generated() -> None:
+    for tier in TIERS.values():
+        config = sealed_config(tier.config)
+        assert (config.storyboards is StoryboardSource.GENERATED) is (tier.config.talk is None)
+        assert sealed_config(config) == config
+    with pytest.raises(ValueError, match="shipped storyboards, which are known"):
+        RolloutSettings(towns=BEACON.towns, seed=BEACON.seed, beacon=BEACON)
+    given = RolloutSettings(towns=BEACON.towns, seed=BEACON.seed, beacon=BEACON, config=sealed_config(EnvConfig()))
+    assert given.config.record()["storyboards"] == "generated"

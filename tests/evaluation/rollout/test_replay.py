@@ -19,6 +19,7 @@ from dorothie_gym.session.recording import Decision, EndReason, Session, Session
 from dorothie_gym.session.scenario import ReferenceDrive, draw_scenario, recorded_reference
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.time_allowed import reference_seconds
+from dorothie_gym.tasks import StoryboardSource
 from dorothie_gym.wrappers.record_session import RecordSession
 
 TOWN = load_town("brookside")
@@ -87,6 +88,19 @@ def test_time_that_depends_on_the_reference_is_that_of_the_record(tmp_path: Path
         play_session(engine, policies, seed=3, folder=tmp_path, on_step=stop, scenario=measured)
     session = Session.load(tmp_path)
     assert recorded_reference(session.header) == reference
+    assert first_difference(session, resimulate(session, TOWN)) is None
+
+
+@pytest.mark.parametrize("storyboard", [None, "generated:7"])
+def test_a_session_with_a_generated_storyboard_is_replayed_from_its_header(
+    storyboard: str | None, tmp_path: Path
+) -> None:
+    engine = SessionEngine(TOWN, storyboard, config=EnvConfig(max_seconds=15.0, storyboards=StoryboardSource.GENERATED))
+    policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
+    play_session(engine, policies, seed=3, folder=tmp_path)
+    session = Session.load(tmp_path)
+    assert session.header.storyboard.startswith("generated:")
+    assert (session.header.storyboard == "generated:7") is (storyboard is not None)
     assert first_difference(session, resimulate(session, TOWN)) is None
 
 
