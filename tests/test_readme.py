@@ -117,15 +117,6 @@ def test_readme_is_one_screen_and_its_first_snippet_draws_a_picture(
     assert picture.width >= 300 and colours is not None and len(colours) > 50
 
 
-def test_readme_quotes_the_tiers_as_their_page_has_them() -> None:
-    measured = (README.parent / "docs" / "tiers.md").read_text(encoding="utf-8").split("## First measurements")[1]
-    text = README.read_text(encoding="utf-8")
-    rows = re.findall(r"\| `(\w+)` \| scripted \| \d+ \| (\d+ % \[\d+, \d+\]) \|", measured)
-    assert len(rows) == 4
-    for tier, figure in rows:
-        assert re.search(rf"\| `{tier}` \|.*{re.escape(figure)}", text), f"{tier}: {figure}"
-
-
 def test_citations_have_the_version_and_the_title() -> None:
     citation = yaml.safe_load((README.parent / "CITATION.cff").read_text(encoding="utf-8"))
     text = README.read_text(encoding="utf-8").replace("\\_", "_")
