@@ -47,9 +47,8 @@ class Step:
     minutes: float
 
 
-def _json(folder: Path, number: int = 0) -> Mapping[str, Any]:
-    found: Mapping[str, Any] = json.loads((folder / f"{number}.json").read_text(encoding="utf-8"))
-    return found
+def _json(folder: Path, number: int = 0) -> Any:  # each step knows what its command writes
+    return json.loads((folder / f"{number}.json").read_text(encoding="utf-8"))
 
 
 # --- rollouts -------------------------------------------------------------------------------------------------------
@@ -184,7 +183,35 @@ def _learned() -> Iterator[Step]:
     )
 
 
+# --- language models ------------------------------------------------------------------------------------------------
+
+SPOILT: Final = (0.0, 0.05, 0.2)
+"""Rates of answers that are drawn at random."""
+
+
+def spoilt_figures(folder: Path) -> Figures:
+    """Returns the success and Pass^3 of the rule program by the rate of its spoilt answers [%]."""
+    rows = {row["player"]: row for row in _json(folder)}
+    found = {}
+    for rate in SPOILT:
+        row = rows["reader" if rate == 0.0 else f"reader, {rate:.0%} spoilt"]
+        keys = "sessions", "success", "pass_k", "reached", "live"
+        found |= {f"rate_{100 * rate:.0f}_{key}": Figure(value=rounded(float(row[key]))) for key in keys}
+    return found
+
+
+def _readers() -> Iterator[Step]:
+    usual = "--tiers standard --roles co_wizard --sessions 6 --trials 3"
+    rates = ",".join(f"{rate:g}" for rate in SPOILT)
+    yield Step(
+        name="spoilt-answers",
+        commands=(f"python -m tests.agents.ceilings {usual} --spoilt {rates} --json",),
+        read=spoilt_figures,
+        minutes=10.0,
+    )
+
+
 STEPS: Final[Mapping[str, Step]] = {
-    step.name: step for part in (_tiers(), _speeds(), _sentences(), _learned()) for step in part
+    step.name: step for part in (_tiers(), _speeds(), _sentences(), _learned(), _readers()) for step in part
 }
 """Steps by name."""
