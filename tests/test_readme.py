@@ -80,6 +80,8 @@ def test_source_distribution_has_docs_benchmarks_and_examples() -> None:
     project = tomllib.loads((README.parent / "pyproject.toml").read_text(encoding="utf-8"))
     included = project["tool"]["hatch"]["build"]["targets"]["sdist"]["only-include"]
     assert {"docs", "benchmarks", "examples", "tests"} <= set(included)
+    assert {"Dockerfile", ".dockerignore", ".devcontainer"} <= set(included), "tests of the distribution read them"
+    assert all((README.parent / name).exists() for name in included)
     assert project["project"]["urls"]
 
 
