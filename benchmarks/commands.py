@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
 
 import typer
 
+from benchmarks.release.command import release
 from dorothie_gym._startup import exit_on_signals
 from dorothie_gym.cli.options import OWN_NAME, AsJson, CommandGroup, PictureCommand
 from dorothie_gym.cli.output import check_picture, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
@@ -398,6 +399,9 @@ def drives(
     for failure in figures["failures"]:
         wrong = "; ".join(filter(None, (failure["drive"], failure["reply"])))
         stdout().print(f"  {failure['id']}: {wrong}", markup=False, soft_wrap=True)
+
+
+app.command()(release)
 
 
 def _run(name: str, measure: Measure, picture: Path | None, as_json: bool, *, pictures: bool = False) -> None:

@@ -270,7 +270,11 @@ class TextSession:
         engine = self.engine
         while not engine.over:
             own = engine.observations.of([self.role])[str(self.role)]
-            self._observation: ObservationMapping = {**own, "action_mask": engine.mask(self.role)}
+            self._observation: ObservationMapping = {
+                **own,
+                "action_mask": engine.mask(self.role),
+                "refusal_reason": engine.refusal(self.role),
+            }
             self._state = self._turns.attend(self._observation, self._state)
             if self._turns.is_due(self._observation, self._state):
                 page, self._schema = self._turns.page(self._observation, self._state)

@@ -11,7 +11,7 @@ import typer
 from dorothie_gym import tasks
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors, needs
-from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.output import Facts, check_folder, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.tier_options import TierName, tier_of
 from dorothie_gym.cli.warm_up import compile_first
@@ -128,6 +128,8 @@ def console_room(
     from dorothie_gym.lab.town_page import town_page
     from dorothie_gym.session.session_engine import SessionEngine
 
+    if out is not None:
+        check_folder(out)
     plans = seats.parse_roles(roles)
     engine = SessionEngine(town, storyboard, config=config.environment())
     room = seats.Room(engine, plans, config, seed=seed, folder=out)

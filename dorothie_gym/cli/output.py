@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -133,6 +134,18 @@ def check_file(path: Path) -> None:
         fail(f"{path}: cannot be written ({error.strerror}); choose another place")
     if not there:
         path.unlink()
+
+
+def check_folder(path: Path) -> None:
+    """Fails if nothing can be written into the folder `path`, which may have to be created; leaves nothing behind."""
+    there = next(each for each in (path.absolute(), *path.absolute().parents) if each.exists())
+    if not there.is_dir():
+        fail(f"{path}: {there} is a file; give a folder")
+    try:
+        with tempfile.TemporaryDirectory(dir=there):
+            pass
+    except OSError as error:
+        fail(f"{path}: cannot be written ({error.strerror}); choose another folder")
 
 
 # --- Video files ------------------------------------------------------------------------------------------------------

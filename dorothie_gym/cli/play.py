@@ -6,7 +6,7 @@ import os
 import sys
 import webbrowser
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -20,6 +20,11 @@ from dorothie_gym.errors import did_you_mean
 from dorothie_gym.lab import console as seats
 from dorothie_gym.maps.folds import DEFAULT_TOWN
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dorothie_gym.cli import terminal_play
 
 NAVIGATION: Final = "navigation"
 ROLES: Final = (*(str(role).replace("_", "-") for role in AGENT_ROLES), NAVIGATION)
@@ -73,9 +78,21 @@ def _play_by_keys(
             if name == NAVIGATION
             else terminal_play.CoWizardGame(town, env_config(max_seconds, None))
         )
-        ended = terminal_play.play(game, seed, screen)
-    if ended:
+        ending = terminal_play.play(game, seed, screen)
+    _print_ending(game, ending, screen)
+
+
+def _print_ending(game: terminal_play.KeyGame, ending: terminal_play.Ending, screen: Console) -> None:
+    """Prints how a session by keys has ended; fails if there was no key at all."""
+    from dorothie_gym.cli.terminal_play import Ending
+
+    if ending is Ending.NO_INPUT:
+        fail("there are no keys: the input is empty; play in a terminal, or pipe keys (? lists them, q quits)")
+    if ending is Ending.OVER:
         screen.print("You did it: all errands are done." if game.info["is_success"] else "The session is over.")
+    else:
+        why = "You have left" if ending is Ending.LEFT else "The input has ended; so has"
+        screen.print(f"{why} the session.")
 
 
 def _play_in_browser(

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
+import enum
+import os
+import re
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
@@ -28,6 +32,14 @@ QUIT: Final = "q"
 PICTURE: Final = "v"
 HELP: Final = "?"
 NOTHING: Final = " "
+END_OF_INPUT: Final = "\x04"
+"""Ctrl-D, which a terminal that passes single keys leaves to the program."""
+
+_ESCAPED: Final = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.|.)?", re.DOTALL)
+"""Key that a terminal sends as several characters, such as an arrow."""
+
+_SHADES: Final = " .:-=+*#%@"
+"""Characters from dark to bright, for terminals without colours."""
 
 COMMANDS: Final[Mapping[str, str]] = {
     " ": "continue", "g": "start", "x": "stop", "u": "turn_round", "+": "faster", "-": "slower",
@@ -149,44 +161,72 @@ class NavigationGame(KeyGame):
         return f"{world.time:5.1f} s  {world.car.speed * 3.6:3.0f} km/h"
 
 
-def play(game: KeyGame, seed: int, screen: Console) -> bool:
-    """Plays a session by keys; returns whether it has ended.
+class Ending(enum.Enum):
+    """How a session by keys has ended."""
+
+    OVER = "the session is over"
+    LEFT = "the player has left"
+    NO_MORE_INPUT = "the input has ended"
+    NO_INPUT = "there was no key at all"
+
+
+def play(game: KeyGame, seed: int, screen: Console) -> Ending:
+    """Plays a session by keys.
 
     Args:
         game: the game.
         seed: seed of the session.
         screen: console on which the session is shown.
     """
-    game.begin(seed)
-    _show_help(game, screen)
+    read_any = False
     with _keys() as read:
+        game.begin(seed)
+        _show_help(game, screen)
         while not game.over:
             words = game.heard()
             if words:
                 screen.print(Text(f"Participant: {words}", style="bold"))
             screen.print(game.status(), style="dim")
             key = read()
-            if key in ("", QUIT):
-                return False
-            if key == PICTURE:
-                screen.print(small_picture(game.env.render(), screen.width - 1))
-            elif key == HELP or key not in game.keys:
-                _show_help(game, screen)
-            elif key not in game.possible():
-                screen.print(f"{game.names[key]} is not possible now", style="dim")
-            else:
-                game.press(key)
-                if key != NOTHING:
-                    screen.print(f"You: {game.names[key]}")
-                if reason := str(game.info["refusal_reason"]):
-                    screen.print(f"Refused: {reason}")
-    return True
+            if key == "":
+                return Ending.NO_MORE_INPUT if read_any else Ending.NO_INPUT
+            if key in (QUIT, END_OF_INPUT):
+                return Ending.LEFT
+            read_any = True
+            _obey(game, key, screen)
+    return Ending.OVER
 
 
-def small_picture(picture: Any, columns: int) -> Text:
-    """Returns a picture (height, width, 3) uint8 as coloured half blocks, at most `columns` characters wide."""
+def _obey(game: KeyGame, key: str, screen: Console) -> None:
+    """Carries out a key and prints what it did."""
+    if key == PICTURE:
+        coloured = screen.color_system is not None
+        screen.print(small_picture(game.env.render(), screen.width - 1, max(screen.height - 2, 2), coloured=coloured))
+    elif key == HELP:
+        _show_help(game, screen)
+    elif key not in game.keys:
+        screen.print(f"This key does nothing; {HELP} lists the keys.", style="dim")
+    elif key not in game.possible():
+        screen.print(f"{game.names[key]} is not possible now", style="dim")
+    else:
+        game.press(key)
+        if key != NOTHING:
+            screen.print(f"You: {game.names[key]}")
+        if reason := str(game.info["refusal_reason"]):
+            screen.print(f"Refused: {reason}")
+
+
+def small_picture(picture: Any, columns: int, lines: int = 50, *, coloured: bool = True) -> Text:
+    """Returns a picture (height, width, 3) uint8 as text of its proportions.
+
+    Args:
+        picture: the picture.
+        columns: largest width [characters]; at most 100 are used.
+        lines: largest height [lines].
+        coloured: whether to draw coloured half blocks; otherwise two pixels are one character by their brightness.
+    """
     height, width = picture.shape[:2]
-    wide = min(columns, 100)
+    wide = max(min(columns, 100, 2 * lines * width // height), 1)
     rows = max(2, round(wide * height / width) // 2 * 2)
     down = np.linspace(0, height, rows + 1).astype(int)
     across = np.linspace(0, width, wide + 1).astype(int)
@@ -196,7 +236,10 @@ def small_picture(picture: Any, columns: int) -> Text:
     text = Text()
     for upper, lower in zip(small[::2], small[1::2], strict=True):
         for one, two in zip(upper, lower, strict=True):
-            text.append("▀", style=f"rgb({one[0]},{one[1]},{one[2]}) on rgb({two[0]},{two[1]},{two[2]})")
+            if coloured:
+                text.append("▀", style=f"rgb({one[0]},{one[1]},{one[2]}) on rgb({two[0]},{two[1]},{two[2]})")
+            else:
+                text.append(_SHADES[int(one.sum() + two.sum()) * len(_SHADES) // (6 * 256)])
         text.append("\n")
     return text
 
@@ -209,7 +252,10 @@ def _show_help(game: KeyGame, screen: Console) -> None:
 
 @contextmanager
 def _keys() -> Iterator[Callable[[], str]]:
-    """Yields a function that reads one key: at once on a terminal, else the next character of the input."""
+    """Yields a function that reads one key: at once on a terminal, else the next character of the input.
+
+    Keys that were pressed before are kept; those that are pressed after the end are not left to the shell.
+    """
     if not sys.stdin.isatty():
         yield _next_character
         return
@@ -223,11 +269,41 @@ def _keys() -> Iterator[Callable[[], str]]:
         return
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
-    tty.setcbreak(descriptor)
+    keys = TerminalKeys(descriptor)
+
+    def read() -> str:
+        tty.setcbreak(descriptor, termios.TCSANOW)  # again, as a shell changes it while the program is suspended
+        return keys.read()
+
+    tty.setcbreak(descriptor, termios.TCSANOW)
     try:
-        yield lambda: sys.stdin.read(1)
+        yield read
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        termios.tcsetattr(descriptor, termios.TCSAFLUSH, before)
+
+
+class TerminalKeys:
+    """Keys of a terminal in cbreak mode; one that is sent as several characters is one key.
+
+    Args:
+        descriptor: number of the open terminal.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor, self._waiting = descriptor, ""
+        self._decoder = codecs.getincrementaldecoder("utf-8")(errors="replace")
+
+    def read(self) -> str:
+        """Returns the next key; empty if the terminal was closed."""
+        while not self._waiting:
+            read = os.read(self._descriptor, 1024)
+            if not read:
+                return ""
+            self._waiting = self._decoder.decode(read)
+        escaped = _ESCAPED.match(self._waiting)
+        length = escaped.end() if escaped is not None else 1
+        key, self._waiting = self._waiting[:length], self._waiting[length:]
+        return key
 
 
 def _next_character() -> str:

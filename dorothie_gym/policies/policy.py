@@ -66,12 +66,15 @@ class Policy(ABC, Generic[State]):
         observes: whether `step` reads the observation; a policy that does not is given an empty one.
         reads_mask: whether `step` reads the action mask of the engine. The observation then has the further field
             `action_mask`, with the content of `info["action_mask"]`.
+        reads_refusals: whether `step` reads why its last action was refused. The observation then has the further field
+            `refusal_reason`, the text of `info["refusal_reason"]`; empty if nothing was refused.
         role: role that the policy acts for.
         limits: sizes of the role's spaces.
     """
 
     observes: ClassVar[bool] = True
     reads_mask: ClassVar[bool] = False
+    reads_refusals: ClassVar[bool] = False
 
     def __init__(self, role: Role, limits: SpaceLimits | None = None) -> None:
         """Prepares a policy for `role`; the sizes of the spaces default to those of `SpaceLimits`."""
@@ -100,7 +103,7 @@ class Policy(ABC, Generic[State]):
         """Chooses an action.
 
         Args:
-            observation: observation of the role, see `observation_space`; with `action_mask` if `reads_mask` is set.
+            observation: observation of the role, see `observation_space`, and the further fields that are read.
             state: state that `initial_state` or the previous step returned; it is not changed.
 
         Returns:
@@ -227,9 +230,13 @@ class ObservedSession(Protocol):
         """Returns the mask of a role's action space at the current decision."""
         ...
 
+    def refusal(self, role: Role) -> str:
+        """Returns why the last action of a role was refused; empty if it was not."""
+        ...
+
 
 def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) -> dict[Role, ObservationMapping]:
-    """Returns the inputs of policies at the current decision: the observation of each role, and its mask if it is read.
+    """Returns the inputs of policies at the current decision: observations, and masks and refusals where they are read.
 
     Observations and masks that no policy reads are not computed.
 
@@ -247,11 +254,15 @@ def _observers(policies: Mapping[Role, AnyPolicy]) -> list[Role]:
 def _inputs(
     session: ObservedSession, policies: Mapping[Role, AnyPolicy], seen: Mapping[str, ObservationMapping]
 ) -> dict[Role, ObservationMapping]:
-    """Returns the observations of policies, with masks where they are read."""
+    """Returns the observations of policies, with masks and refusals where they are read."""
     inputs: dict[Role, ObservationMapping] = {}
     for role, policy in policies.items():
         observation = seen.get(role, {})
-        inputs[role] = {**observation, "action_mask": session.mask(role)} if policy.reads_mask else observation
+        if policy.reads_mask:
+            observation = {**observation, "action_mask": session.mask(role)}
+        if policy.reads_refusals:
+            observation = {**observation, "refusal_reason": session.refusal(role)}
+        inputs[role] = observation
     return inputs
 
 

@@ -252,6 +252,10 @@ class SessionEngine(Restorable):
         """Returns the mask of a role's action space at the current decision."""
         return self.session.observer.masks.mask(role)
 
+    def refusal(self, role: Role) -> str:
+        """Returns why the last action of a role was refused, its parts joined by "; "; empty if nothing was."""
+        return "; ".join(self.session.log.refused[role])
+
     def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:
         """Returns the info dictionary of a role, always with the same keys; the caller owns its contents.
 
@@ -264,7 +268,7 @@ class SessionEngine(Restorable):
             "action_mask": session.observer.masks.mask(role),
             "reward_terms": dict(terms) if terms else dict.fromkeys(term_names(role), 0.0),
             "refused": {kind: bool(reason) for kind, reason in session.log.refusals[role].items()},
-            "refusal_reason": "; ".join(session.log.refused[role]),
+            "refusal_reason": self.refusal(role),
             "infractions": session.log.infractions,
         }
 

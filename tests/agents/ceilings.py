@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
 import typer
@@ -23,6 +23,10 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.casting import partners_of
 from tests.agents.players import reader_of
+
+HEAD = """\
+| tier | role | player | sessions | subgoals | success | all trials | score | tokens in |
+|---|---|---|---|---|---|---|---|---|"""
 
 
 class SpoiltReader:
@@ -98,7 +102,7 @@ def scripted_row(tier: str, role: Role, sessions: Sequence[tuple[TextSession, in
         tier=tier, role=str(role), player="scripted", sessions=len(summaries),
         reached=sum(summary["subgoals"]["reached"] for summary in summaries),
         live=sum(summary["subgoals"]["live"] for summary in summaries),
-        success=success, pass_k=success, score=float("nan"), tokens=0.0,
+        success=success, pass_k=success, score=0.0, tokens=0.0,
     )  # fmt: skip
 
 
@@ -109,10 +113,18 @@ def main(
     rates: Annotated[str, typer.Option("--spoilt", help="rates of spoilt answers")] = "0",
     trials: Annotated[int, typer.Option(min=1, help="trials of a scenario with spoilt answers")] = 3,
     first_seed: Annotated[int, typer.Option(help="seed of the first scenario")] = 9100,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON and nothing else")] = False,
 ) -> None:
     """Prints a table."""
-    print("| tier | role | player | sessions | subgoals | success | all trials | score | tokens in |")
-    print("|---|---|---|---|---|---|---|---|---|", flush=True)
+    rows = list[Row]()
+
+    def show(row: Row) -> None:
+        rows.append(row)
+        if not as_json:
+            print(row.line(), flush=True)
+
+    if not as_json:
+        print(HEAD, flush=True)
     for tier in tiers.split(","):
         towns = find_tier(tier).towns
         for role in map(Role, roles.split(",")):
@@ -120,9 +132,11 @@ def main(
                 (TextSession(role, towns[number % len(towns)], tier=tier, pages="changes"), first_seed + number)
                 for number in range(count)
             ]
-            print(scripted_row(tier, role, played).line(), flush=True)
+            show(scripted_row(tier, role, played))
             for rate in map(float, rates.split(",")):
-                print(read_row(tier, role, played, rate, trials if rate else 1).line(), flush=True)
+                show(read_row(tier, role, played, rate, trials if rate else 1))
+    if as_json:
+        print(json.dumps([asdict(row) for row in rows]))
 
 
 if __name__ == "__main__":

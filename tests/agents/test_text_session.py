@@ -234,6 +234,16 @@ def test_calls_that_take_no_time_count_for_the_limit_of_turns(name: str, argumen
     assert turns[-1].truncated and limited.finish().turns == 3
 
 
+def test_ad_wizard_is_told_why_its_change_was_refused() -> None:
+    session = TextSession(Role.AD_WIZARD, "brookside")
+    session.reset(7)
+    turn = session.answer({"change": "message", "again": "20"})
+    assert 'Your change "message" was refused: the message is empty.' in turn.page and turn.time < 5.0
+    turn = session.answer({"change": "message", "message": "Mind the road.", "again": "20"})
+    assert "was refused" not in turn.page
+    assert session.engine.session.messages[-1][1] == "Mind the road."
+
+
 def test_use_before_reset_is_an_error_in_words() -> None:
     session = TextSession(config=MINUTE)
     for call in (lambda: session.answer("{}"), lambda: session.tool("look"), session.finish):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +17,7 @@ from typer.testing import CliRunner
 from dorothie_gym.cli import play as module
 from dorothie_gym.cli.app import app
 from dorothie_gym.cli.play import ROLES
-from dorothie_gym.cli.terminal_play import COMMANDS, DRIVING, small_picture
+from dorothie_gym.cli.terminal_play import COMMANDS, DRIVING, END_OF_INPUT, TerminalKeys, small_picture
 from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.wrappers.macro_actions import MACRO_ACTIONS
 
@@ -27,7 +31,7 @@ def test_co_wizard_drives_and_talks_by_keys_until_the_time_is_up() -> None:
         "--terminal", "--town", "brookside", "--seed", "7", "--max-seconds", "20", keys="?f    v x g" + 40 * " "
     )
     assert done.exit_code == 0, done.output
-    for words in ("Keys: space continue", "You: ask where to", "Participant: ", "km/h", "▀", "The session is over."):
+    for words in ("Keys: space continue", "You: ask where to", "Participant: ", "km/h", "@@@", "The session is over."):
         assert words in done.stdout
 
 
@@ -35,12 +39,59 @@ def test_navigation_is_driven_by_keys_and_quit() -> None:
     done = play("navigation", "--town", "brookside", "--seed", "3", keys="      +  q")
     assert done.exit_code == 0, done.output
     assert "Participant: " in done.stdout and "You: faster" in done.stdout
-    assert "The session is over" not in done.stdout
+    assert "The session is over" not in done.stdout and "You have left the session." in done.stdout
 
 
 def test_impossible_keys_are_explained_and_the_end_of_the_input_ends_the_play() -> None:
     done = play("--terminal", "--town", "brookside", "--seed", "7", keys="m")
     assert done.exit_code == 0 and "say goal is not possible now" in done.stdout
+
+
+def test_the_end_of_the_input_and_an_empty_input_are_named() -> None:
+    done = play("navigation", "--town", "brookside", "--seed", "7", keys=" ")
+    assert done.exit_code == 0 and done.stdout.endswith("The input has ended; so has the session.\n")
+    done = play("navigation", "--town", "brookside", "--seed", "7")
+    assert done.exit_code == 2 and "there are no keys: the input is empty" in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="terminals of other systems have no devices")
+def test_keys_of_a_terminal_are_read_one_at_a_time() -> None:
+    import pty
+
+    master, terminal = pty.openpty()
+    with (
+        os.fdopen(master, "wb", buffering=0) as keyboard,
+        os.fdopen(terminal, "rb", buffering=0) as device,
+        open_keys(device) as read,
+    ):
+        keyboard.write("g\x1b[A\x1b[1;5C\x1bOP\x1b[3~é \x1b".encode())
+        pressed = [read() for _ in range(8)]
+        keyboard.write(b"\x04")
+        pressed.append(read())
+    assert pressed == ["g", "\x1b[A", "\x1b[1;5C", "\x1bOP", "\x1b[3~", "é", " ", "\x1b", END_OF_INPUT]
+
+
+@contextmanager
+def open_keys(device: Any) -> Iterator[Callable[[], str]]:
+    """Yields the reader of keys of a terminal's device, which is in cbreak mode then."""
+    import termios
+    import tty
+
+    before = termios.tcgetattr(device)
+    tty.setcbreak(device)
+    yield TerminalKeys(device.fileno()).read
+    termios.tcsetattr(device, termios.TCSANOW, before)
+
+
+@pytest.mark.parametrize("path", ["a_file", "a_file/below", "/proc/nowhere"])
+def test_a_folder_that_cannot_be_written_is_refused_before_the_seat_is_opened(
+    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a_file").touch()
+    done = play("--town", "brookside", "--out", path)
+    assert done.exit_code == 2 and done.stdout == "" and path in done.stderr and done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [tmp_path / "a_file"]
 
 
 def test_every_action_has_a_key() -> None:
@@ -97,3 +148,11 @@ def test_small_picture_keeps_proportions_and_colours() -> None:
     rows = text.plain.splitlines()
     assert len(rows) == 10 and {len(row) for row in rows} == {40}
     assert str(text.spans[0].style) == "rgb(255,0,0) on rgb(255,0,0)"
+
+
+def test_small_picture_fits_the_lines_and_needs_no_colours() -> None:
+    picture = np.zeros((400, 800, 3), dtype=np.uint8)
+    picture[:200] = 255
+    text = small_picture(picture, 100, 10, coloured=False)
+    assert text.plain.splitlines() == 5 * ["@" * 40] + 5 * [" " * 40]
+    assert not text.spans

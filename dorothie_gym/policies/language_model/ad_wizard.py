@@ -79,10 +79,12 @@ class AdWizardMemory(Memory):
 
     Attributes:
         order: requested change; None if there is none.
+        label: label of the change that was requested last.
         tasks: last observed state of the tasks.
     """
 
     order: AdWizardAction | None = None
+    label: str = ""
     tasks: bytes = b""
 
 
@@ -100,13 +102,15 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
     def attend(
         self, observation: ObservationMapping, memory: AdWizardMemory, delay: float
     ) -> tuple[AdWizardMemory, tuple[str, ...]]:
-        """Listens to both speakers; a change of the tasks triggers a call."""
+        """Listens to both speakers; a change of the tasks, or a refusal of the last one, triggers a call."""
         memory = replace(memory, clock=memory.clock.ticked(scalar(observation, "time")))
         memory, _ = with_heard(memory, observation, Role.PARTICIPANT, "participant")
         memory, _ = with_heard(memory, observation, Role.CO_WIZARD, "driver")
         tasks = observation["subgoals"].tobytes()
-        events = ("The tasks have changed, or one is done.",) if memory.tasks and tasks != memory.tasks else ()
-        return replace(memory, tasks=tasks), events
+        events = ["The tasks have changed, or one is done."] if memory.tasks and tasks != memory.tasks else []
+        if reason := str(observation["refusal_reason"]):
+            events.append(f'Your change "{memory.label}" was refused: {reason.partition(": ")[2]}.')
+        return replace(memory, tasks=tasks), tuple(events)
 
     def prompt(
         self, observation: ObservationMapping, memory: AdWizardMemory, events: Sequence[str]
@@ -141,9 +145,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
             return memory, int(answer["change"] != NONE)
         if order.exception.is_task or order.exception is ExceptionKind.MESSAGE:
             order = replace(order, message=answer["message"] or order.message)
-        if order.exception is ExceptionKind.MESSAGE and not order.message:
-            return memory, 0
-        return replace(memory, order=order), 0
+        return replace(memory, order=order, label=answer["change"]), 0
 
     def act(self, observation: ObservationMapping, memory: AdWizardMemory) -> tuple[ActionDict, AdWizardMemory, int]:
         """Makes the change."""

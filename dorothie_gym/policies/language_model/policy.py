@@ -62,6 +62,7 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
     """
 
     reads_mask = True
+    reads_refusals = True
 
     def __init__(
         self,
