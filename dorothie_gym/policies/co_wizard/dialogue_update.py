@@ -53,10 +53,12 @@ from dorothie_gym.policies.co_wizard.repairs import (
     hear_wrong_way,
     is_garbled,
     is_here,
+    is_lost_order,
     is_murmur,
     is_settled,
     is_unclear,
     is_unclear_reply,
+    lacks_what_to_do,
     names_unknown_place,
     note_contradiction,
     repeat_last,
@@ -108,7 +110,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     if is_murmur(state, view, heard):
         state.say(*before, *behind)
         return
-    unclear = is_unclear(state, view, heard)
+    unclear = is_unclear(state, view, heard) or lacks_what_to_do(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
     looks = looks_heard(state, heard)
@@ -326,7 +328,7 @@ def _explanation(
         _mentioned_place(state, view, act, words, name, rng)
     elif act.values(Slot.STREET):
         hear_description(state, view, act_builders.named_streets(act), landmarks, rng)
-    elif act.slots or not _senseless(state, view, act, words, asks=False):
+    elif act.slots or not _senseless(state, view, act, words, asks=is_lost_order(state, view, words)):
         _statement(state, view, act, words, rng)
 
 

@@ -19,7 +19,7 @@ from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
 from dorothie_gym.policies.co_wizard.intentions import Wish
-from dorothie_gym.policies.co_wizard.proposals import go_on_unanswered, propose_way
+from dorothie_gym.policies.co_wizard.proposals import go_on_unanswered, probable_way, propose_way
 from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -140,7 +140,7 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     if state.beliefs.goal is None and dialogue.heard_at >= 0.0 and silence > config.goal_interval:
         # the place may have been misheard, and asking for it helps more than asking for the way
         state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))
-    elif not asked and rng.random() < state.style.proposes:
+    elif not asked and rng.random() < state.style.proposes and probable_way(state, view, choice) is not None:
         propose_way(state, view, choice, rng)
     else:
         state.dialogue = state.dialogue.with_proposal(None)
@@ -317,8 +317,9 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
 
 def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Mentions, with some probability, a weather change or a crowd, after leaving time to the participant."""
-    if state.count % state.config.looks_every:
-        return
+    silence = view.time - max(state.dialogue.heard_at, state.speech.last_end)
+    if state.count % state.config.looks_every or silence < state.config.looks_after:
+        return  # the participant sees the same, and may be about to speak of it
     said, noticed = notice(
         state.dialogue.noticed, view.raw, view.objects, rng, chance=state.style.notices, handled=_HANDLED
     )

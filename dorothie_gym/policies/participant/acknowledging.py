@@ -56,6 +56,9 @@ CONSENTS: Final = 0.35
 ASKS_BACK: Final = 0.3
 """Share of the announcements of the car after which an impatient passenger asks how far it is."""
 
+UNDER_WAY: Final = 30.0
+"""Time after naming a destination before which nobody asks whether it is near [s]."""
+
 
 def take_note(state: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> None:
     """Reacts to a statement of the car: with a sign of hearing, consent, a question about the way, or not at all.
@@ -69,11 +72,13 @@ def take_note(state: ParticipantState, view: ParticipantView, heard: HeardUttera
     alone = heard.acts[0].move not in SIGNS_OF_HEARING
     nod = nod_to(view, heard)
     if alone and state.speech.idle and not state.guidance.guiding and not nod.wording.topic:
-        nod = _in_own_manner(state, heard, rng) or nod
+        nod = _in_own_manner(state, view.time, heard, rng) or nod
     _nod(state, view, rng, nod, heard.words.told, alone=alone)
 
 
-def _in_own_manner(state: ParticipantState, heard: HeardUtterance, rng: np.random.Generator) -> Remark | None:
+def _in_own_manner(
+    state: ParticipantState, now: float, heard: HeardUtterance, rng: np.random.Generator
+) -> Remark | None:
     """Returns the consent to an announced manoeuvre, or the question how far it is; None for an acknowledgement."""
     act, style = heard.acts[-1], state.style
     if act.move is not DialogueMove.EXPLAIN or not _MANOEUVRES & act.slots or state.task.goal is None:
@@ -83,7 +88,8 @@ def _in_own_manner(state: ParticipantState, heard: HeardUtterance, rng: np.rando
         announced = checked(state, act, heard.words)
         elided, wording = act_builders.arguments_of(announced), Wording(topic="goes_along")
         return intend(Function.ACCEPT, announced, elided=elided, wording=wording)
-    if draw < CONSENTS * style.thanks + ASKS_BACK * style.hurries:
+    on_the_way = now - state.task.announced_at > UNDER_WAY
+    if draw < CONSENTS * style.thanks + ASKS_BACK * style.hurries and on_the_way:
         place = state.task.goal.name
         for asked in (
             intend(Function.PROPOSITIONAL_QUESTION, Proposition.of(Predicate.CLOSE, place=place), elided=("place",)),
@@ -149,6 +155,8 @@ def _nod(
 ) -> None:
     """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
     waiting = state.speech.first
+    if told is not None and told.predicate is Predicate.ARRIVED and state.guidance.guiding and waiting is not None:
+        return  # "fine, and then a bit further" would agree that this is the place
     if waiting is not None and not waiting.urgent and not waiting.text:
         done = GoalStatus.COMPLETE in waiting.act.slots
         if waiting.act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:

@@ -50,6 +50,9 @@ _HASTE, _HURRIED = 5, 0.75
 _SPEEDING_UP = 130.0
 """Route length to the place below which the participant does not ask for more speed [m]."""
 
+CHAT_SILENCE = 4.0
+"""Silence of the car after which a remark is made that is unrelated to the task [s]."""
+
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the headlights [s]."""
 
@@ -314,6 +317,8 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     ]
     if progress.left(view.station) < 130.0 or (state.guidance.guiding and min(steps) < 140.0):
         return
+    if view.time - state.conversation.heard_at < CHAT_SILENCE:
+        return  # the car may have more to say, or has just answered the question
     next_chat = view.time + float(rng.exponential(state.style.chat)) + 20.0
     state.conversation = state.conversation.with_next_chat(next_chat)
     asked = _said_lately(state)

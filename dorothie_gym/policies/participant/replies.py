@@ -31,6 +31,7 @@ from dorothie_gym.policies.participant.arriving import straight_on
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn
 from dorothie_gym.policies.participant.goals import announcement, describe, pick_up_wording
 from dorothie_gym.policies.participant.guidance import next_step, note_step
+from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere, is_near_by
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
@@ -60,6 +61,12 @@ if TYPE_CHECKING:
 REASON_FIRST = 0.7
 """Share of the given reasons that come before the destination when the car asks for it."""
 
+TIME_TO_STOP = 5.0
+"""Time before the place in which a question for the way can still be answered, and the car be stopped [s]."""
+
+SLOW = 4.0
+"""Speed at which a car creeps towards a place [m/s]."""
+
 _YES_NO = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
 
 
@@ -73,8 +80,8 @@ _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we'
 """Words by which the car says that it has reached a place."""
 
 _LACKS_PLACE = re.compile(
-    r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|(don't know|no idea) where (?!we|i\b)"
-    r"|isn't marked)\b"
+    r"\b((can't|cannot) find|(is not|isn't|not)( \w+)? on my|doesn't show|don't have|isn't marked"
+    r"|(don't know|no idea) where (?!we|i\b))\b"
 )
 """Words by which the car says that it does not find the place, even if parts of them are misheard."""
 
@@ -217,7 +224,9 @@ def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMov
         return
     key, distance, words = step
     if key[0] == "on" and distance < state.config.stop_distance:
-        return  # the stop at the place is announced next
+        if distance > TIME_TO_STOP * max(view.speed, SLOW) and not view.standing:  # the stop is announced next
+            state.say_only(order(move, ActionValue.LANE_FOLLOW, Wording(topic="run_up")))
+        return
     if key[0] in ("turn", "on") and waits_for_road(state, view):
         state.say_first(intend(Function.UNCERTAIN_ANSWER))  # there is no way round
         return

@@ -46,6 +46,9 @@ def check(
     """Confirms or corrects a check of the car."""
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     goal = state.task.goal
+    if goal is not None and not state.task.announced and act.values(Slot.ACTION):
+        _name_untold_place(state, view, rng)  # "what's left?", half heard
+        return
     where = (
         streets if not act.values(Slot.ACTION) else ()
     )  # its place may have been misheard: "the ... on Beal, right?"
@@ -126,7 +129,6 @@ def answer_yes_no(
             again = announcement(state, view, rng)
             state.say_first(denied(words.asked or checked(state, act, words)), replace(again, joined=True))
     elif set(act.values(Slot.ACTION)) & _WAYS:
-        state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
     elif not act.slots and is_just_short(state, view):
         correct_arrival(state, view, words.asked)
@@ -185,11 +187,16 @@ def go_first(name: LandmarkName) -> Remark:
     return intend(Function.REQUEST, act_builders.destination(name), wording=Wording(topic="first"), joined=True)
 
 
+def _name_untold_place(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Names the next place to a car that asks about the way before it has been told where to go."""
+    state.task = state.task.after_announcement(view.time)
+    state.say_only(announcement(state, view, rng))
+
+
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct, rng: np.random.Generator) -> None:
     """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
     if not state.task.announced and state.task.goal is not None:
-        state.task = state.task.after_announcement(view.time)
-        state.say_only(announcement(state, view, rng))  # it cannot be about the way to a place that it does not know
+        _name_untold_place(state, view, rng)  # it cannot be about the way to a place that it does not know
         return
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
@@ -204,7 +211,11 @@ def _answer_street(state: ParticipantState, view: ParticipantView, act: Dialogue
 def _answer_proposal(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Confirms the right way, or else names it."""
+    """Confirms the right way, or else names it; names the place to a car that has not been told where to go."""
+    if state.task.goal is not None and not state.task.announced:
+        _name_untold_place(state, view, rng)
+        return
+    state.set_guiding(True)
     if words.direction is None and _ASKS_WHERE.search(words.text.lower()):
         name_step_or_place(state, view, rng)  # "please tell me where turn"
         return
