@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.reactions import says_missed
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -64,7 +63,7 @@ from dorothie_gym.policies.co_wizard.repairs import (
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over
+from dorothie_gym.policies.co_wizard.small_remarks import is_called_dark, passes_over, sign_of_statement
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import COMMON
@@ -364,8 +363,7 @@ def _statement(
     elif passes_over(state, words, rng):
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
-        sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None
-        state.say(sign_of_hearing("sorry" if says_missed(words.text) else "seen" if sees else "told"))
+        state.say(sign_of_statement(words, sees=camera_fault(view.raw) is None))
 
 
 def _reply(

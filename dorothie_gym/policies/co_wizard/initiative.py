@@ -45,8 +45,12 @@ HAZARD_EXPIRES = 4.0
 UNANSWERED = 3
 """Number of questions about the way without a word of the participant after which the car goes on by itself."""
 
+SENT_ON = 30.0
+"""Time for which a car asks for no way that was told to drive on until it hears more [s]."""
+
 _ANNOUNCES_U_TURN = 0.85  # probability that a car that turns round on its own says so
 _JUST_SAID = 8.0  # time for which a manoeuvre that was named need not be announced [s]
+_JUST_TOLD = 3  # number of remarks among which an answer about the camera counts as the report of its fault
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 
 _WISHED = {
@@ -129,7 +133,8 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     guided = state.beliefs.goal is not None and progress is None
     straight = any(way.type is LinkType.STRAIGHT for way in choice.exits)
     optional = guided and straight and not waiting
-    if optional and dialogue.considered_lane == choice.lane:
+    told_to_wait = view.time - dialogue.sent_on_at < SENT_ON
+    if optional and (dialogue.considered_lane == choice.lane or told_to_wait):
         return
     state.dialogue = dialogue.after_considering(choice.lane)
     if optional and rng.random() > state.style.asks:
@@ -263,6 +268,9 @@ def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         return
     if fault is None or known is not None:
         return  # the picture changes, the fault stays
+    if any(said.predicate is Predicate.FAILED for item in state.speech.said[-_JUST_TOLD:] for said in item.meaning):
+        _slower(state, view)  # it has answered a question about it
+        return
     effect = (view_remark(Limit.CAMERA, sight(view.raw), rng),) if rng.random() < state.style.rambles else ()
     failed = fault_remark(fault, joined=bool(effect))
     state.say(*effect, failed, *_slower(state, view))
@@ -325,6 +333,7 @@ def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
     )
     state.dialogue = state.dialogue.with_noticed(noticed)
     if said is not None:
+        state.speech = state.speech.hold(view.time + state.config.remark_delay)  # both may notice at the same moment
         state.say(said)
 
 

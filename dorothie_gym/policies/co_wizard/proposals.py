@@ -46,10 +46,10 @@ def propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: n
     street = street_of(view.raw, state.town, way.lane)
     named = action is ActionValue.J_TURN and rng.random() < 0.3
     content = act_builders.action(action, direction=direction, street=street if named else None)
-    function = Function.PROPOSITIONAL_QUESTION if rng.random() < 0.7 else Function.CHECK_QUESTION
     state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
     first = plan_remark(state, view, rng)
-    question = intend(function, content, wording=Wording(direction=direction), joined=bool(first))
+    wording = Wording(direction=direction)
+    question = intend(Function.PROPOSITIONAL_QUESTION, content, wording=wording, joined=bool(first))
     state.say(*first, question)
 
 

@@ -35,6 +35,7 @@ class DialogueState:
         considered_lane: lane before the last junction for which the Co-Wizard has decided whether to ask, -1 for none.
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
+        sent_on_at: time at which the participant has last said that it will say when [s].
         stop_instructed_at: time of the last instruction to stop [s].
         stop_reason: reason for that stop: an instruction, or a description of the place.
         u_turn_instructed_at: time of the last instruction to turn round [s].
@@ -60,6 +61,7 @@ class DialogueState:
     considered_lane: int = -1
     idle_since: float = 0.0
     steered_at: float = -math.inf
+    sent_on_at: float = -math.inf
     stop_instructed_at: float = -math.inf
     stop_reason: Proposition = TOLD_TO_STOP
     u_turn_instructed_at: float = -math.inf
@@ -100,6 +102,10 @@ class DialogueState:
     def after_steering(self, now: float) -> DialogueState:
         """Records a navigation instruction at `now` [s]."""
         return replace(self, steered_at=now)
+
+    def after_sending_on(self, now: float) -> DialogueState:
+        """Records that the participant wants to say when something is to be done."""
+        return replace(self, sent_on_at=now)
 
     def after_stop_instruction(self, now: float, reason: Proposition = TOLD_TO_STOP) -> DialogueState:
         """Records an instruction to stop at `now` [s], and the reason for it."""

@@ -12,6 +12,7 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Sl
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.arriving import about_to_arrive
 from dorothie_gym.policies.participant.short_answers import addition, checked
+from dorothie_gym.policies.participant.trip_memory import UNDER_WAY
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
@@ -55,9 +56,6 @@ CONSENTS: Final = 0.35
 
 ASKS_BACK: Final = 0.3
 """Share of the announcements of the car after which an impatient passenger asks how far it is."""
-
-UNDER_WAY: Final = 30.0
-"""Time after naming a destination before which nobody asks whether it is near [s]."""
 
 
 def take_note(state: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> None:

@@ -116,7 +116,7 @@ def _report_added(
     if view.speed > 2.0 and far and state.speech.idle and rng.random() < state.style.waits:
         state.task = state.task.waiting_until(view.time + state.config.thinking_time)
         stop = intend(Function.REQUEST, act_builders.action(ActionValue.STOP), urgent=True)
-        state.say(stop, replace(news, joined=True))
+        state.say(stop, news)
     else:
         state.say(news, *message_remark(state, view, landmark, rng))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
@@ -91,8 +92,20 @@ _KNOWS_WAY = re.compile(
 )
 """Words by which the car says that it knows the way to its destination."""
 
+_KNOWS_PLACE = re.compile(
+    r"\b(know (where it is|the way|the place|how to get)|(it's|have it) on my map|have (a|the) (route|way))\b"
+    r"|\b(minutes?|seconds?)( and a half)? (to go|from here)\b"
+)
+"""Words by which the car says that it needs no directions."""
+
+_MEASURES = re.compile(r"\b(minutes?|seconds?|meters?)\b")
+"""Words by which the car says how far it is."""
+
 _LACKS_GOAL = re.compile(r"\b(no destination|nothing on my list|don't know where to go)\b")
 """Words by which the car says that it was not told where to go, or has not understood it."""
+
+_OBEYED = re.compile(r"\b(you (told|asked) me|you said|told to)\b")
+"""Words by which the car says that it has stopped on an order."""
 
 _LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
 """Words by which the car says that it has stopped because it does not know the way."""
@@ -118,6 +131,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     if heard.words.told is not None and heard.words.told.predicate in _POOR_VIEW:
         state.conversation = state.conversation.after_talking_about_view()
         state.speech = state.speech.without_statements(_POOR_VIEW)
+    _note_knowledge(state, view, heard.words)
     if take_up_confirmation(state, view, heard, rng):
         return
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
@@ -135,6 +149,16 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         thank(state, view, rng)
     elif state.speech is before and needs_nod(state, view, heard):
         take_note(state, view, heard, rng)
+
+
+def _note_knowledge(state: ParticipantState, view: ParticipantView, words: ParsedText) -> None:
+    """Leaves the way to a car that says that it knows it, and remembers that it has said how far it is."""
+    said = words.text.lower()
+    if _MEASURES.search(said) is not None:
+        state.conversation = state.conversation.after_hearing_how_far(view.time)
+    knows = _KNOWS_PLACE.search(said) is not None and _LACKS_PLACE.search(said) is None
+    if knows and not words.question and not state.task.described:
+        state.set_guiding(False)
 
 
 # --- open questions -------------------------------------------------------------------------------------------------
@@ -316,6 +340,9 @@ def _answer_to_why(
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
     if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:
         return
+    if _OBEYED.search(said) and view.standing and math.isinf(state.task.resume_at) and not is_near_by(state, view):
+        state.say_first(intend(Function.REQUEST, act_builders.action(ActionValue.START)))
+        return  # it was a misunderstanding
     if _LACKS_WAY.search(said):
         state.set_guiding(True)
         before = state.speech

@@ -37,6 +37,9 @@ _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLL
 _ASKS_WHERE = re.compile(r"\b(where|which|tell me|what)\b")
 """Words of an open question for the way, of which a part was misheard."""
 
+_UNASKED = frozenset({ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
+"""Actions that the car checks only if it has heard an order."""
+
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 
@@ -58,6 +61,13 @@ def check(
             again = intend(Function.REQUEST, act_builders.destination(goal.name, goal.street), joined=True)
             state.say_first(denied(checked(state, act, words)), again)
             return
+    elif _is_unasked(state, act):
+        state.say_first(denied(checked(state, act, words)))
+        if goal is not None and state.task.announced:
+            state.task = state.task.after_reminding(view.time)
+            again = act_builders.destination(goal.name, goal.street)
+            state.say(intend(Function.REQUEST, again, joined=True))
+        return
     elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
         _refuse_with_step(state, view, act, words, rng)
         return
@@ -66,6 +76,12 @@ def check(
         state.task = state.task.after_announcement(view.time)
     wanted = checked(state, act, words)
     state.say_first(short(Function.CONFIRM, wanted), *addition(state, view, rng))
+
+
+def _is_unasked(state: ParticipantState, act: DialogueAct) -> bool:
+    """Returns whether the car takes up a speed or lights that were not spoken of: it has misheard something else."""
+    taken_up = _UNASKED & set(act.values(Slot.ACTION))
+    return bool(taken_up) and not any(taken_up & set(item.act.values(Slot.ACTION)) for item in state.speech.said)
 
 
 def _fits(
