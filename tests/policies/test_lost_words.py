@@ -104,9 +104,10 @@ def test_an_apology_is_no_news() -> None:
 
 def test_who_shall_say_when_is_not_asked_for_the_way() -> None:
     ride, _ = driver()
-    ride.say("keep going for now, I'll tell you when", seconds=2.0)
+    ride.say("keep going for now, I'll tell you when", seconds=6.0)
     assert ride.state.dialogue.sent_on_at > 0.0
-    assert ride.state.dialogue.steered_at >= ride.state.dialogue.sent_on_at
+    ride.say("turn left", seconds=4.0)
+    assert ride.state.dialogue.sent_on_at < 0.0
 
 
 # --- both -------------------------------------------------------------------------------------------------------------
@@ -135,8 +136,8 @@ def test_nobody_repeats_at_once_what_the_other_has_said_of_the_weather() -> None
 # --- the participant --------------------------------------------------------------------------------------------------
 
 
-def is_asked(human: Human, text: str, action: ActionValue) -> None:
-    raw = with_words(human.observation, Role.CO_WIZARD, text, DialogueAct.of(M.CHECK, action))
+def is_asked(human: Human, text: str, asked: ActionValue | LandmarkName) -> None:
+    raw = with_words(human.observation, Role.CO_WIZARD, text, DialogueAct.of(M.CHECK, asked))
     listen(human.state, replace(human.view, raw=raw), human.rng)
 
 
@@ -144,6 +145,13 @@ def test_a_speed_that_was_not_asked_for_is_denied_with_the_place() -> None:
     human = Human()
     is_asked(human, "so you want me to go faster, right?", A.SPEED_CHANGE)
     assert human.moves() == [M.REPLY_N, M.INSTRUCT]
+
+
+def test_a_choice_is_not_answered_with_yes() -> None:
+    human = Human()
+    is_asked(human, "do you mean before or after the Panera?", LandmarkName.PANERA)
+    (said,) = human.state.speech.queue
+    assert said.act.move is M.INSTRUCT and human.state.task.destination.name in said.act.slots
 
 
 def test_nothing_is_added_about_a_place_that_was_not_named() -> None:

@@ -97,7 +97,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
     if heard is None:
         return
-    state.dialogue = state.dialogue.after_hearing(view.time)
+    state.dialogue = state.dialogue.after_hearing(view.time, heard.words.text)
     state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
     if state.persona is not None:
         reaction = state.persona.draw_reaction(rng) - state.clock.interval / 2.0

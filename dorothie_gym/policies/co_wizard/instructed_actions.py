@@ -50,9 +50,6 @@ SPEED_RANGE = (10, 60)
 _SETS_RIGHT: Final = re.compile(r"\b(i mean|i meant|no|wrong|instead|not (?:faster|slower))\b", re.I)
 """Words by which a change of the speed takes the place of the opposite one."""
 
-_SAYS_WHEN: Final = re.compile(r"\b(say|tell you|let you know) (when|where to stop)\b", re.I)
-"""Words by which a participant asks for no questions until it speaks again."""
-
 Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]
 """Reaction to an instruction: changes the state (working copy) by the observation, the act and its words."""
 
@@ -70,8 +67,6 @@ def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 
 def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    if _SAYS_WHEN.search(words.text):
-        state.dialogue = state.dialogue.after_sending_on(view.time)
     lost = view.standing and not state.beliefs.exact  # a car that knows its way stands for the traffic
     close = state.intentions.halted or state.intentions.creeping or lost
     choice = junction_meant(state.town, view.here, view.choice)

@@ -7,6 +7,7 @@ works on a shallow copy of `CoWizardState` and replaces whole groups in it; the 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 
 from dorothie_gym.dialogue.propositions import Proposition
@@ -21,6 +22,9 @@ from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.speech import SpeakingState
+
+SAYS_WHEN = re.compile(r"\b(say|tell you|let you know) (when|where to stop)\b", re.I)
+"""Words by which a participant asks for no questions until it speaks again."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +83,10 @@ class DialogueState:
     contradicted: tuple[LandmarkName | None, int] = (None, 0)
     view_fault: Sensor | None = None
 
-    def after_hearing(self, now: float) -> DialogueState:
+    def after_hearing(self, now: float, text: str = "") -> DialogueState:
         """Records an utterance of the participant at `now` [s]."""
-        return replace(self, heard_at=now, idle_since=now, way_asks=0)
+        sent_on = now if SAYS_WHEN.search(text) else -math.inf
+        return replace(self, heard_at=now, idle_since=now, way_asks=0, sent_on_at=sent_on)
 
     def after_asking(self, now: float) -> DialogueState:
         """Records a question of the Co-Wizard at `now` [s]."""
@@ -102,10 +107,6 @@ class DialogueState:
     def after_steering(self, now: float) -> DialogueState:
         """Records a navigation instruction at `now` [s]."""
         return replace(self, steered_at=now)
-
-    def after_sending_on(self, now: float) -> DialogueState:
-        """Records that the participant wants to say when something is to be done."""
-        return replace(self, sent_on_at=now)
 
     def after_stop_instruction(self, now: float, reason: Proposition = TOLD_TO_STOP) -> DialogueState:
         """Records an instruction to stop at `now` [s], and the reason for it."""

@@ -52,6 +52,9 @@ def check(
     if goal is not None and not state.task.announced and act.values(Slot.ACTION):
         _name_untold_place(state, view, rng)  # "what's left?", half heard
         return
+    if goal is not None and words.order is not None and " or " in words.text:
+        state.say_first(replace(go_first(goal.name), joined=False))  # "before or after the Panera?" wants no yes
+        return
     where = (
         streets if not act.values(Slot.ACTION) else ()
     )  # its place may have been misheard: "the ... on Beal, right?"
