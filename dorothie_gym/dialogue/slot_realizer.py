@@ -270,7 +270,7 @@ class SlotRealizer:
 
     def _name(self, value: SlotValue, named: bool) -> str:
         lexicon, style, scene = load_lexicon(), self._style, self._scene
-        named = named or value is LandmarkName.PERSON  # who is not "that place"
+        named = named or value in (LandmarkName.PERSON, LandmarkName.HOUSE)  # "that one" could be any house
         if not named and scene.mentioned and value in scene.mentioned and self.random() < style.anaphora:
             return self.pick(lexicon.forms(value, "again"))
         if not named and value is scene.street and self.random() < style.anaphora:

@@ -72,6 +72,9 @@ CROWD_INTERVAL: Final = 180.0
 """Time between remarks about crowds of a kind [s]."""
 
 
+JUST_HEARD: Final = 12.0
+"""Time after a remark on a parameter of the weather within which the listener makes none on it [s]."""
+
 _TELLS_DISTANCE: Final = 0.2  # probability that the range of sight is named
 _NAMES_OBJECT: Final = 0.35  # probability that an object is named that is hidden or shown
 
@@ -100,6 +103,7 @@ class Noticed:
         crowds: kinds of crowds, with the time at which each was last noticed [s].
         usual: usual number of objects near, by the kinds of `CROWDS`.
         looked_at: time of the last look around [s].
+        heard: parameters of which the other speaker has spoken, with the time [s].
     """
 
     weather: frozenset[W] = frozenset()
@@ -107,6 +111,7 @@ class Noticed:
     crowds: tuple[tuple[ObjectClass, float], ...] = ()
     usual: tuple[float, ...] = (0.0,) * len(CROWDS)
     looked_at: float = 0.0
+    heard: tuple[tuple[W, float], ...] = ()
 
     def with_change(self, parameter: W, *, high: bool) -> Noticed:
         """Records that a parameter has become conspicuous, or has ceased to be."""
@@ -132,14 +137,20 @@ class Noticed:
         return replace(self, usual=usual, looked_at=now)
 
     def after_hearing(self, words: ParsedText, now: float) -> Noticed:
-        """Records conditions that the other speaker has just mentioned at a time [s], which then need no mention."""
+        """Records conditions that the other speaker has just mentioned at a time [s], which then need no mention.
+
+        Words may be misheard: "the clouds are" speaks of the clouds, and "there are so people" of a crowd.
+        """
         told = words.told
-        if told is None:
+        if told is None and (words.question or words.plan or set(words.objects).isdisjoint(CROWDS)):
             return self
-        parameter = told.get("parameter")
+        parameter = None if told is None else told.get("parameter")
         if isinstance(parameter, W):
-            return self.with_mention(parameter, high=told.get("high") is True)
-        if told.predicate is not Predicate.CROWDED:
+            heard = (*(row for row in self.heard if row[0] is not parameter), (parameter, now))
+            return replace(
+                self.with_mention(parameter, high=told is not None and told.get("high") is True), heard=heard
+            )
+        if told is not None and told.predicate is not Predicate.CROWDED:
             return self
         # "look at that traffic" names no object
         kind = next((thing for thing in words.objects if thing in CROWDS), ObjectClass.VEHICLES)
@@ -167,8 +178,9 @@ def notice(
 
     Returns: The remark, or None, and the noticed conditions.
     """
+    heard = {parameter for parameter, at in noticed.heard if scalar(observation, "time") - at < JUST_HEARD}
     for parameter, high in changes(observation, noticed.weather):
-        told = (parameter, high) in noticed.mentioned
+        told = (parameter, high) in noticed.mentioned or parameter in heard
         noticed = noticed.with_change(parameter, high=high)
         if not told and not (high and parameter in handled) and rng.random() < chance:
             return weather_change_remark(parameter, high=high), noticed

@@ -14,6 +14,7 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     Role,
     Slot,
+    StreetName,
 )
 from dorothie_gym.policies import ScriptedCoWizard
 from dorothie_gym.policies.co_wizard.intentions import Wish
@@ -175,8 +176,10 @@ def test_wish_is_kept_at_red_light():
 def test_proposed_way_is_taken_after_yes():
     talk = Talk(seed=3)
     talk.state = replace(talk.state, style=replace(talk.state.style, proposes=1.0))
+    named = tuple(name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED))
     while talk.state.dialogue.proposed is None:
         assert len(talk.actions) < 60
+        talk.state = replace(talk.state, beliefs=replace(talk.state.beliefs, streets=named))  # a reason to propose
         talk.step()
     proposed = talk.state.dialogue.proposed
     talk.say(DialogueMove.REPLY_Y, decisions=4)

@@ -67,11 +67,17 @@ def acknowledge(
     at_once = action in _AT_ONCE or words.further or words.distance is not None
     if rng.random() < state.style.checks * 0.25 and not at_once:
         state.say(intend(Function.CHECK_QUESTION, wanted, wording=wording))
-    elif rng.random() < state.style.echoes and not (words.further or words.distance is not None):
+    elif rng.random() < state.style.echoes and not _is_yet_to_come(view, action, words):
         state.say(*_repeated(wanted, wording, rng))
     else:
         more = plan_remark(state, view, rng, joined=True) if state.beliefs.exact and action not in _AT_ONCE else ()
         state.say(taken_on(state, wanted, rng, promises=action in _AT_ONCE), *more)
+
+
+def _is_yet_to_come(view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
+    """Returns whether "slowing down" or "turning now" would be wrong: the action comes later, or is a short way on."""
+    later = (action is ActionValue.SPEED_CHANGE and view.standing) or (words.ordinal or 1) > 1
+    return later or words.further or words.distance is not None
 
 
 def what_keeps(state: CoWizardState, view: CoWizardView, action: ActionValue) -> Remark | None:

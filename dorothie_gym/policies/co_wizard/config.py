@@ -70,6 +70,8 @@ class CoWizardConfig:
         found_variance: variance of the position below which it is measured again [m^2].
         contradictions: instructions against the route to a destination after which it is checked.
         looks_every: decisions after which the Co-Wizard looks around for changes to mention.
+        looks_after: silence after which it does [s].
+        remark_delay: time after which it says what it has seen, unless the participant does [s].
         leaves_weather: probability that mentioning the weather is left to the participant.
         accepts: probability that an instruction is accepted ("will do") rather than only heard ("okay").
     """
@@ -121,6 +123,8 @@ class CoWizardConfig:
     found_variance: float = 0.08
     contradictions: int = 2
     looks_every: int = 8
+    looks_after: float = 3.0
+    remark_delay: float = 1.0
     leaves_weather: float = 0.25
     accepts: float = 0.45
 

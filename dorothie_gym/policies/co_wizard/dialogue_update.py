@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
-from dorothie_gym.dialogue.reactions import says_missed
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -53,16 +52,18 @@ from dorothie_gym.policies.co_wizard.repairs import (
     hear_wrong_way,
     is_garbled,
     is_here,
+    is_lost_order,
     is_murmur,
     is_settled,
     is_unclear,
     is_unclear_reply,
+    lacks_what_to_do,
     names_unknown_place,
     note_contradiction,
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.small_remarks import IN_SIGHT, is_called_dark, passes_over
+from dorothie_gym.policies.co_wizard.small_remarks import is_called_dark, passes_over, sign_of_statement
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import COMMON
@@ -96,7 +97,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
     if heard is None:
         return
-    state.dialogue = state.dialogue.after_hearing(view.time)
+    state.dialogue = state.dialogue.after_hearing(view.time, heard.words.text)
     state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
     if state.persona is not None:
         reaction = state.persona.draw_reaction(rng) - state.clock.interval / 2.0
@@ -108,7 +109,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     if is_murmur(state, view, heard):
         state.say(*before, *behind)
         return
-    unclear = is_unclear(state, view, heard)
+    unclear = is_unclear(state, view, heard) or lacks_what_to_do(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
     looks = looks_heard(state, heard)
@@ -326,7 +327,7 @@ def _explanation(
         _mentioned_place(state, view, act, words, name, rng)
     elif act.values(Slot.STREET):
         hear_description(state, view, act_builders.named_streets(act), landmarks, rng)
-    elif act.slots or not _senseless(state, view, act, words, asks=False):
+    elif act.slots or not _senseless(state, view, act, words, asks=is_lost_order(state, view, words)):
         _statement(state, view, act, words, rng)
 
 
@@ -362,8 +363,7 @@ def _statement(
     elif passes_over(state, words, rng):
         return
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
-        sees = words.told is not None and words.told.predicate in IN_SIGHT and camera_fault(view.raw) is None
-        state.say(sign_of_hearing("sorry" if says_missed(words.text) else "seen" if sees else "told"))
+        state.say(sign_of_statement(words, sees=camera_fault(view.raw) is None))
 
 
 def _reply(

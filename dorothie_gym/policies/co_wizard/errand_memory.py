@@ -45,6 +45,13 @@ _DRIVES = re.compile(
 
 _CUT_OFF = re.compile(r"\b(of|for|to|and|a|an|the|with|some|his|her|their)$")
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
+_FUNCTION_WORD = re.compile(
+    r"(an?|the|this|that|these|those|or|but|on|in|of|with|from|by|up|down|it|is|are|was|be|been|has|have|had|you|me|we"
+    r"|he|she|they|him|her|us|them|my|your|our|who|what|where|when|how|there|here|please|just)",
+    re.I,
+)
+"""Words that the recogniser may put in the place of a name, with its capital."""
+
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
 
@@ -99,12 +106,17 @@ def note_friend(state: CoWizardState, heard: HeardUtterance) -> None:
     if not any(GoalStatus.PENDING not in slots and not _OVER & slots for slots in about):
         return
     found = _FRIEND.search(heard.words.text)
-    if found is not None:
+    if found is not None and not _is_no_name(found["friend"]):
         if state.beliefs.friend is not None and found["friend"] != state.beliefs.friend:
             state.beliefs = state.beliefs.without_look()
         state.beliefs = state.beliefs.with_friend(found["friend"])
     elif any(_OVER & act.slots for act in heard.acts) or state.beliefs.goal is not LandmarkName.PERSON:
         state.beliefs = state.beliefs.with_friend(None)  # somebody else than the last one
+
+
+def _is_no_name(word: str) -> bool:
+    """Returns whether a capital word is no name, but a word that the recogniser has put in the place of one."""
+    return word.lower() in _BEFORE_NAMES or _FUNCTION_WORD.fullmatch(word) is not None
 
 
 def without_purposes(heard: HeardUtterance) -> HeardUtterance:

@@ -10,7 +10,7 @@ import numpy as np
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
-from dorothie_gym.ontology.slots import ActionValue, ObjectClass
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.destinations import plan_route
 from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
@@ -54,8 +54,9 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
         state.say(intend(CommunicativeFunction.OFFER, detour, wording=Wording(topic="detour"), joined=not told))
     else:
         state.dialogue = state.dialogue.after_asking(view.time)
-        way = act_builders.action(ActionValue.QUERIED)
-        state.say(intend(CommunicativeFunction.SET_QUESTION, way, joined=not told))
+        lacks_goal = state.beliefs.goal is None or state.intentions.arrived
+        way, where = act_builders.action(ActionValue.QUERIED), act_builders.destination(LandmarkName.QUERIED)
+        state.say(intend(CommunicativeFunction.SET_QUESTION, where if lacks_goal else way, joined=not told))
     state.intentions = state.intentions.blocked()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.ontology.slots import ActionValue, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.intentions import Directive
@@ -17,22 +17,39 @@ from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import intend
 
 if TYPE_CHECKING:
+    from dorothie_gym.maps.model import Exit
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
 
+def probable_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> Exit | None:
+    """Returns the exit that the car has a reason to think of; None without one.
+
+    It leads onto a street on which the place is said to be, or straight on along such a street.
+
+    Args:
+        state: state of the Co-Wizard.
+        view: observation.
+        choice: exits of the next junction.
+    """
+    meant = set(state.beliefs.streets) - {StreetName.UNKNOWN, StreetName.QUERIED}
+    leading = [way for way in choice.exits if street_of(view.raw, state.town, way.lane) in meant]
+    return min(leading, key=lambda way: abs(way.angle)) if leading else None
+
+
 def propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: np.random.Generator) -> None:
-    """Asks whether one of the exits is meant."""
-    way = choice.exits[int(rng.integers(len(choice.exits)))]
+    """Asks whether one of the exits is meant: the one that the car has a reason to think of, otherwise any."""
+    drawn = choice.exits[int(rng.integers(len(choice.exits)))]
+    way = probable_way(state, view, choice) or drawn
     direction = direction_of(way)
     action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
     street = street_of(view.raw, state.town, way.lane)
     named = action is ActionValue.J_TURN and rng.random() < 0.3
     content = act_builders.action(action, direction=direction, street=street if named else None)
-    function = Function.PROPOSITIONAL_QUESTION if rng.random() < 0.7 else Function.CHECK_QUESTION
     state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
     first = plan_remark(state, view, rng)
-    question = intend(function, content, wording=Wording(direction=direction), joined=bool(first))
+    wording = Wording(direction=direction)
+    question = intend(Function.PROPOSITIONAL_QUESTION, content, wording=wording, joined=bool(first))
     state.say(*first, question)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.reactions import is_in_passing, is_praise
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
@@ -46,6 +47,14 @@ _WITHOUT_CONTENT = frozenset(
 
 _WANTS_REPLY = act_builders.QUESTIONS | {DialogueMove.INSTRUCT, DialogueMove.CONFUSE, DialogueMove.ALIGN}
 _EMPTY = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.EXPLAIN})
+_ORDERS = frozenset({DialogueMove.INSTRUCT, DialogueMove.CLARIFY, DialogueMove.REPLY_W})
+
+SLOWEST: Final = 10
+"""Lowest speed to which a car is asked to speed up [km/h]."""
+
+SPEED_TOLERANCE: Final = 5
+"""Error with which a passenger estimates the speed [km/h]."""
+
 _NO_MORE: Final = 6.0  # time after a remark within which a murmur is a reaction to it [s]
 
 _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
@@ -55,6 +64,13 @@ _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predi
 def is_garbled(words: ParsedText) -> bool:
     """Returns whether words that make no sense are so few that they have probably been misheard."""
     return len(words.text.split()) <= FRAGMENT
+
+
+def is_lost_order(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether a few words that state nothing may be the rest of an order ("lane, mate"): the car is guided."""
+    guided = state.beliefs.goal is not None and not state.beliefs.exact and not state.intentions.arrived
+    says = words.told is not None or is_in_passing(words.text) or is_praise(words.text)
+    return guided and is_garbled(words) and not says and state.speech.may_ask_back(view.time)
 
 
 def names_unknown_place(state: CoWizardState, words: ParsedText) -> bool:
@@ -93,6 +109,33 @@ def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) 
     if stops or not is_partly_inaudible(heard.words.text):
         return False
     return state.speech.may_ask_back(view.time) or not any(act.slots for act in heard.acts)
+
+
+def lacks_what_to_do(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
+    """Returns whether an order was heard without what it asks for, and must be repeated.
+
+    That is a turn to no side ("we-turn"), a number without an action ("go up to fairly-five"), or a speed that is
+    lower than the present one although the car shall speed up ("speed up to five").
+
+    Args:
+        state: state of the Co-Wizard.
+        view: observation.
+        heard: the utterance.
+    """
+    act, words = heard.acts[0], heard.words
+    if len(heard.acts) > 1 or act.move not in _ORDERS or words.question or not state.speech.may_ask_back(view.time):
+        return False  # once it has been repeated, it must do
+    actions = act.values(Slot.ACTION)
+    if not act.slots:
+        return words.speed is not None and not words.plan
+    if actions == (ActionValue.J_TURN,):
+        return act.slots == {ActionValue.J_TURN} and words.direction is None and not words.turns
+    return actions == (ActionValue.SPEED_CHANGE,) and words.speed is not None and _is_absurd(view, words)
+
+
+def _is_absurd(view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether a speed was probably misheard: the car shall speed up, to less than it drives."""
+    return words.faster is True and (words.speed or 0) < max(SLOWEST, 3.6 * view.speed - SPEED_TOLERANCE)
 
 
 def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.reactions import is_in_passing, is_praise
+from dorothie_gym.dialogue.reactions import is_in_passing, is_praise, says_missed
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from dorothie_gym.dialogue.nlu import ParsedText
     from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.speech import Remark
 
 IN_SIGHT: Final = frozenset(
     {Predicate.WEATHER, Predicate.CROWDED, Predicate.SEES, Predicate.BLOCKED, Predicate.VISIBILITY, Predicate.LIGHTS_ON}
@@ -40,6 +41,19 @@ def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generato
     if praises and rng.random() < _ANSWERED:
         state.say(sign_of_hearing("praise"))
     return praises
+
+
+def sign_of_statement(words: ParsedText, *, sees: bool) -> Remark:
+    """Returns the acknowledgement of a statement: of an apology, a miss, something visible, or news.
+
+    Args:
+        words: the statement.
+        sees: whether the car sees what is around it.
+    """
+    visible = sees and words.told is not None and words.told.predicate in IN_SIGHT
+    if "sorry" in words.text.lower().replace(",", " ").split():
+        return sign_of_hearing("ordered")
+    return sign_of_hearing("sorry" if says_missed(words.text) else "seen" if visible else "told")
 
 
 def is_called_dark(words: ParsedText) -> bool:

@@ -7,6 +7,7 @@ works on a shallow copy of `CoWizardState` and replaces whole groups in it; the 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 
 from dorothie_gym.dialogue.propositions import Proposition
@@ -22,6 +23,9 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_state import RouteState
 from dorothie_gym.policies.speech import SpeakingState
 
+SAYS_WHEN = re.compile(r"\b(say|tell you|let you know) (when|where to stop)\b", re.I)
+"""Words by which a participant asks for no questions until it speaks again."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DialogueState:
@@ -35,6 +39,7 @@ class DialogueState:
         considered_lane: lane before the last junction for which the Co-Wizard has decided whether to ask, -1 for none.
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
+        sent_on_at: time at which the participant has last said that it will say when [s].
         stop_instructed_at: time of the last instruction to stop [s].
         stop_reason: reason for that stop: an instruction, or a description of the place.
         u_turn_instructed_at: time of the last instruction to turn round [s].
@@ -60,6 +65,7 @@ class DialogueState:
     considered_lane: int = -1
     idle_since: float = 0.0
     steered_at: float = -math.inf
+    sent_on_at: float = -math.inf
     stop_instructed_at: float = -math.inf
     stop_reason: Proposition = TOLD_TO_STOP
     u_turn_instructed_at: float = -math.inf
@@ -77,9 +83,10 @@ class DialogueState:
     contradicted: tuple[LandmarkName | None, int] = (None, 0)
     view_fault: Sensor | None = None
 
-    def after_hearing(self, now: float) -> DialogueState:
+    def after_hearing(self, now: float, text: str = "") -> DialogueState:
         """Records an utterance of the participant at `now` [s]."""
-        return replace(self, heard_at=now, idle_since=now, way_asks=0)
+        sent_on = now if SAYS_WHEN.search(text) else -math.inf
+        return replace(self, heard_at=now, idle_since=now, way_asks=0, sent_on_at=sent_on)
 
     def after_asking(self, now: float) -> DialogueState:
         """Records a question of the Co-Wizard at `now` [s]."""

@@ -19,7 +19,7 @@ from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
 from dorothie_gym.policies.co_wizard.intentions import Wish
-from dorothie_gym.policies.co_wizard.proposals import go_on_unanswered, propose_way
+from dorothie_gym.policies.co_wizard.proposals import go_on_unanswered, probable_way, propose_way
 from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
 from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -45,8 +45,12 @@ HAZARD_EXPIRES = 4.0
 UNANSWERED = 3
 """Number of questions about the way without a word of the participant after which the car goes on by itself."""
 
+SENT_ON = 30.0
+"""Time for which a car asks for no way that was told to drive on until it hears more [s]."""
+
 _ANNOUNCES_U_TURN = 0.85  # probability that a car that turns round on its own says so
 _JUST_SAID = 8.0  # time for which a manoeuvre that was named need not be announced [s]
+_JUST_TOLD = 3  # number of remarks among which an answer about the camera counts as the report of its fault
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 
 _WISHED = {
@@ -129,7 +133,8 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     guided = state.beliefs.goal is not None and progress is None
     straight = any(way.type is LinkType.STRAIGHT for way in choice.exits)
     optional = guided and straight and not waiting
-    if optional and dialogue.considered_lane == choice.lane:
+    told_to_wait = view.time - dialogue.sent_on_at < SENT_ON
+    if optional and (dialogue.considered_lane == choice.lane or told_to_wait):
         return
     state.dialogue = dialogue.after_considering(choice.lane)
     if optional and rng.random() > state.style.asks:
@@ -140,7 +145,7 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     if state.beliefs.goal is None and dialogue.heard_at >= 0.0 and silence > config.goal_interval:
         # the place may have been misheard, and asking for it helps more than asking for the way
         state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))
-    elif not asked and rng.random() < state.style.proposes:
+    elif not asked and rng.random() < state.style.proposes and probable_way(state, view, choice) is not None:
         propose_way(state, view, choice, rng)
     else:
         state.dialogue = state.dialogue.with_proposal(None)
@@ -263,6 +268,9 @@ def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         return
     if fault is None or known is not None:
         return  # the picture changes, the fault stays
+    if any(said.predicate is Predicate.FAILED for item in state.speech.said[-_JUST_TOLD:] for said in item.meaning):
+        _slower(state, view)  # it has answered a question about it
+        return
     effect = (view_remark(Limit.CAMERA, sight(view.raw), rng),) if rng.random() < state.style.rambles else ()
     failed = fault_remark(fault, joined=bool(effect))
     state.say(*effect, failed, *_slower(state, view))
@@ -317,13 +325,15 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
 
 def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Mentions, with some probability, a weather change or a crowd, after leaving time to the participant."""
-    if state.count % state.config.looks_every:
-        return
+    silence = view.time - max(state.dialogue.heard_at, state.speech.last_end)
+    if state.count % state.config.looks_every or silence < state.config.looks_after:
+        return  # the participant sees the same, and may be about to speak of it
     said, noticed = notice(
         state.dialogue.noticed, view.raw, view.objects, rng, chance=state.style.notices, handled=_HANDLED
     )
     state.dialogue = state.dialogue.with_noticed(noticed)
     if said is not None:
+        state.speech = state.speech.hold(view.time + state.config.remark_delay)  # both may notice at the same moment
         state.say(said)
 
 

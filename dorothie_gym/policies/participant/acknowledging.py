@@ -12,6 +12,7 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Sl
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.answer_parts import addition, checked
 from dorothie_gym.policies.participant.final_approach import about_to_arrive
+from dorothie_gym.policies.participant.trip_memory import UNDER_WAY
 from dorothie_gym.policies.speech import Remark, intend
 
 if TYPE_CHECKING:
@@ -69,11 +70,13 @@ def take_note(state: ParticipantState, view: ParticipantView, heard: HeardUttera
     alone = heard.acts[0].move not in SIGNS_OF_HEARING
     nod = nod_to(view, heard)
     if alone and state.speech.idle and not state.guidance.guiding and not nod.wording.topic:
-        nod = _in_own_manner(state, heard, rng) or nod
+        nod = _in_own_manner(state, view.time, heard, rng) or nod
     _nod(state, view, rng, nod, heard.words.told, alone=alone)
 
 
-def _in_own_manner(state: ParticipantState, heard: HeardUtterance, rng: np.random.Generator) -> Remark | None:
+def _in_own_manner(
+    state: ParticipantState, now: float, heard: HeardUtterance, rng: np.random.Generator
+) -> Remark | None:
     """Returns the consent to an announced manoeuvre, or the question how far it is; None for an acknowledgement."""
     act, style = heard.acts[-1], state.style
     if act.move is not DialogueMove.EXPLAIN or not _MANOEUVRES & act.slots or state.task.goal is None:
@@ -83,7 +86,8 @@ def _in_own_manner(state: ParticipantState, heard: HeardUtterance, rng: np.rando
         announced = checked(state, act, heard.words)
         elided, wording = act_builders.arguments_of(announced), Wording(topic="goes_along")
         return intend(Function.ACCEPT, announced, elided=elided, wording=wording)
-    if draw < CONSENTS * style.thanks + ASKS_BACK * style.hurries:
+    on_the_way = now - state.task.announced_at > UNDER_WAY
+    if draw < CONSENTS * style.thanks + ASKS_BACK * style.hurries and on_the_way:
         place = state.task.goal.name
         for asked in (
             intend(Function.PROPOSITIONAL_QUESTION, Proposition.of(Predicate.CLOSE, place=place), elided=("place",)),
@@ -149,6 +153,8 @@ def _nod(
 ) -> None:
     """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
     waiting = state.speech.first
+    if told is not None and told.predicate is Predicate.ARRIVED and state.guidance.guiding and waiting is not None:
+        return  # "fine, and then a bit further" would agree that this is the place
     if waiting is not None and not waiting.urgent and not waiting.text:
         done = GoalStatus.COMPLETE in waiting.act.slots
         if waiting.act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:

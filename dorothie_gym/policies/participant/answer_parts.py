@@ -46,8 +46,8 @@ def denied(content: Proposition) -> Remark:
 
 def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns, with some probability, a hint or reason to add to an answer."""
-    if rng.random() >= state.style.reasons:
-        return ()
+    if rng.random() >= state.style.reasons or not state.task.announced:
+        return ()  # the listener does not know yet what it would be about
     if state.guidance.guiding or not is_in_mind(state, view) or rng.random() < 0.5:
         return hint(state, view, rng)
     return tuple(item for item in story_remark(state, view, rng) if item.wording.topic != "reason")

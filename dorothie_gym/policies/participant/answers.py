@@ -37,6 +37,9 @@ _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLL
 _ASKS_WHERE = re.compile(r"\b(where|which|tell me|what)\b")
 """Words of an open question for the way, of which a part was misheard."""
 
+_UNASKED = frozenset({ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
+"""Actions that the car checks only if it has heard an order."""
+
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 
@@ -46,6 +49,12 @@ def check(
     """Confirms or corrects a check of the car."""
     landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
     goal = state.task.goal
+    if goal is not None and not state.task.announced and act.values(Slot.ACTION):
+        _name_untold_place(state, view, rng)  # "what's left?", half heard
+        return
+    if goal is not None and words.order is not None and " or " in words.text:
+        state.say_first(replace(go_first(goal.name), joined=False))  # "before or after the Panera?" wants no yes
+        return
     where = (
         streets if not act.values(Slot.ACTION) else ()
     )  # its place may have been misheard: "the ... on Beal, right?"
@@ -55,6 +64,13 @@ def check(
             again = intend(Function.REQUEST, act_builders.destination(goal.name, goal.street), joined=True)
             state.say_first(denied(checked(state, act, words)), again)
             return
+    elif _is_unasked(state, act):
+        state.say_first(denied(checked(state, act, words)))
+        if goal is not None and state.task.announced:
+            state.task = state.task.after_reminding(view.time)
+            again = act_builders.destination(goal.name, goal.street)
+            state.say(intend(Function.REQUEST, again, joined=True))
+        return
     elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
         _refuse_with_step(state, view, act, words, rng)
         return
@@ -63,6 +79,12 @@ def check(
         state.task = state.task.after_announcement(view.time)
     wanted = checked(state, act, words)
     state.say_first(short(Function.CONFIRM, wanted), *addition(state, view, rng))
+
+
+def _is_unasked(state: ParticipantState, act: DialogueAct) -> bool:
+    """Returns whether the car takes up a speed or lights that were not spoken of: it has misheard something else."""
+    taken_up = _UNASKED & set(act.values(Slot.ACTION))
+    return bool(taken_up) and not any(taken_up & set(item.act.values(Slot.ACTION)) for item in state.speech.said)
 
 
 def _fits(
@@ -126,7 +148,6 @@ def answer_yes_no(
             again = announcement(state, view, rng)
             state.say_first(denied(words.asked or checked(state, act, words)), replace(again, joined=True))
     elif set(act.values(Slot.ACTION)) & _WAYS:
-        state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
     elif not act.slots and is_just_short(state, view):
         correct_arrival(state, view, words.asked)
@@ -185,11 +206,16 @@ def go_first(name: LandmarkName) -> Remark:
     return intend(Function.REQUEST, act_builders.destination(name), wording=Wording(topic="first"), joined=True)
 
 
+def _name_untold_place(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Names the next place to a car that asks about the way before it has been told where to go."""
+    state.task = state.task.after_announcement(view.time)
+    state.say_only(announcement(state, view, rng))
+
+
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct, rng: np.random.Generator) -> None:
     """Accepts a detour that is the participant's own, or over a street that it has named; else insists on its own."""
     if not state.task.announced and state.task.goal is not None:
-        state.task = state.task.after_announcement(view.time)
-        state.say_only(announcement(state, view, rng))  # it cannot be about the way to a place that it does not know
+        _name_untold_place(state, view, rng)  # it cannot be about the way to a place that it does not know
         return
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
@@ -204,7 +230,11 @@ def _answer_street(state: ParticipantState, view: ParticipantView, act: Dialogue
 def _answer_proposal(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Confirms the right way, or else names it."""
+    """Confirms the right way, or else names it; names the place to a car that has not been told where to go."""
+    if state.task.goal is not None and not state.task.announced:
+        _name_untold_place(state, view, rng)
+        return
+    state.set_guiding(True)
     if words.direction is None and _ASKS_WHERE.search(words.text.lower()):
         name_step_or_place(state, view, rng)  # "please tell me where turn"
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
@@ -40,6 +41,7 @@ from dorothie_gym.policies.participant.answers import (
 )
 from dorothie_gym.policies.participant.early_corrections import contradicts_turn
 from dorothie_gym.policies.participant.final_approach import straight_on
+from dorothie_gym.policies.participant.order_wording import order
 from dorothie_gym.policies.participant.proposition_truth import has_just_finished, is_elsewhere, is_near_by
 from dorothie_gym.policies.participant.repairs import ask_back, correction, explain_again, has_missed
 from dorothie_gym.policies.participant.route_steps import route_step
@@ -60,6 +62,12 @@ if TYPE_CHECKING:
 REASON_FIRST = 0.7
 """Share of the given reasons that come before the destination when the car asks for it."""
 
+TIME_TO_STOP = 5.0
+"""Time before the place in which a question for the way can still be answered, and the car be stopped [s]."""
+
+SLOW = 4.0
+"""Speed at which a car creeps towards a place [m/s]."""
+
 _YES_NO = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM})
 
 
@@ -73,8 +81,8 @@ _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we'
 """Words by which the car says that it has reached a place."""
 
 _LACKS_PLACE = re.compile(
-    r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|(don't know|no idea) where (?!we|i\b)"
-    r"|isn't marked)\b"
+    r"\b((can't|cannot) find|(is not|isn't|not)( \w+)? on my|doesn't show|don't have|isn't marked"
+    r"|(don't know|no idea) where (?!we|i\b))\b"
 )
 """Words by which the car says that it does not find the place, even if parts of them are misheard."""
 
@@ -84,8 +92,20 @@ _KNOWS_WAY = re.compile(
 )
 """Words by which the car says that it knows the way to its destination."""
 
+_KNOWS_PLACE = re.compile(
+    r"\b(know (where it is|the way|the place|how to get)|(it's|have it) on my map|have (a|the) (route|way))\b"
+    r"|\b(minutes?|seconds?)( and a half)? (to go|from here)\b"
+)
+"""Words by which the car says that it needs no directions."""
+
+_MEASURES = re.compile(r"\b(minutes?|seconds?|meters?)\b")
+"""Words by which the car says how far it is."""
+
 _LACKS_GOAL = re.compile(r"\b(no destination|nothing on my list|don't know where to go)\b")
 """Words by which the car says that it was not told where to go, or has not understood it."""
+
+_OBEYED = re.compile(r"\b(you (told|asked) me|you said|told to)\b")
+"""Words by which the car says that it has stopped on an order."""
 
 _LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
 """Words by which the car says that it has stopped because it does not know the way."""
@@ -111,6 +131,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     if heard.words.told is not None and heard.words.told.predicate in _POOR_VIEW:
         state.conversation = state.conversation.after_talking_about_view()
         state.speech = state.speech.without_statements(_POOR_VIEW)
+    _note_knowledge(state, view, heard.words)
     if take_up_confirmation(state, view, heard, rng):
         return
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
@@ -128,6 +149,16 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         thank(state, view, rng)
     elif state.speech is before and needs_nod(state, view, heard):
         take_note(state, view, heard, rng)
+
+
+def _note_knowledge(state: ParticipantState, view: ParticipantView, words: ParsedText) -> None:
+    """Leaves the way to a car that says that it knows it, and remembers that it has said how far it is."""
+    said = words.text.lower()
+    if _MEASURES.search(said) is not None:
+        state.conversation = state.conversation.after_hearing_how_far(view.time)
+    knows = _KNOWS_PLACE.search(said) is not None and _LACKS_PLACE.search(said) is None
+    if knows and not words.question and not state.task.described:
+        state.set_guiding(False)
 
 
 # --- open questions -------------------------------------------------------------------------------------------------
@@ -217,7 +248,9 @@ def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMov
         return
     key, distance, words = step
     if key[0] == "on" and distance < state.config.stop_distance:
-        return  # the stop at the place is announced next
+        if distance > TIME_TO_STOP * max(view.speed, SLOW) and not view.standing:  # the stop is announced next
+            state.say_only(order(move, ActionValue.LANE_FOLLOW, Wording(topic="run_up")))
+        return
     if key[0] in ("turn", "on") and waits_for_road(state, view):
         state.say_first(intend(Function.UNCERTAIN_ANSWER))  # there is no way round
         return
@@ -307,6 +340,9 @@ def _answer_to_why(
         state.motion = state.motion.excused(view.time + state.config.excuse_time)
     if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:
         return
+    if _OBEYED.search(said) and view.standing and math.isinf(state.task.resume_at) and not is_near_by(state, view):
+        state.say_first(intend(Function.REQUEST, act_builders.action(ActionValue.START)))
+        return  # it was a misunderstanding
     if _LACKS_WAY.search(said):
         state.set_guiding(True)
         before = state.speech

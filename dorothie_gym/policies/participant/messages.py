@@ -26,7 +26,7 @@ READING_RATE = 4.0
 LONGEST_REASON = 55
 """Longest purpose or reason that is said [characters]."""
 
-_PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this|that|those|these)\b")
+_PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this|that|those|these|ones?)\b")
 
 
 _HERE = re.compile(r"\bhere\b")

@@ -54,6 +54,7 @@ class ConversationState:
         noticed: weather and crowds that have been noticed.
         blind_since: time since which the camera shows less than the weather explains [s]; infinite while it does not.
         asked_about_view: whether that has been talked about.
+        how_far_at: time at which the car last said how far it is [s].
     """
 
     heard_at: float = 0.0
@@ -68,10 +69,15 @@ class ConversationState:
     noticed: Noticed = field(default_factory=Noticed)
     blind_since: float = math.inf
     asked_about_view: bool = False
+    how_far_at: float = -math.inf
 
     def after_hearing(self, now: float) -> ConversationState:
         """Records an utterance of the car at `now` [s]."""
         return replace(self, heard_at=now)
+
+    def after_hearing_how_far(self, now: float) -> ConversationState:
+        """Records that the car has said how far it is, or how long it takes."""
+        return replace(self, how_far_at=now)
 
     def with_puzzle(self, heard: HeardUtterance | None) -> ConversationState:
         """Sets the utterance that needs to be repeated; None once it has been clarified."""

@@ -116,7 +116,7 @@ def _report_added(
     if view.speed > 2.0 and far and state.speech.idle and rng.random() < state.style.waits:
         state.task = state.task.waiting_until(view.time + state.config.thinking_time)
         stop = intend(Function.REQUEST, act_builders.action(ActionValue.STOP), urgent=True)
-        state.say(stop, replace(news, joined=True))
+        state.say(stop, news)
     else:
         state.say(news, *message_remark(state, view, landmark, rng))
 
@@ -251,10 +251,7 @@ def _report_changed(
         busy = task.goal is not None and task.goal.name in (former.name, landmark.name)
         if busy or rng.random() >= state.config.announces_ahead:
             return  # the change is announced when the subgoal becomes the target
-        if former.name is landmark.name:
-            later = act_builders.errand(landmark.name, GoalStatus.PENDING, landmark.street)
-            state.say(intend(Function.REQUEST, later))
-        else:
+        if former.name is not landmark.name:  # a house that was not spoken of yet is named when it is due
             wording = Wording(topic="changed_later", dropped=former.name)
             dropped = act_builders.errand(former.name, GoalStatus.ABANDONED)
             instead = act_builders.errand(landmark.name, GoalStatus.PENDING)
@@ -315,7 +312,12 @@ def _report_same_place(
 ) -> None:
     """States further tasks at the target, or which of the places with its name is meant."""
     reason = story_remark(state, view, rng) if former.place == landmark.place else ()
-    state.say(*(reason or (intend(Function.REQUEST, act_builders.destination(landmark.name, landmark.street)),)))
+    if reason:
+        state.say(*reason)
+        return
+    elsewhere = act_builders.destination(landmark.name, landmark.street)
+    wording = Wording(topic="moved") if former.place != landmark.place else None
+    state.say(intend(Function.REQUEST, elsewhere, wording=wording), *message_remark(state, view, landmark, rng))
 
 
 # --- target ---------------------------------------------------------------------------------------------------------

@@ -13,6 +13,9 @@ from dorothie_gym.support import portable_math as pm
 PASSED_WITHIN: Final = 25.0
 """Distance within which a place at the road was passed [m]."""
 
+UNDER_WAY: Final = 30.0
+"""Time after naming a destination, or hearing how far it is, before which nobody asks for that [s]."""
+
 _STEP: Final = 12.0  # between remembered positions [m]
 _LEFT_BEHIND: Final = 80.0  # distance from which on a place has been passed, and not just reached [m]
 _NEAR_STOP: Final = 130.0  # distance up to which a place is near an earlier stop [m]

@@ -11,6 +11,7 @@ from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
 from dorothie_gym.policies.participant.target_hints import FAMOUS
+from dorothie_gym.policies.participant.trip_memory import UNDER_WAY
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.support import portable_math as pm
 
@@ -84,7 +85,8 @@ def trip_questions(state: ParticipantState, view: ParticipantView) -> list[tuple
     asks, goal = Function.SET_QUESTION, state.task.destination
     found = [intend(asks, Proposition.of(Predicate.DRIVES_AT, speed=ASKED, limit=True), wording=Wording(topic="limit"))]
     distance = Proposition.of(Predicate.DISTANCE, place=goal.name, metres=ASKED)
-    found.append(intend(asks, distance, wording=Wording(topic="how_far")))
+    if view.time - max(state.conversation.how_far_at, state.task.announced_at) >= UNDER_WAY:
+        found.append(intend(asks, distance, wording=Wording(topic="how_far")))
     named = state.task.mentioned | {goal.name}
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != state.task.target]
     known = [mark for mark in later if mark is not None and mark.name in named]

@@ -10,6 +10,7 @@ import numpy as np
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording, WordingContext
+from dorothie_gym.ontology.dialogue_acts import SIGNS_OF_HEARING
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
@@ -28,6 +29,7 @@ from dorothie_gym.policies.participant.order_history import last_given, turned_r
 from dorothie_gym.policies.participant.standstill import waits_for_road
 from dorothie_gym.policies.participant.stories import picks_up, purpose_of_target
 from dorothie_gym.policies.participant.subgoals import announcement
+from dorothie_gym.policies.participant.trip_memory import UNDER_WAY
 from dorothie_gym.policies.participant.trip_talk import note_told, trip_questions, trip_remarks
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.scripted_agent_limits import FOG_LIMIT, RAIN_LIMIT, usual_cruise
@@ -49,6 +51,12 @@ _HASTE, _HURRIED = 5, 0.75
 
 _SPEEDING_UP = 130.0
 """Route length to the place below which the participant does not ask for more speed [m]."""
+
+AGREED = 12.0
+"""Time after a sign of hearing within which nobody asks why the car does what it has said [s]."""
+
+CHAT_SILENCE = 4.0
+"""Silence of the car after which a remark is made that is unrelated to the task [s]."""
 
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the headlights [s]."""
@@ -293,13 +301,19 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
     if not stands and not view.turning:
         return
     state.conversation = conversation.after_wondering(view.time)
-    if view.turning and turned_round_lately(state, view):
+    if view.turning and (turned_round_lately(state, view) or _has_just_agreed(state, view)):
         return
     if stands and _sends_on(state, view, rng):
         return
     if rng.random() < state.style.curious:
         turning = Proposition.of(Predicate.DOES, action=ActionValue.U_TURN)
         state.say(_why(turning if view.turning else Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))
+
+
+def _has_just_agreed(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the participant has taken note of what the car does a moment ago."""
+    lately = state.speech.has_just_spoken(view.time, AGREED)
+    return lately and any(item.act.move in SIGNS_OF_HEARING for item in state.speech.said[-2:])
 
 
 def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -314,6 +328,8 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     ]
     if progress.left(view.station) < 130.0 or (state.guidance.guiding and min(steps) < 140.0):
         return
+    if view.time - state.conversation.heard_at < CHAT_SILENCE:
+        return  # the car may have more to say, or has just answered the question
     next_chat = view.time + float(rng.exponential(state.style.chat)) + 20.0
     state.conversation = state.conversation.with_next_chat(next_chat)
     asked = _said_lately(state)
@@ -327,6 +343,11 @@ def _said_lately(state: ParticipantState) -> set[Proposition]:
     return {content for item in state.speech.said for content in item.meaning}
 
 
+def _knows_how_far(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car has said lately how far it is, or has only just been told where to go."""
+    return view.time - max(state.conversation.how_far_at, state.task.announced_at) < UNDER_WAY
+
+
 def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
     """Returns a general question: what the car knows, or how the drive is going."""
     asked = [Proposition.of(Predicate.RIGHT_WAY)]
@@ -335,10 +356,11 @@ def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Gen
     asked += [Proposition.of(Predicate.LOCALISED), Proposition.of(Predicate.LOCALISED, negated=True)]
     if state.task.goal is not None and not state.guidance.guiding:
         place = state.task.goal.name
-        asked += [
-            Proposition.of(Predicate.CLOSE, place=place),
-            Proposition.of(Predicate.CLOSE, negated=True, place=place),
-        ]
+        if not _knows_how_far(state, view):
+            asked += [
+                Proposition.of(Predicate.CLOSE, place=place),
+                Proposition.of(Predicate.CLOSE, negated=True, place=place),
+            ]
         asked.append(Proposition.of(Predicate.HAS_ROUTE, place=place))
     chosen = asked[int(rng.integers(len(asked)))]
     return intend(Function.PROPOSITIONAL_QUESTION, chosen, elided=("place",))
@@ -354,8 +376,9 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         *trip_remarks(state, view) * 3,
     ]
     if not state.guidance.guiding:
-        arrival = Proposition.of(Predicate.ARRIVES_IN, place=goal.name, seconds=ASKED)
-        found.append((intend(asks_open, arrival, elided=("place",)),))
+        if not _knows_how_far(state, view):
+            arrival = Proposition.of(Predicate.ARRIVES_IN, place=goal.name, seconds=ASKED)
+            found.append((intend(asks_open, arrival, elided=("place",)),))
         found.append((intend(asks_open, act_builders.action(ActionValue.QUERIED)),))
         found.append((intend(Function.CHECK_QUESTION, act_builders.destination(goal.name)),))
         found.append((intend(asks_open, Proposition.of(Predicate.DRIVES_AT, speed=ASKED)),))

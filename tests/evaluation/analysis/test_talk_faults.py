@@ -219,7 +219,9 @@ def test_person_is_no_it():
     it = human(5.0, "it has a yellow coat", M.EXPLAIN, meaning=coat)
     she = human(5.0, "look for a yellow coat", M.EXPLAIN, meaning=coat)
     assert wrong(mention_checks.pronouns(drive(it)))
+    heard = human(5.0, "a yellow coat, got it", M.EXPLAIN, meaning=coat)
     assert not wrong(mention_checks.pronouns(drive(she)))
+    assert not wrong(mention_checks.pronouns(drive(heard)))
 
 
 def test_metres_of_a_passenger_are_found():

@@ -40,7 +40,7 @@ _ADDED: Final = "task_trigger"  # another errand is added to the list, the prese
 _AGAIN: Final = frozenset({Predicate.TRIED, Predicate.PASSED})
 _SHARED: Final = frozenset({LandmarkName.HOUSE, LandmarkName.PERSON})
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
-_IT: Final = re.compile(r"\b(it|it's|its|that one|the one)\b", re.IGNORECASE)
+_IT: Final = re.compile(r"\b((?<!got )it|it's|its|that one|the one)\b", re.IGNORECASE)
 _ABOUT_A_PLACE: Final = frozenset({Predicate.LOOKS, Predicate.LOCATED, Predicate.NEAR})
 _ACTIONS: Final = {
     ActionValue.U_TURN: PhysicalAction.U_TURN,
