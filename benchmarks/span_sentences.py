@@ -6,19 +6,19 @@ import itertools
 import json
 import random
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from dorothie_gym.dialogue import AsrChannel, Wording, draw_style, word_acts
-from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans
-from dorothie_gym.dialogue.span_features import span_features
-from dorothie_gym.dialogue.span_inputs import SpanFeatures
+from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans, slots_of
+from dorothie_gym.dialogue.span_features import action_signs, span_features
+from dorothie_gym.dialogue.span_inputs import ACTIONS, SpanFeatures
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
-from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
+from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, Slot, SlotValue
 from dorothie_gym.ontology.spellings import parse_move
 
 FOLDER: Final = Path(__file__).parent / "people"
@@ -48,12 +48,27 @@ NEXT: Final = {
 }  # fmt: skip
 """Moves of the second span of a sampled sentence of the grammar."""
 
-Spans = tuple[tuple[str, DialogueMove], ...]
+
+class LabelledSpan(NamedTuple):
+    """Span of a training sentence.
+
+    Attributes:
+        text: its words.
+        move: its move.
+        actions: actions of the car that it names; None if they are not labelled.
+    """
+
+    text: str
+    move: DialogueMove
+    actions: frozenset[ActionValue] | None = None
+
+
+Spans = tuple[LabelledSpan, ...]
 
 
 @dataclass(frozen=True)
 class Sentence:
-    """Sentence with the words and the move of each span.
+    """Sentence with its labelled spans.
 
     Attributes:
         spans: its spans.
@@ -66,53 +81,91 @@ class Sentence:
     @property
     def text(self) -> str:
         """The whole sentence."""
-        return " ".join(text for text, _ in self.spans)
+        return " ".join(span.text for span in self.spans)
+
+
+class NamedActions(NamedTuple):
+    """Actions of a span, each tuple with 0 or 1 for each of `ACTIONS`.
+
+    Attributes:
+        begin: number of its first word.
+        end: number of the word behind its last one.
+        move: its move.
+        ruled: actions that the rules find.
+        named: actions that it names.
+    """
+
+    begin: int
+    end: int
+    move: DialogueMove
+    ruled: tuple[int, ...]
+    named: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Example:
-    """Features of a sentence, and the label of each word: twice the number of its move, plus 1 inside of a span."""
+    """Features and labels of a sentence.
+
+    Attributes:
+        features: features of its words.
+        labels: label of each word: twice the number of its move, plus 1 inside of a span.
+        actions: actions of the spans in which they are labelled.
+    """
 
     features: SpanFeatures
     labels: tuple[int, ...]
+    actions: tuple[NamedActions, ...] = ()
 
 
 def read_training_sentences(path: Path = FOLDER / "train.jsonl", split: str | None = None) -> list[Sentence]:
     """Returns the sentences of a file with fields `before` and `acts` a line, of one split if there are several."""
     rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
-    return [_sentence(row) for row in rows if split is None or row["split"] == split]
+    return [sentence_of(row) for row in rows if split is None or row["split"] == split]
 
 
-def _sentence(row: dict[str, object]) -> Sentence:
+def sentence_of(row: Mapping[str, object]) -> Sentence:
+    """Returns the sentence of a row with fields `before` and `acts`."""
     acts, before = row["acts"], str(row["before"]).strip()
     if not isinstance(acts, list):
         raise TypeError("`acts` must be a list")
-    spans = tuple((str(act["text"]), parse_move(act["move"])) for act in acts)
+    spans = tuple(LabelledSpan(str(act["text"]), parse_move(act["move"]), _actions(act)) for act in acts)
     return Sentence(spans, rule_spans(before)[-1].act.move if before else None)
+
+
+def _actions(act: Mapping[str, Mapping[str, Sequence[str]]]) -> frozenset[ActionValue] | None:
+    """Returns the labelled actions of an act; None if it has no slots."""
+    if "slots" not in act:
+        return None
+    labels = act["slots"].get("Action", ())
+    return frozenset(value for value in ACTIONS if value.label in labels)
 
 
 def example(sentence: Sentence) -> Example:
     """Returns the features and labels of a sentence."""
     labels: list[int] = []
+    actions: list[NamedActions] = []
     moves = list(DialogueMove)
-    for text, move in sentence.spans:
-        label = 2 * moves.index(move)
+    for text, move, named in sentence.spans:
+        label, begin = 2 * moves.index(move), len(labels)
         labels += [label, *[label + 1] * (len(text.split()) - 1)]
-    features = span_features(rule_spans(sentence.text, sentence.after))
-    return Example(features, tuple(labels))
+        if named is not None:
+            ruled = action_signs(slots_of(text, move))
+            actions.append(NamedActions(begin, len(labels), move, ruled, action_signs(named)))
+    features = span_features(rule_spans(sentence.text, sentence.after), sentence.after)
+    return Example(features, tuple(labels), tuple(actions))
 
 
 def variants(sentence: Sentence, rng: random.Random, noise: np.random.Generator) -> list[Sentence]:
     """Returns a sentence without marks, with those of a writer, and misheard."""
-    bare = tuple((_unmarked(text), move) for text, move in sentence.spans)
+    bare = tuple(span._replace(text=_unmarked(span.text)) for span in sentence.spans)
     found = [bare]
     if len(bare) > 1 or rng.random() < 0.5:
         joint = "," if rng.random() < 0.7 else "."
-        ends = [joint] * (len(bare) - 1) + [_end(bare[-1][1], rng)]
-        found.append(tuple((text + end, move) for (text, move), end in zip(bare, ends, strict=True)))
+        ends = [joint] * (len(bare) - 1) + [_end(bare[-1].move, rng)]
+        found.append(tuple(span._replace(text=span.text + end) for span, end in zip(bare, ends, strict=True)))
     channel = AsrChannel(rate=rng.choice(WORD_ERRORS))
-    heard = tuple((channel.transcribe(text, noise), move) for text, move in sentence.spans)
-    found.append(tuple((text, move) for text, move in heard if text.strip()))
+    heard = tuple(span._replace(text=channel.transcribe(span.text, noise)) for span in sentence.spans)
+    found.append(tuple(span for span in heard if span.text.strip()))
     return [Sentence(spans, sentence.after) for spans in found if spans]
 
 
@@ -126,34 +179,34 @@ def _unmarked(text: str) -> str:
 
 def compositions(sentences: Sequence[Sentence], number: int, rng: random.Random) -> Iterator[Sentence]:
     """Yields sentences put together of spans of others, in orders of moves that occur."""
-    first: dict[DialogueMove, list[tuple[str, DialogueMove | None]]] = defaultdict(list)
-    later: dict[DialogueMove, list[str]] = defaultdict(list)
+    first: dict[DialogueMove, list[tuple[LabelledSpan, DialogueMove | None]]] = defaultdict(list)
+    later: dict[DialogueMove, list[LabelledSpan]] = defaultdict(list)
     for sentence in sentences:
-        for place, (text, move) in enumerate(sentence.spans):
-            if len(text.split()) <= LONGEST:
-                (first[move].append((text, sentence.after)) if place == 0 else later[move].append(text))
-    orders = [tuple(move for _, move in sentence.spans) for sentence in sentences if len(sentence.spans) > 1]
+        for place, span in enumerate(sentence.spans):
+            if len(span.text.split()) <= LONGEST:
+                (first[span.move].append((span, sentence.after)) if place == 0 else later[span.move].append(span))
+    orders = [tuple(span.move for span in sentence.spans) for sentence in sentences if len(sentence.spans) > 1]
     while number > 0:
         order = rng.choice(orders)
         if any(move is other and move is not M.INSTRUCT for move, other in itertools.pairwise(order)):
             continue  # neighbours with one move are one span
         if not first[order[0]]:
             continue
-        text, after = rng.choice(first[order[0]])
-        spans = [(_unmarked(text), order[0])]
+        span, after = rng.choice(first[order[0]])
+        spans = [span._replace(text=_unmarked(span.text))]
         for move in order[1:]:
             pool = later[move] if later[move] and (rng.random() < 0.5 or not first[move]) else None
-            spans.append((_joined(rng.choice(pool or [text for text, _ in first[move]]), move, rng), move))
+            spans.append(_joined(rng.choice(pool or [span for span, _ in first[move]]), rng))
         mark = rng.choice(("", "", ",", ",", ",", "."))
-        marked = [(text + mark, move) for text, move in spans[:-1]]
+        marked = [span._replace(text=span.text + mark) for span in spans[:-1]]
         yield Sentence((*marked, spans[-1]), after)
         number -= 1
 
 
-def _joined(text: str, move: DialogueMove, rng: random.Random) -> str:
-    text, joints = _unmarked(text), JOINTS.get(move, ())
+def _joined(span: LabelledSpan, rng: random.Random) -> LabelledSpan:
+    text, joints = _unmarked(span.text), JOINTS.get(span.move, ())
     joined = bool(joints) and rng.random() < 0.3 and text.split()[0].lower() not in ("and", "then", "so", "but", "now")
-    return f"{rng.choice(joints)} {text}" if joined else text
+    return span._replace(text=f"{rng.choice(joints)} {text}" if joined else text)
 
 
 def grammar_sentences(number: int, seed: int) -> list[Sentence]:
@@ -169,11 +222,15 @@ def grammar_sentences(number: int, seed: int) -> list[Sentence]:
             order += [options[int(rng.integers(len(options)))]] if options else []
         acts = [DialogueAct.of(move, *_values(move, rng)) for move in order]
         said = word_acts(acts, role, rng, [Wording()] * len(acts), style=draw_style(role, rng))
-        spans = tuple((span.text, span.act.move) for span in said)
+        spans = tuple(LabelledSpan(span.text, span.act.move, _named(span.act)) for span in said)
         before = BEFORE.get(order[0], ())
         after = before[int(rng.integers(len(before)))] if before and rng.random() < 0.75 else None
         found.setdefault(spans, Sentence(spans, after))
     return list(found.values())
+
+
+def _named(act: DialogueAct) -> frozenset[ActionValue]:
+    return frozenset(value for value in act.slots if isinstance(value, ActionValue) and value in ACTIONS)
 
 
 def _values(move: DialogueMove, rng: np.random.Generator) -> list[SlotValue]:

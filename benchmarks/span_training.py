@@ -38,7 +38,7 @@ from benchmarks.span_sentences import (
     variants,
 )
 from dorothie_gym.baselines.encoders.pretrained import minilm_folder
-from dorothie_gym.dialogue.span_inputs import MARKS, MASKS, SIGNS
+from dorothie_gym.dialogue.span_inputs import ACTIONS, MARKS, MASKS, SIGNS
 from dorothie_gym.dialogue.span_tagger import (
     BUCKETS,
     DILATIONS,
@@ -73,6 +73,7 @@ class TrainingConfig:
         composed: sentences put together of spans of others.
         sampled: sentences of the grammar.
         grammar_weight: weight of a sentence of the grammar.
+        action_weight: weight of the loss of the actions of a span.
         epochs: passes over the sentences.
         batch: sentences a step.
         rate: largest learning rate (one cycle; Smith and Topin, 2019).
@@ -85,10 +86,11 @@ class TrainingConfig:
     width: int = 48
     letters: int = 24
     hidden: int = 64
-    composed: int = 1500
-    sampled: int = 2500
+    composed: int = 1200
+    sampled: int = 1500
     grammar_weight: float = 0.5
-    epochs: int = 12
+    action_weight: float = 1.0
+    epochs: int = 8
     batch: int = 64
     rate: float = 4e-3
     dropout: float = 0.4
@@ -144,7 +146,8 @@ class SpanNetwork(nn.Module):
         nn.init.normal_(self.groups.weight, std=0.3)
         self.marks, self.begins = nn.Embedding(len(MARKS), 6), nn.Embedding(2, 4)
         self.rules, self.places = nn.Embedding(moves, 12), nn.Embedding(3, 4)
-        inputs = vectors.shape[1] + config.letters + 6 + 4 + 12 + 4 + SIGNS
+        self.befores = nn.Embedding(1 + moves, 8)
+        inputs = vectors.shape[1] + config.letters + 6 + 4 + 12 + 4 + 8 + SIGNS
         self.convolutions = [
             nn.Conv1d(inputs if layer == 0 else hidden, hidden, KERNEL, padding=dilation, dilation=dilation)
             for layer, dilation in enumerate(DILATIONS)
@@ -153,11 +156,13 @@ class SpanNetwork(nn.Module):
         self.pooled = nn.Linear(2 * hidden, hidden)
         self.output = nn.Linear(2 * hidden, LABELS)
         self.pairs = nn.Parameter(torch.zeros(1 + moves, moves))
+        self.acted = nn.Linear(2 * hidden, len(ACTIONS))
+        self.acted_moves = nn.Parameter(torch.zeros(moves, len(ACTIONS)))
+        self.acted_rules = nn.Parameter(2.0 * torch.eye(len(ACTIONS)))
         self.dropout = nn.Dropout(config.dropout)
 
-    def scores(self, batch: Mapping[str, Any]) -> Tensor:
-        """Returns scores (b, n, 2 m) of the labels."""
-        number = batch["rows"].shape[1]
+    def encode(self, batch: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
+        """Returns values (b, h, n) of the words and summaries (b, h)."""
         inputs = torch.cat(
             (
                 self.vectors(batch["rows"]),
@@ -166,6 +171,7 @@ class SpanNetwork(nn.Module):
                 self.begins(batch["begins"]),
                 self.rules(batch["rules"]),
                 self.places(batch["places"]),
+                self.befores(batch["befores"])[:, None].expand(-1, batch["rows"].shape[1], -1),
                 batch["signs"],
             ),
             dim=-1,
@@ -177,13 +183,30 @@ class SpanNetwork(nn.Module):
             values = found + values if layer else found
         largest = (values + (mask - 1.0) * 1e4).max(dim=2)[0]
         summary = F.relu(self.pooled(torch.cat((largest, values[:, :, 0]), dim=-1)))
-        both = torch.cat((values, summary[:, :, None].expand(-1, -1, number)), dim=1)
+        return values, summary
+
+    def scores(self, values: Tensor, summary: Tensor) -> Tensor:
+        """Returns scores (b, n, 2 m) of the labels."""
+        both = torch.cat((values, summary[:, :, None].expand(-1, -1, values.shape[2])), dim=1)
         scores: Tensor = self.output(self.dropout(both.transpose(1, 2)))
         return scores
 
-    def losses(self, batch: Mapping[str, Any]) -> Tensor:
-        """Returns the negative log likelihood (b,) of the labels of each sentence."""
-        scores, mask, labels = self.scores(batch), batch["mask"], batch["labels"]
+    def action_losses(self, batch: Mapping[str, Any], values: Tensor, summary: Tensor) -> Tensor:
+        """Returns the negative log likelihood (b,) of the actions of each sentence's spans."""
+        inside = batch["span_words"][:, None].float()  # (s, 1, n)
+        sentences, found = batch["span_sentences"], torch.zeros(len(values))
+        if len(sentences) == 0:
+            return found
+        largest = (values[sentences] + (inside - 1.0) * 1e4).max(dim=2)[0]
+        scores = self.acted(self.dropout(torch.cat((largest, summary[sentences]), dim=-1)))
+        scores = scores + self.acted_moves[batch["span_moves"]] + batch["span_ruled"] @ self.acted_rules
+        losses = F.binary_cross_entropy_with_logits(scores, batch["span_named"], reduction="none").sum(dim=1)
+        return found.index_add(0, sentences, losses)
+
+    def losses(self, batch: Mapping[str, Any], action_weight: float) -> Tensor:
+        """Returns the negative log likelihood (b,) of the labels and, by their weight, the actions of each sentence."""
+        values, summary = self.encode(batch)
+        scores, mask, labels = self.scores(values, summary), batch["mask"], batch["labels"]
         chosen = scores.gather(2, labels[..., None])[..., 0]
         moves, begun = labels // 2, (labels % 2 == 0) & mask
         joints = self.pairs[1 + moves[:, :-1], moves[:, 1:]] * begun[:, 1:]
@@ -195,7 +218,7 @@ class SpanNetwork(nn.Module):
             grown = torch.logaddexp(begun_here, sums + insides[:, place])
             sums = torch.where(mask[:, place, None], grown, sums)
         losses: Tensor = torch.logsumexp(sums, dim=1) - true
-        return losses
+        return losses + action_weight * self.action_losses(batch, values, summary)
 
 
 def collate(network: SpanNetwork, examples: Sequence[Example], rng: random.Random, forgotten: float) -> dict[str, Any]:
@@ -205,6 +228,7 @@ def collate(network: SpanNetwork, examples: Sequence[Example], rng: random.Rando
     batch: dict[str, Any] = {name: torch.zeros(size, number, dtype=torch.int64) for name in whole}
     batch["mask"] = torch.zeros(size, number, dtype=torch.bool)
     batch["signs"] = torch.zeros(size, number, SIGNS)
+    batch["befores"] = torch.zeros(size, dtype=torch.int64)
     groups: list[int] = []
     offsets: list[int] = []
     unknown = len(network.rows) + len(MASKS)
@@ -223,10 +247,19 @@ def collate(network: SpanNetwork, examples: Sequence[Example], rng: random.Rando
         batch["signs"][at, :length] = torch.tensor(features.signs, dtype=torch.float32)
         batch["places"][at, 0] = 1
         batch["places"][at, length - 1] = 2
+        batch["befores"][at] = 0 if features.after is None else 1 + MOVES.index(features.after)
         for place in range(number):
             offsets.append(len(groups))
             groups += letter_groups(features.words[place]) if place < length else (0,)
     batch["groups"], batch["offsets"] = torch.tensor(groups), torch.tensor(offsets)
+    spans = [(at, span) for at, row in enumerate(examples) for span in row.actions]
+    batch["span_sentences"] = torch.tensor([at for at, _ in spans], dtype=torch.int64)
+    batch["span_words"] = torch.zeros(len(spans), number, dtype=torch.bool)
+    for place, (_, span) in enumerate(spans):
+        batch["span_words"][place, span.begin : span.end] = True
+    batch["span_moves"] = torch.tensor([MOVES.index(span.move) for _, span in spans], dtype=torch.int64)
+    for name in ("ruled", "named"):
+        batch[f"span_{name}"] = torch.tensor([getattr(span, name) for _, span in spans], dtype=torch.float32)
     return batch
 
 
@@ -246,7 +279,7 @@ def train(
         for chosen in _batches(examples, config, rng):
             batch = collate(network, [examples[number] for number in chosen], rng, config.forgotten)
             share = torch.tensor([weights[number] for number in chosen])
-            loss = (network.losses(batch) * share).sum() / share.sum()
+            loss = (network.losses(batch, config.action_weight) * share).sum() / share.sum()
             optimiser.zero_grad()
             torch.autograd.backward(loss)
             nn.utils.clip_grad_norm_(parameters, 1.0)
@@ -276,7 +309,7 @@ def packed(network: SpanNetwork) -> bytes:
         "moves": _text(move.label for move in MOVES),
         "vectors": _nibbles(network.vectors.weight),
     }
-    for name in ("groups", "marks", "begins", "rules", "places"):
+    for name in ("groups", "marks", "begins", "rules", "places", "befores"):
         arrays[name] = _whole(getattr(network, name).weight, INPUT_BITS)
     shifts = []
     for layer, convolution in enumerate(network.convolutions):
@@ -293,7 +326,12 @@ def packed(network: SpanNetwork) -> bytes:
     arrays["output_bias"] = _whole(network.output.bias, bits_out + HIDDEN_BITS, np.int32)
     arrays["pairs"] = _whole(network.pairs, bits_out + HIDDEN_BITS, np.int32)
     arrays["shifts"] = np.array([*shifts, bits], np.int32)
-    arrays["scale"] = np.array([bits_out + HIDDEN_BITS], np.int32)
+    bits_acted = _bits(network.acted.weight)
+    arrays["acted"] = _whole(network.acted.weight.T, bits_acted)
+    arrays["acted_bias"] = _whole(network.acted.bias, bits_acted + HIDDEN_BITS, np.int32)
+    for name in ("acted_moves", "acted_rules"):
+        arrays[name] = _whole(getattr(network, name), bits_acted + HIDDEN_BITS, np.int32)
+    arrays["scale"] = np.array([bits_out + HIDDEN_BITS, bits_acted + HIDDEN_BITS], np.int32)
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **arrays)
     return file.getvalue()
@@ -343,7 +381,7 @@ def compare(data: bytes, examples: Sequence[Example]) -> tuple[Shares, Shares]:
             2 * MOVES.index(move) + (not begins)
             for move, begins in zip(row.features.moves, row.features.begins, strict=True)
         ]
-        labels, best, said = tagger.tag(row.features)
+        labels, best, said = tagger.tag(row.features, *tagger.encode(row.features))
         ruled.append(by_rules)
         tagged.append(labels if best - said > tagger.margin else by_rules)
     return _shares(ruled, examples), _shares(tagged, examples)

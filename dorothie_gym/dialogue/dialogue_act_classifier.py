@@ -26,12 +26,14 @@ from dorothie_gym.dialogue.pattern_index import bits
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import behind_signs
 from dorothie_gym.dialogue.span_features import span_features
-from dorothie_gym.dialogue.span_tagger import retagged
+from dorothie_gym.dialogue.span_tagger import tagged
 from dorothie_gym.dialogue.vocatives import is_endearment, without_asides, without_vocative
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot, SlotValue
 
 _SENTENCE_END = re.compile(r"(?<=[.?!])(?<!\b(?:Mr|Ms|Dr)\.)(?<!\bMrs\.)\s+")
+
+_MARKS = re.compile(r"[,.;:?!]+")
 
 _COMMA = re.compile(r",(?=\s|$)")
 """Comma between words; one inside of a word, as in a number, separates nothing."""
@@ -252,9 +254,14 @@ def _is_small_talk(parsed: ParsedText) -> bool:
     if any(status is not GoalStatus.PENDING for status in parsed.statuses):  # "later" is unspecific
         return False
     words = set(parsed.masked.split())
-    if not words.isdisjoint(_ROADS):
+    if not {word.removesuffix("'s") for word in words}.isdisjoint(_ROADS):
         return False
     return not words.isdisjoint(move_cues().small_talk) and words.isdisjoint(move_cues().reports)
+
+
+def slots_of(text: str, move: DialogueMove) -> frozenset[SlotValue]:
+    """Returns the slot values that the rules find in a span of a known move."""
+    return _slots(understand(text), move)
 
 
 def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
@@ -297,20 +304,26 @@ def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...
     spans = rule_spans(text, after)
     if not spans or all(formula_move(_plain_words(span.text)) is not None for span in spans):
         return spans  # formulas have no other move
-    found = retagged(spans, span_features(spans))
-    if found is None or (all(move in _NO_ORDERS for _, move in found) and understand(text).plan):
+    read = tagged(spans, span_features(spans, after))
+    return read.with_actions(_retagged(text, after, spans, read.spans))
+
+
+def _retagged(
+    text: str, after: DialogueMove | None, spans: tuple[Span, ...], tags: Sequence[tuple[str, DialogueMove]] | None
+) -> tuple[Span, ...]:
+    """Returns the spans of a text: those of the tagger, unless there are none or they make no sense here."""
+    if tags is None or (all(move in _NO_ORDERS for _, move in tags) and understand(text).plan):
         return spans  # "no, not right, left!" orders something, and "okay, drive on" as well
-    if after is None and {move for _, move in found} & _ANSWERING - {span.act.move for span in spans}:
+    if after is None and {move for _, move in tags} & _ANSWERING - {span.act.move for span in spans}:
         return spans  # nothing was said that could be answered or corrected
-    if any(_joins_sentences(part, spans) for part, _ in found):
+    if any(_joins_sentences(part, spans) for part, _ in tags):
         return spans
+    found = list(tags)
     changes = move_cues().answers.get(after) if after is not None else None
     if changes is not None and found[0][1] is not DialogueMove.IRRELEVANT:
         found[0] = found[0][0], changes.get(found[0][1], found[0][1])
     ruled = {(span.text, span.act.move): span for span in spans}
-    return tuple(
-        ruled.get((part, move)) or Span(part, DialogueAct(move, _slots(understand(part), move))) for part, move in found
-    )
+    return tuple(ruled.get((part, move)) or Span(part, DialogueAct(move, slots_of(part, move))) for part, move in found)
 
 
 def _joins_sentences(part: str, spans: Sequence[Span]) -> bool:
@@ -322,16 +335,28 @@ def _joins_sentences(part: str, spans: Sequence[Span]) -> bool:
 @functools.lru_cache(maxsize=2048)
 def rule_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
     """Segments free English as `guess_spans`, by the rules alone: at sentence ends and where a new act begins."""
-    broken = with_breaks(text.strip(), answering=after is not None)
+    words = _tokens(text)
+    broken = with_breaks(" ".join(word.replace(" ", "") for word in words), answering=after is not None)
     segments = [segment for sentence in _SENTENCE_END.split(broken) for segment in _segments(sentence)]
     spans: list[Span] = []
-    words, place = text.split(), 0
+    place = 0
     for marked, core in joined([segment for segment in segments if segment], after):
         begin, place = place, place + len(marked.split())
         segment = " ".join(words[begin:place])
         act = guess_act(core, after if not spans else None)
         spans.append(Span(segment, in_context(act, understand(core), [span.act.move for span in spans], after)))
     return tuple(spans)
+
+
+def _tokens(text: str) -> list[str]:
+    """Returns the words of a text, each with the marks that stand alone behind it: "wait ," of "wait , stop"."""
+    found: list[str] = []
+    for token in text.split():
+        if found and _MARKS.fullmatch(token):
+            found[-1] += f" {token}"
+        else:
+            found.append(token)
+    return found
 
 
 def _segments(sentence: str) -> list[str]:

@@ -121,6 +121,7 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
             if before == "," and after in _BESIDE and not _LISTED.isdisjoint(words[:place]):
                 masked[place] = "#ok"  # "stop on the left, right by the KFC"
                 continue
+            taken = taken or (before == "you" and list(words[place - 2 : place - 1]) == ["told"])
             direct = listed or (taken and after not in lists.right_never_before | lists.right_not_before)
             masked[place] = "right" if direct else _right(before, after, following, place, lists)
         elif word == "left" and before in lists.left_not_after and not (before in _SAYS and after in _ENDS):
@@ -146,8 +147,10 @@ def _remains(words: Sequence[str], place: int) -> bool:
 def _right(before: str, after: str, following: str, place: int, lists: WordLists) -> str:
     if after in _SIDED and following != "?":
         return "right"
-    if after == "?" and place > 0 and (before == "," or before not in lists.turning):
+    if after == "?" and place > 0 and before != "all" and (before == "," or before not in lists.turning):
         return "#tag"
+    if after == "now" and before in ("going", "driving", "doing"):
+        return "#ok"  # "how fast are you going right now"
     if before in lists.right_not_after or after in lists.right_never_before or (place == 0 and after == ","):
         return "#ok"
     if place == 0 and (after in _RIGHT_OPENS or (after == "then" and following in (",", ""))):

@@ -125,6 +125,7 @@ def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Men
             continue
         value, length = _at(words, place, statuses)
         if value is None:
+            length = _until_name(words, place, length, statuses)
             masked += words[place : place + length]
         else:
             guessed = word not in first_words and word.removesuffix("'s") not in first_words
@@ -135,6 +136,15 @@ def find_names(words: Sequence[str], *, statuses: bool = True) -> tuple[list[Men
                 length += words[place + length] in _STREET_KINDS
         place += length
     return mentions, masked
+
+
+def _until_name(words: tuple[str, ...], place: int, length: int, statuses: bool) -> int:
+    """Returns the number of words of no name, up to a name that reaches beyond them: "the" of "the car in front"."""
+    for skipped in range(1, length):
+        value, behind = _at(words, place + skipped, statuses)
+        if value is not None and skipped + behind > length:
+            return skipped
+    return length
 
 
 def _at(words: tuple[str, ...], place: int, statuses: bool) -> tuple[SlotValue | None, int]:

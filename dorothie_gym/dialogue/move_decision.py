@@ -44,14 +44,15 @@ _UNSURE: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
 
 _COMMA_ANSWERS: Final = ("no ,", "nope ,", "nah ,")
 _WHAT_TO_DO: Final = ("what you", "what we", "okay so what you", "so what you", "right so what you", "all you")
-_CONDITIONS: Final = ("where ", "when ", "wherever ", "whenever ", "so when ", "so where ", "and when ", "then when ")
+_CONDITIONS: Final = re.compile(r"(?:(?:and|so|then|but|okay|now|well|right|,) )*(?:where|when)(?:ever)? ")
 """First words of a condition of an order: "where the wall ends, make a left"."""
 _ASKED: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CONFUSE})
 _OFFERS: Final = (
     "may i",
     "shall i",
-    "shall we",
     "should i",
+    "shall we go to",
+    "shall we try",
     "should we",
     "like me",
     "want me",
@@ -97,7 +98,7 @@ _PAST: Final = frozenset(
         "drove",
     }
 )
-_HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "wha", "th", "so", "and"})
+_HESITATIONS: Final = frozenset({"um", "uh", "er", "erm", "hm", "hmm", "mm", "mmm", "ehm", "wha", "th", "so", "and"})
 _CALLS: Final = frozenset(
     {"whoa", "woah", "oh", "ooh", "hey", "oi", "look", "listen", "hang", "hold", "goodness", "gosh", "god", "blimey"}
 )
@@ -133,6 +134,9 @@ _NO_DOING: Final = ("no turning", "no more", "no stopping", "no parking", "no u 
 _FORBIDDEN_LATER: Final = (["do", "not"], ["don't"], ["please", "don't"], ["never"])
 _FORBIDDING: Final = frozenset({"never", "don't", "dont", "please"})
 _SIGNS_FIRST: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
+_ASKING: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.QUERY_W, DialogueMove.ALIGN})
+"""Moves of the other speaker behind which a yes is an answer, or what was asked for."""
+
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
 _SUPPOSING: Final = ("isn't ", "wasn't ", "aren't ", "weren't ", "didn't ", "haven't ", "hasn't ")
@@ -262,7 +266,8 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         return DialogueMove.INSTRUCT  # there is nothing that it reacts to
     if move in _UNSURE and not named and not news:
         return DialogueMove.INSTRUCT
-    if after is None and move in _SIGNS_FIRST and (_runs_on(parsed) or _sends_on(parsed)):
+    goes_on = _runs_on(parsed) or (after is None and _sends_on(parsed))
+    if after not in _ASKING and move in _SIGNS_FIRST and goes_on:
         return DialogueMove.INSTRUCT  # "aye nip up the lane on the left"
     commanded = parse is not None and set(parse.moods) == {ClauseMood.COMMAND}
     confirms_nothing = move is DialogueMove.CONFIRM and after is None and _begins_with_order(parsed)
@@ -274,7 +279,7 @@ def _order(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None, *
         offered = offered or (mine and not all(step.action in _FOR_PASSENGERS for step in parsed.plan))
         return move if offered else DialogueMove.INSTRUCT
     told = move is DialogueMove.QUERY_W and (
-        parsed.masked.startswith(_WHAT_TO_DO) or (_ends_in_order(parse) and parsed.masked.startswith(_CONDITIONS))
+        parsed.masked.startswith(_WHAT_TO_DO) or (_ends_in_order(parse) and _CONDITIONS.match(parsed.masked))
     )
     if (move is DialogueMove.CHECK or told) and not parsed.question:
         return DialogueMove.INSTRUCT
@@ -417,7 +422,7 @@ def joined(segments: Sequence[str], after: DialogueMove | None) -> list[tuple[st
     """
     found: list[tuple[str, str]] = []
     for segment in segments:
-        if found and _is_noise(found[-1][1]):
+        if found and (_is_noise(found[-1][1]) or (len(found) == 1 and _opens(found[-1][1], segment, after))):
             full = f"{found[-1][0]} {segment}"
             found[-1] = full, segment if understand(segment).plan.steps or len(split_words(segment)) > 2 else full
         elif found and _is_unfinished(found[-1][1], segment, after if len(found) == 1 else None):
@@ -425,6 +430,12 @@ def joined(segments: Sequence[str], after: DialogueMove | None) -> list[tuple[st
         else:
             found.append((segment, segment))
     return found
+
+
+def _opens(segment: str, following: str, after: DialogueMove | None) -> bool:
+    """Returns whether a "right," opens a statement rather than tells a side: "right, that's the shopping done"."""
+    answers = after in (DialogueMove.QUERY_W, DialogueMove.CONFIRM)
+    return split_words(segment) == ["right", ","] and not answers and not read_plan(following).plan.steps
 
 
 def _is_noise(segment: str) -> bool:

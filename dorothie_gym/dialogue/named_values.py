@@ -21,7 +21,7 @@ from dorothie_gym.ontology.slots import (
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_parser import PlanParse
 
-_VAGUE: Final = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quick|important|like)\b")
+_VAGUE: Final = re.compile(r"\bsome ?thing (to|else|big|small|nice|for|back|quick|important|like|wrong|up|is wrong)\b")
 _TICKED: Final = re.compile(r"\b(tick|check|cross) (?:\w+ ){0,4}off\b")
 _PEOPLE: Final = re.compile(
     r"\b(pedestrians?|walkers?|joggers?|runners?|crowd|on foot|crossing|crosses|crossed|cross|street|road|roads"
@@ -34,7 +34,8 @@ _PEOPLE: Final = re.compile(
 """Words of people outside the car."""
 
 _INSIDE: Final = re.compile(
-    r"\b(back here|in here|in the (?:back|car)|with us|with me|my mother|out(?:side)? (?:at|by))\b"
+    r"\b(back here|in here|in the (?:back|car)|with us|with me|my mother|out(?:side)? (?:at|by)"
+    r"|(?:got|have|with|bring|my|her|his|mum's|mom's) (?:the |a |my |her |his )?walker)\b"
 )
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
@@ -53,6 +54,14 @@ _SOUGHT: Final = re.compile(
     r"|by the|next to|in front)"
 )
 """Words of somebody who is looked for, at a place outside the car."""
+
+_FETCHED: Final = re.compile(
+    r"\b(?:to|gotta|must|should|and|then) (?:still )?(?:pick up|grab|fetch|collect|get) (?:my |our |his |her |the )?"
+    r"(?:friends?|mate|buddy|brother|sister|mum|mom|mother|dad|father|gran|granny|grandma|grandpa|grandad|aunt|auntie"
+    r"|uncle|cousin|nephew|niece|son|daughter|wife|husband|boss|girlfriend|boyfriend|grandson|granddaughter|partner"
+    r"|kids|children|baby)(?: from| at| by| on| first| too| up| later| now| as well|$| ,)"
+)
+"""Words of somebody who is to be fetched."""
 
 _LIVING: Final = re.compile(r"\b(?:lives?|living|lived|house|place|home|works?|working|worked)\b")
 _DOING: Final = re.compile(r"\b(?:get|gets|getting) (?:\w+ ){1,4}done\b")
@@ -101,7 +110,7 @@ def meant_values(
         spoken: the words, in lower case.
     """
     found = [value for value in named if not _is_misled(value, spoken)]
-    if parse.person:
+    if parse.person or _FETCHED.search(spoken):
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)
     if _SOUGHT.search(spoken) and LandmarkName.PERSON not in found and not _LIVING.search(spoken):

@@ -28,6 +28,7 @@ _ENDS: Final = frozenset({"", ",", "?", "and", "then", "please", "now", "when", 
 """Words behind "over to the left" of a change of lane."""
 _LANES: Final = frozenset({"lane", "lanes"})
 _OF_LANES: Final = frozenset({"lane", "lanes", "file"})
+_HUGGING: Final = frozenset({"hug", "hugging"})
 _JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
 """Words between a lane and a direction that has nothing to do with it."""
 
@@ -121,8 +122,9 @@ class DirectionReader(TokenReader):
         if over and isinstance(self.items[-1] if self.items else None, ActionItem):
             self.items.append(LaneItem(found.direction))  # "go over to the left"
             return place
-        changed = found.preposition == "to" and self.word_at(begin - 1) in _CHANGING
-        if changed or self.word_at(place) in _OF_LANES or self.word_at(begin - 1) in _LANES:
+        before = self.word_at(begin - 1)
+        changed = (found.preposition == "to" and before in _CHANGING) or before in _HUGGING
+        if changed or self.word_at(place) in _OF_LANES or before in _LANES:
             self.items.append(LaneItem(found.direction))
             return place + (self.word_at(place) in _OF_LANES)
         if self._is_other_lane(begin, place):

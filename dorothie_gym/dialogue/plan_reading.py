@@ -27,6 +27,10 @@ _ASKING = (["do"], ["did"], ["d'you"], ["don't"], ["didn't"], ["if"])
 
 _NAMES_FILE = "15_names.talk"
 _PERSON = "#person"
+_OR_NOT = (["or", "no"], ["or", "not"], ["or", "what"])
+"""Last words of a question that leaves it at that: "are we turning or not"."""
+_INTO = frozenset({"in", "into", "to", "over"})
+_LANES = frozenset({"lane", "lanes"})
 _SEPARABLE = frozenset({"pick", "picking"})
 _FETCHES = frozenset({"fetch", "fetching", "grab", "grabbing", "collect", "collecting", "meet"})
 _BEHIND_NAMES = frozenset({"from", "at", "by", "on", "outside", ",", "and", "then", "first", "please", "in", "off"})
@@ -130,6 +134,10 @@ def _with_particles(words: list[str]) -> list[str]:
         if words[place] in ("k", "m") and words[place + 1 : place + 3] == ["p", "h"]:
             words = [*words[:place], f"{words[place]}ph", *words[place + 3 :]]
             break
+    for place in range(1, len(words) - 2):
+        if words[place] == "back" and words[place + 1] in _INTO and _LANES.intersection(words[place + 2 : place + 6]):
+            words = [*words[:place], *words[place + 1 :]]  # "go back in the right lane"
+            break
     for place, word in enumerate(words):
         if word not in _SEPARABLE:
             continue
@@ -183,5 +191,5 @@ def _sentence(text: str) -> Sentence | None:
     names = {mention.start: mention.value for mention in mentions}
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)
-    clauses = ClauseReader(words=words, question=words[-1:] == ["?"], contracted=contracted)
+    clauses = ClauseReader(words=words, question=words[-1:] == ["?"] or words[-2:] in _OR_NOT, contracted=contracted)
     return Sentence(clauses, read_items(words, names, lead, contracted))

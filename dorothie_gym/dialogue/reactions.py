@@ -32,6 +32,7 @@ class _Reactions:
     praises: re.Pattern[str]
     in_passing: re.Pattern[str]
     says_missed: re.Pattern[str]
+    greets: re.Pattern[str]
 
 
 @functools.cache
@@ -47,6 +48,7 @@ def _reactions() -> _Reactions:
         praises=_pattern(data, "praises"),
         in_passing=_pattern(data, "in_passing"),
         says_missed=_pattern(data, "says_missed"),
+        greets=_pattern(data, "greets"),
     )
 
 
@@ -105,3 +107,8 @@ def is_in_passing(text: str) -> bool:
 def says_missed(text: str) -> bool:
     """Returns whether a statement says that the car has driven past the place: "you've gone past it"."""
     return _reactions().says_missed.search(text.lower()) is not None
+
+
+def is_greeting(text: str) -> bool:
+    """Returns whether a remark begins with a greeting: "good evening, driver"."""
+    return _reactions().greets.match(text.lower()) is not None

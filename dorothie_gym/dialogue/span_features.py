@@ -15,6 +15,7 @@ from dorothie_gym.dialogue.formulas import formula_move
 from dorothie_gym.dialogue.lexicon import load_lexicon, split_words
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.span_inputs import (
+    ACTIONS,
     CONTINUED,
     LANDMARK,
     MARKS,
@@ -39,11 +40,12 @@ _LEADING: Final = re.compile(r"^[.?!,;:'\"\u2026(\u2014-]+")
 _TRAILING: Final = re.compile(r"[.?!,;:\u2026\u2014-]+$")
 
 
-def span_features(spans: Sequence[Span]) -> SpanFeatures:
+def span_features(spans: Sequence[Span], after: DialogueMove | None) -> SpanFeatures:
     """Returns the features of an utterance.
 
     Args:
         spans: its spans by the rules, which know the move before it.
+        after: move of the other speaker before it.
     """
     tokens: list[str] = []
     begins: list[bool] = []
@@ -54,19 +56,20 @@ def span_features(spans: Sequence[Span]) -> SpanFeatures:
         tokens += said
         begins += [number == 0 for number in range(len(said))]
         moves += [span.act.move] * len(said)
-        signs += [_signs(span.text)] * len(said)
+        signs += [_signs(span)] * len(said)
     return SpanFeatures(
         words=tuple(masked_words([_bare(token) for token in tokens])),
         marks=tuple(map(_mark, tokens)),
         begins=tuple(begins),
         moves=tuple(moves),
         signs=tuple(signs),
+        after=after,
     )
 
 
-def _signs(text: str) -> tuple[int, ...]:
+def _signs(span: Span) -> tuple[int, ...]:
     """Returns what the parser tells of a span."""
-    parsed = understand(text)
+    parsed = understand(span.text)
     parse = parsed.parse
     if parse is None:
         return (0,) * SIGNS
@@ -78,14 +81,19 @@ def _signs(text: str) -> tuple[int, ...]:
         bool(parse.described) and not parse.plan.steps,
         parsed.question,
         bool(parsed.values),
-        formula_move(split_words(text)) is not None,
+        formula_move(split_words(span.text)) is not None,
         parse.repaired,
         bool(parse.denied),
         bool(parsed.landmarks or parsed.streets),
         parsed.told is not None,
         parsed.affirms is not None,
     )
-    return (*found, *map(int, answers))
+    return (*found, *map(int, answers), *action_signs(span.act.slots))
+
+
+def action_signs(values: frozenset[SlotValue]) -> tuple[int, ...]:
+    """Returns for each of the `ACTIONS` whether it is among slot values, 0 or 1."""
+    return tuple(int(action in values) for action in ACTIONS)
 
 
 def _number_of(moods: Sequence[ClauseMood]) -> int:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-
-if TYPE_CHECKING:
-    pass
+from dorothie_gym.ontology.slots import ActionValue
 
 MARKS: Final = ("", ",", ".", "?", "!", "other")
 """Marks behind a word."""
 
 MOODS: Final = tuple(ClauseMood)
 
-SIGNS: Final = 2 * (1 + len(MOODS)) + 10
-"""Number of signs of a span: its first and its last mood, each with "none", and ten yes-or-no questions."""
+ACTIONS: Final = tuple(value for value in ActionValue if value.label not in ("Unknown", "Queried"))
+"""Actions of the car, whose names in a span the tagger checks."""
+
+SIGNS: Final = 2 * (1 + len(MOODS)) + 10 + len(ACTIONS)
+"""Number of signs of a span: its first and last mood, each with "none", ten yes-or-no questions, and its actions."""
 
 LANDMARK: Final = "#landmark"
 STREET: Final = "#street"
@@ -39,6 +40,7 @@ class SpanFeatures:
         begins: whether a span of the rules begins at the word.
         moves: move of the rules' span.
         signs: signs of the rules' span, `SIGNS` zeros and ones.
+        after: move of the other speaker before the utterance.
     """
 
     words: tuple[str, ...]
@@ -46,3 +48,4 @@ class SpanFeatures:
     begins: tuple[bool, ...]
     moves: tuple[DialogueMove, ...]
     signs: tuple[tuple[int, ...], ...]
+    after: DialogueMove | None = None

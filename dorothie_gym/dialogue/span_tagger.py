@@ -1,9 +1,9 @@
-"""Trained tagger of spans: cuts an utterance into spans and finds their moves, where it is surer than the rules.
+"""Trained tagger of spans: cuts an utterance into spans, finds their moves and actions, where surer than the rules.
 
 Convolutions over the words (Kim, EMNLP 2014), with the reading of the rules among their inputs, score the labels of
 each word: begin or inside of a span, for each move. A chain of labels (a linear-chain conditional random field;
-Lafferty et al., ICML 2001) with scores of move pairs finds the best sequence. Words have vectors of a table and of
-their letter groups (Bojanowski et al., TACL 2017).
+Lafferty et al., ICML 2001) with scores of move pairs finds the best sequence. A second layer scores the actions of the
+car that each span names. Words have vectors of a table and of their letter groups (Bojanowski et al., TACL 2017).
 
 All weights and sums are whole numbers, so that results are equal on every processor. `benchmarks/span_training.py`
 trains the weights.
@@ -22,13 +22,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.dialogue.span_inputs import MASKS, SpanFeatures
-from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.dialogue.conversation import Span
+from dorothie_gym.dialogue.span_inputs import ACTIONS, MASKS, SpanFeatures
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.ontology.spellings import parse_move
 from dorothie_gym.support.compilation import compiled
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.conversation import Span
+    from collections.abc import Set as AbstractSet
 
 WEIGHTS_FILE: Final = "span_tagger.npz"
 """Data file of the shipped weights."""
@@ -64,6 +66,9 @@ _STEP: Final = 12
 _MARGIN: Final = 2.0
 """Lead in log odds with which the tagger overrules the rules; chosen by cross-validation (benchmarks/people)."""
 
+_SURE: Final = 1.5
+"""Log odds with which an action is added to those of the rules, or taken from them; chosen by cross-validation."""
+
 _LOWEST: Final = -(2**30)
 
 Whole = NDArray[np.int32]
@@ -78,8 +83,8 @@ class SpanTagger:
         words: row of each word in `vectors`; masks come behind the words, and then unknown words.
         vectors: vectors of words (n, d), int32.
         groups: vectors of letter groups (BUCKETS, g).
-        marks, begins, rules, places: vectors of marks, of the begin of a rules' span, of the rules' moves, and of
-            places (inner, first, last).
+        marks, begins, rules, places, befores: vectors of marks, of the begin of a rules' span, of the rules' moves, of
+            places (inner, first, last), and of the move before the utterance (none, or a move).
         convolutions: weights (KERNEL, inputs, h) of each convolution.
         biases: their biases (h,).
         shifts: binary places by which their sums are too long.
@@ -90,6 +95,11 @@ class SpanTagger:
         output_bias: their biases (2 m,).
         pairs: scores (1 + m, m) of a move behind the start, and behind each move.
         margin: lead by which the tagger overrules the rules.
+        acted: weights (2 h, a) of the actions: of the largest values of a span, and of the summary.
+        acted_bias: their biases (a,).
+        acted_moves: scores (m, a) of the actions by the span's move.
+        acted_rules: scores (a, a) of the actions by those of the rules.
+        sure: score by which the tagger overrules the actions of the rules.
     """
 
     moves: tuple[DialogueMove, ...]
@@ -100,6 +110,7 @@ class SpanTagger:
     begins: Whole
     rules: Whole
     places: Whole
+    befores: Whole
     convolutions: tuple[Whole, ...]
     biases: tuple[Whole, ...]
     shifts: tuple[int, ...]
@@ -110,9 +121,14 @@ class SpanTagger:
     output_bias: Whole
     pairs: Whole
     margin: int
+    acted: Whole
+    acted_bias: Whole
+    acted_moves: Whole
+    acted_rules: Whole
+    sure: int
 
-    def tag(self, features: SpanFeatures) -> tuple[list[int], int, int]:
-        """Returns the best labels, their score, and that of the rules' labels."""
+    def encode(self, features: SpanFeatures) -> tuple[Whole, Whole]:
+        """Returns values (n, h) of the words, and a summary (h,) of the utterance."""
         inputs = self.inputs(features)
         number, hidden = len(features.words), len(self.pooled_bias)
         values = np.empty((len(DILATIONS) + 1, number, hidden), np.int32)
@@ -124,11 +140,35 @@ class SpanTagger:
             before, held = held, values[layer + 1]
         summary = np.empty(hidden, np.int32)
         _summarise(before, self.pooled, self.pooled_bias, self.pooled_shift, summary)
+        return before, summary
+
+    def tag(self, features: SpanFeatures, values: Whole, summary: Whole) -> tuple[list[int], int, int]:
+        """Returns the best labels of encoded words, their score, and that of the rules' labels."""
+        number = len(values)
         scores = np.empty((number, 2 * len(self.moves)), np.int32)
-        _score(before, summary, self.output, self.output_bias, scores)
+        _score(values, summary, self.output, self.output_bias, scores)
         labels, rules = np.empty(number, np.int32), self._rules_labels(features)
         best, said = _decode(scores, self.pairs, rules, np.empty((number, len(self.moves)), np.int32), labels)
         return labels.tolist(), int(best), int(said)
+
+    def actions(
+        self, values: Whole, summary: Whole, move: DialogueMove, ruled: AbstractSet[ActionValue]
+    ) -> frozenset[ActionValue]:
+        """Returns the actions that a span names: those of the rules, except where the tagger is sure.
+
+        Args:
+            values: values (k, h) of the words of the span.
+            summary: summary of the utterance.
+            move: move of the span.
+            ruled: actions that the rules find in it; others than `ACTIONS` are kept.
+        """
+        scores = self.acted_bias + self.acted_moves[self.moves.index(move)]
+        scores = scores + np.concatenate((values.max(axis=0), summary)) @ self.acted
+        signs = [action in ruled for action in ACTIONS]
+        scores = scores + self.acted_rules[signs].sum(axis=0)
+        found = zip(ACTIONS, signs, scores.tolist(), strict=True)
+        named = {action for action, sign, score in found if score > (-self.sure if sign else self.sure)}
+        return frozenset(named | (set(ruled) - set(ACTIONS)))
 
     def _rules_labels(self, features: SpanFeatures) -> Whole:
         pairs = zip(features.moves, features.begins, strict=True)
@@ -139,6 +179,7 @@ class SpanTagger:
         number = len(features.words)
         places = np.zeros(number, np.int64)
         places[0], places[-1] = 1, 2
+        before = 0 if features.after is None else 1 + self.moves.index(features.after)
         return np.concatenate(
             (
                 np.array([_word_vector(self, word) for word in features.words]),
@@ -146,6 +187,7 @@ class SpanTagger:
                 self.begins[[int(begins) for begins in features.begins]],
                 self.rules[[self.moves.index(move) for move in features.moves]],
                 self.places[places],
+                np.broadcast_to(self.befores[before], (number, self.befores.shape[1])),
                 np.array([_sign_vector(signs) for signs in features.signs]),
             ),
             axis=1,
@@ -220,6 +262,7 @@ def unpack(data: bytes) -> SpanTagger:
         begins=whole["begins"],
         rules=whole["rules"],
         places=whole["places"],
+        befores=whole["befores"],
         convolutions=tuple(whole[f"convolution{number}"] for number in range(len(DILATIONS))),
         biases=tuple(whole[f"bias{number}"] for number in range(len(DILATIONS))),
         shifts=tuple(shifts[: len(DILATIONS)]),
@@ -230,27 +273,64 @@ def unpack(data: bytes) -> SpanTagger:
         output_bias=whole["output_bias"],
         pairs=whole["pairs"],
         margin=round(_MARGIN * (1 << scale)),
+        acted=whole["acted"],
+        acted_bias=whole["acted_bias"],
+        acted_moves=whole["acted_moves"],
+        acted_rules=whole["acted_rules"],
+        sure=round(_SURE * (1 << int(whole["scale"][1]))),
     )
 
 
-def retagged(spans: Sequence[Span], features: SpanFeatures) -> list[tuple[str, DialogueMove]] | None:
-    """Returns the spans of an utterance where the tagger is surer than the rules, and None elsewhere.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TaggedUtterance:
+    """Utterance that the tagger has read.
+
+    Attributes:
+        spans: words and moves of its spans where the tagger is surer than the rules, and None elsewhere.
+        values: values (n, h) of its words.
+        summary: its summary (h,).
+    """
+
+    spans: tuple[tuple[str, DialogueMove], ...] | None
+    values: Whole
+    summary: Whole
+
+    def with_actions(self, spans: Sequence[Span]) -> tuple[Span, ...]:
+        """Returns spans with the actions that they name.
+
+        Args:
+            spans: spans of the utterance, which have all of its words.
+        """
+        tagger, place, found = load_tagger(), 0, []
+        for span in spans:
+            end = place + len(span.text.split())
+            ruled = frozenset(value for value in span.act.slots if isinstance(value, ActionValue))
+            named = tagger.actions(self.values[place:end], self.summary, span.act.move, ruled)
+            act = span.act if named == ruled else DialogueAct(span.act.move, (span.act.slots - ruled) | named)
+            found.append(span if act is span.act else Span(span.text, act))
+            place = end
+        return tuple(found)
+
+
+def tagged(spans: Sequence[Span], features: SpanFeatures) -> TaggedUtterance:
+    """Returns what the tagger reads in an utterance.
 
     Args:
         spans: spans of the rules, at least one.
         features: features of the utterance.
     """
     tagger = load_tagger()
-    labels, best, rules = tagger.tag(features)
+    values, summary = tagger.encode(features)
+    labels, best, rules = tagger.tag(features, values, summary)
     if best - rules <= tagger.margin:
-        return None
+        return TaggedUtterance(spans=None, values=values, summary=summary)
     found: list[tuple[str, DialogueMove]] = []
     for token, label in zip(" ".join(span.text for span in spans).split(), labels, strict=True):
         if label % 2 == 0:
             found.append((token, tagger.moves[label // 2]))
         else:
             found[-1] = f"{found[-1][0]} {token}", found[-1][1]
-    return found
+    return TaggedUtterance(spans=tuple(found), values=values, summary=summary)
 
 
 @compiled

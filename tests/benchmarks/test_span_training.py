@@ -12,6 +12,7 @@ import pytest
 
 from benchmarks.span_sentences import (
     FOLDER,
+    LabelledSpan,
     Sentence,
     compositions,
     example,
@@ -20,11 +21,15 @@ from benchmarks.span_sentences import (
     variants,
 )
 from dorothie_gym.dialogue.span_tagger import unpack
-from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.ontology import ActionValue, DialogueMove
 from dorothie_gym.ontology.spellings import parse_move
 
 SENTENCE = Sentence(
-    (("the road's closed,", DialogueMove.EXPLAIN), ("take Beal instead.", DialogueMove.INSTRUCT)), DialogueMove.CONFIRM
+    (
+        LabelledSpan("the road's closed,", DialogueMove.EXPLAIN, frozenset()),
+        LabelledSpan("turn left instead.", DialogueMove.INSTRUCT, frozenset({ActionValue.J_TURN})),
+    ),
+    DialogueMove.CONFIRM,
 )
 
 
@@ -51,18 +56,22 @@ def test_labels_begin_where_spans_begin() -> None:
     explain, instruct = 2 * DialogueMove.EXPLAIN, 2 * DialogueMove.INSTRUCT
     assert found.labels == (explain, explain + 1, explain + 1, instruct, instruct + 1, instruct + 1)
     assert len(found.features.words) == len(found.labels)
+    assert found.features.after is DialogueMove.CONFIRM
+    assert [(span.begin, span.end, sum(span.named)) for span in found.actions] == [(0, 3, 0), (3, 6, 1)]
+    unlabelled = Sentence(tuple(span._replace(actions=None) for span in SENTENCE.spans))
+    assert example(unlabelled).actions == ()
 
 
 def test_variants_keep_the_moves_and_compositions_join_no_equal_neighbours() -> None:
     rng, noise = random.Random(3), np.random.default_rng(3)
     found = variants(SENTENCE, rng, noise)
-    assert [move for _, move in found[0].spans] == [move for _, move in SENTENCE.spans]
-    assert found[0].text == "the road's closed take Beal instead"
+    assert [span[1:] for span in found[0].spans] == [span[1:] for span in SENTENCE.spans]
+    assert found[0].text == "the road's closed turn left instead"
     others = grammar_sentences(60, 1)
     made = list(compositions([SENTENCE, *others], 50, rng))
     assert len(made) == 50
     for sentence in made:
-        moves = [move for _, move in sentence.spans]
+        moves = [span.move for span in sentence.spans]
         assert len(moves) > 1
         assert all(move is not other or move is DialogueMove.INSTRUCT for move, other in itertools.pairwise(moves))
 
@@ -81,7 +90,7 @@ def test_weights_are_reproducible_and_learn() -> None:
     first, again = (training.packed(training.train(examples, weights, table, config)) for _ in range(2))
     assert first == again
     tagger = unpack(first)
-    right = [tagger.tag(row.features)[0][0] == row.labels[0] for row in examples]
+    right = [tagger.tag(row.features, *tagger.encode(row.features))[0][0] == row.labels[0] for row in examples]
     assert sum(right) > 0.6 * len(right)
 
 

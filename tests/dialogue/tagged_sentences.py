@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from dorothie_gym.dialogue import guess_spans
 from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans
 from dorothie_gym.dialogue.span_features import span_features
 from dorothie_gym.dialogue.span_inputs import SpanFeatures
@@ -25,7 +26,7 @@ SAID = [
 
 
 def features_of(text: str, after: DialogueMove | None = None) -> SpanFeatures:
-    return span_features(rule_spans(text, after))
+    return span_features(rule_spans(text, after), after)
 
 
 def sentences(number: int) -> list[tuple[str, list[str]]]:
@@ -42,4 +43,6 @@ def fingerprint() -> str:
     """Returns the scores of sentences as text."""
     tagger = load_tagger()
     texts = [text for text, _ in sentences(120)] + SAID
-    return json.dumps([tagger.tag(features_of(text)) for text in texts])
+    features = [features_of(text) for text in texts]
+    tags = [tagger.tag(each, *tagger.encode(each)) for each in features]
+    return json.dumps([tags, [[str(span.act) for span in guess_spans(text)] for text in texts]])

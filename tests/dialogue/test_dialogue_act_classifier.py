@@ -139,9 +139,14 @@ def test_any_text_gets_acts(text, after):
 
 @pytest.mark.parametrize("greeting", ["Hello", "Hi", "hey", "Good morning", "Hello there", "Good evening,", "Hi,"])
 @pytest.mark.parametrize("addressee", ["car", "dear car", "robot", "my friend", ""])
-def test_a_greeting_opens_the_channel_whoever_it_addresses(greeting, addressee):
+def test_a_greeting_is_small_talk_whoever_it_addresses(greeting, addressee):
     (span,) = guess_spans(f"{greeting} {addressee}".strip(" ,") + ".")
-    assert span.act == DialogueAct(DialogueMove.ALIGN)
+    assert span.act == DialogueAct(DialogueMove.IRRELEVANT)
+
+
+@pytest.mark.parametrize("call", ["Hello?", "hello, hello?", "hello, anybody there?", "hey, are you listening?"])
+def test_a_greeting_that_waits_for_an_answer_asks_for_attention(call):
+    assert guess_spans(call)[0].act == DialogueAct(DialogueMove.ALIGN)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Trained tagger of spans: exact on every processor, no worse than the rules, and small."""
+"""Trained tagger of spans and actions: exact on every processor, no worse than the rules, and small."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from dorothie_gym.dialogue import guess_spans
 from dorothie_gym.dialogue.dialogue_act_classifier import rule_spans
 from dorothie_gym.dialogue.span_features import masked_words
-from dorothie_gym.dialogue.span_inputs import MARKS
+from dorothie_gym.dialogue.span_inputs import ACTIONS, MARKS
 from dorothie_gym.dialogue.span_tagger import (
     DILATIONS,
     WEIGHTS_FILE,
@@ -24,13 +24,13 @@ from dorothie_gym.dialogue.span_tagger import (
     unpack,
     word_row,
 )
-from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.ontology import ActionValue, DialogueMove
 from tests.dialogue.tagged_sentences import PEOPLE, SAID, features_of, fingerprint, sentences
 from tests.portability.processors import SETTINGS, TOGETHER
 
 
-def scores_of(tagger: SpanTagger, inputs: np.ndarray) -> np.ndarray:
-    """Returns the scores of the labels, in whole numbers of 64 bits, a word and a layer at a time."""
+def encoded(tagger: SpanTagger, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the values of the words and the summary, in whole numbers of 64 bits, a word and a layer at a time."""
     values = inputs.astype(np.int64)
     number = len(values)
     for layer, dilation in enumerate(DILATIONS):
@@ -43,8 +43,13 @@ def scores_of(tagger: SpanTagger, inputs: np.ndarray) -> np.ndarray:
         values = found if layer == 0 else values + found
     everything = np.concatenate((values.max(axis=0), values[0]))
     summary = tagger.pooled_bias + np.einsum("k,kh->h", everything, tagger.pooled.astype(np.int64))
-    summary = np.maximum(summary + (1 << (tagger.pooled_shift - 1)), 0) >> tagger.pooled_shift
-    both = np.concatenate((values, np.broadcast_to(summary, (number, len(summary)))), axis=1)
+    return values, np.maximum(summary + (1 << (tagger.pooled_shift - 1)), 0) >> tagger.pooled_shift
+
+
+def scores_of(tagger: SpanTagger, inputs: np.ndarray) -> np.ndarray:
+    """Returns the scores of the labels, in whole numbers of 64 bits."""
+    values, summary = encoded(tagger, inputs)
+    both = np.concatenate((values, np.broadcast_to(summary, (len(values), len(summary)))), axis=1)
     return np.einsum("nk,km->nm", both, tagger.output.astype(np.int64)) + tagger.output_bias
 
 
@@ -82,7 +87,7 @@ def test_labels_are_the_best_of_all_by_independent_sums() -> None:
     tagger = load_tagger()
     for text, after in (("turn left then stop", None), ("yes please", DialogueMove.QUERY_YN), ("hm", None)):
         features = features_of(text, after)
-        labels, best, said = tagger.tag(features)
+        labels, best, said = tagger.tag(features, *tagger.encode(features))
         scores = scores_of(tagger, tagger.inputs(features))
         moves = np.argsort(-scores.reshape(len(scores), -1, 2).max(axis=(0, 2)), kind="stable")[:5]
         likely = [2 * int(move) + inside for move in moves for inside in (0, 1)]
@@ -94,6 +99,52 @@ def test_labels_are_the_best_of_all_by_independent_sums() -> None:
             for move, begins in zip(features.moves, features.begins, strict=True)
         ]
         assert score_of(tuple(ruled), scores, tagger.pairs) == said
+
+
+def test_actions_are_those_of_independent_sums() -> None:
+    tagger = load_tagger()
+    for text in ("stop on the left by the wall", "that bus is turning left up there", "hm"):
+        features = features_of(text)
+        values, summary = tagger.encode(features)
+        wide, whole = encoded(tagger, tagger.inputs(features))
+        assert np.array_equal(values, wide) and np.array_equal(summary, whole)
+        for move, ruled in itertools.product((DialogueMove.INSTRUCT, DialogueMove.EXPLAIN), ((), (ACTIONS[3],))):
+            scores = np.concatenate((wide.max(axis=0), whole)) @ tagger.acted.astype(np.int64) + tagger.acted_bias
+            scores = scores + tagger.acted_moves[tagger.moves.index(move)]
+            scores = scores + sum(tagger.acted_rules[ACTIONS.index(action)] for action in ruled)
+            wanted = {
+                action
+                for action, score in zip(ACTIONS, scores, strict=True)
+                if score > (-tagger.sure if action in ruled else tagger.sure)
+            }
+            assert tagger.actions(values, summary, move, frozenset(ruled)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("before", "text", "actions"),
+    [
+        ("", "they've put cones all over the left lane", set()),
+        ("", "some guy parked his truck in our lane", set()),
+        ("Which side do you want to get out on?", "the left, by the gate", set()),
+        ("Which house is yours?", "the white one with the fence, on the right", set()),
+        ("", "straight across at the crossroads, please", {ActionValue.LANE_FOLLOW}),
+        ("", "on the left please, next to that gate", {ActionValue.STOP}),
+        ("", "stop on the right, by the hedge", {ActionValue.STOP}),
+    ],
+)
+def test_a_span_names_the_actions_of_the_own_car(before: str, text: str, actions: set[ActionValue]) -> None:
+    after = guess_spans(before)[-1].act.move if before else None
+    found = {value for span in guess_spans(text, after) for value in span.act.slots if isinstance(value, ActionValue)}
+    assert found == actions
+
+
+def test_actions_that_the_tagger_does_not_know_are_kept() -> None:
+    tagger = load_tagger()
+    features = features_of("which way now")
+    values, summary = tagger.encode(features)
+    assert ActionValue.QUERIED in tagger.actions(
+        values, summary, DialogueMove.QUERY_W, frozenset({ActionValue.QUERIED})
+    )
 
 
 def test_features_mask_names_and_numbers_and_keep_marks() -> None:

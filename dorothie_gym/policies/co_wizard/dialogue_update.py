@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.reactions import is_greeting
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -470,6 +471,8 @@ def _confusion(
 def _small_talk(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
+    if is_greeting(words.text):
+        return _alignment(state, view, act, words, rng)
     awaited = not state.beliefs.statuses or view.time - state.dialogue.asked_at < state.config.answer_time
     expected = awaited and state.beliefs.goal is None and state.intentions.directive is None
     if _senseless(state, view, act, words, asks=expected):
