@@ -68,8 +68,8 @@ def check(
         state.say_first(denied(checked(state, act, words)))
         if goal is not None and state.task.announced:
             state.task = state.task.after_reminding(view.time)
-            again = act_builders.destination(goal.name, goal.street)
-            state.say(intend(Function.REQUEST, again, joined=True))
+            there = act_builders.destination(goal.name, goal.street)
+            state.say(intend(Function.REQUEST, there, joined=True))
         return
     elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
         _refuse_with_step(state, view, act, words, rng)

@@ -31,7 +31,7 @@ def test_participant_guides_the_scripted_car_to_its_places() -> None:
 
 def test_ad_wizard_changes_world_and_task() -> None:
     kinds: set[str] = set()
-    for seed in (1, 2, 3):
+    for seed in (2, 10):
         engines: list[SessionEngine] = []
         model = PromptModel(Interferer())
         summary = play({Role.AD_WIZARD: (NOWHERE, model)}, seed=seed, on_step=engines.append)
