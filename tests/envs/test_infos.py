@@ -93,7 +93,10 @@ def parallel_episodes(env: Any) -> Iterator[dict[str, Info]]:
     for seed in range(2):
         yield env.reset(seed=seed)[1]
         while env.agents:
-            yield env.step({agent: env.action_space(agent).sample() for agent in env.agents})[-1]
+            infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})[-1]
+            for info in infos.values():
+                info.pop("TimeLimit.truncated", None)  # stable-baselines3 expects it at the end only
+            yield infos
 
 
 @pytest.mark.parametrize("wrapped", [lambda env: env, IdenticalSpaces], ids=["plain", "identical spaces"])
