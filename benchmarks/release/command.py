@@ -75,6 +75,9 @@ def _measure(names: list[str], measured: dict[str, Measurement], build: Build, w
             fail(str(error), FAILED)
         except KeyboardInterrupt:
             exit_interrupted(f"Interrupted in {name}; the same command resumes.")
+        now = Build.of_checkout()
+        if now.changes or now.package != build.package:
+            fail(f"the checkout has changed while {name} was measured; delete its folder in {work}, and measure again")
         figure_file.save(measured)
     _write_pages(measured)
 

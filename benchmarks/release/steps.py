@@ -192,7 +192,7 @@ SPOILT: Final = (0.0, 0.05, 0.2)
 def spoilt_figures(folder: Path) -> Figures:
     """Returns the success and Pass^3 of the rule program by the rate of its spoilt answers [%]."""
     rows = {row["player"]: row for row in _json(folder)}
-    found = {}
+    found: Figures = {}
     for rate in SPOILT:
         row = rows["reader" if rate == 0.0 else f"reader, {rate:.0%} spoilt"]
         keys = "sessions", "success", "pass_k", "reached", "live"

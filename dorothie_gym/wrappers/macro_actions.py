@@ -151,7 +151,9 @@ class MacroActions(gym.Wrapper[dict[str, Any], int, dict[str, Any], Any], Record
         gym.Wrapper.__init__(self, env)
         self._inner: SingleRole = env.unwrapped  # type: ignore[assignment]  # checked next
         if getattr(env.unwrapped, "role", None) is not Role.CO_WIZARD:
-            raise ValueError("MacroActions wraps dorothie_gym/CoWizard-v0; other environments have small action spaces")
+            raise ValueError(
+                "MacroActions wraps dorothie_gym/CoWizard-v0; flatten(env, fields=[...]) keeps some fields of another"
+            )
         observed = self._inner.observation_space
         if not isinstance(observed, spaces.Dict) or "participant_slots" not in observed.spaces:
             raise ValueError("MacroActions reads dialogue acts; leave EnvConfig.observe_acts at True")

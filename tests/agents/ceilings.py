@@ -107,7 +107,7 @@ def scripted_row(tier: str, role: Role, sessions: Sequence[tuple[TextSession, in
 
 
 def main(
-    tiers: Annotated[str, typer.Option(help="tiers, separated by commas")] = "standard,rough",
+    tiers: Annotated[str, typer.Option("--tiers", help="tiers, separated by commas")] = "standard,rough",
     roles: Annotated[str, typer.Option(help="roles, separated by commas")] = "co_wizard,participant",
     count: Annotated[int, typer.Option("--sessions", min=1, help="scenarios of a tier; towns take turns")] = 8,
     rates: Annotated[str, typer.Option("--spoilt", help="rates of spoilt answers")] = "0",

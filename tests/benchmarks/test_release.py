@@ -16,7 +16,7 @@ from benchmarks.release import figures, quotes, running
 from benchmarks.release.figures import Figure, Measurement
 from benchmarks.release.quotes import Quote, QuoteError, QuoteFile
 from benchmarks.release.running import Build, measure, outdated
-from benchmarks.release.steps import STEPS, Step, driver_figures, rollout_figures
+from benchmarks.release.steps import STEPS, Step, driver_figures, rollout_figures, spoilt_figures
 from dorothie_gym import EnvConfig
 from dorothie_gym.errors import InputFileError, ProcessError
 from dorothie_gym.evaluation.closed_loop import RolloutSettings, roll_out
@@ -177,6 +177,15 @@ def test_figures_of_trained_drivers_are_read(tmp_path: Path) -> None:
         (tmp_path / f"seed-{seed}" / "progress.jsonl").write_text("\n".join(map(json.dumps, rows)) + "\n")
     found = driver_figures(tmp_path)
     assert found["seconds_to_90_percent"].value == 52.0 and found["least_success"].value == 0.95
+
+
+def test_figures_of_spoilt_answers_are_read(tmp_path: Path) -> None:
+    usual = {"sessions": 18, "reached": 46, "live": 57, "success": 0.7222, "pass_k": 0.3333}
+    players = "scripted", "reader", "reader, 5% spoilt", "reader, 20% spoilt"
+    (tmp_path / "0.json").write_text(json.dumps([{"player": player, **usual} for player in players]))
+    found = spoilt_figures(tmp_path)
+    assert found["rate_5_success"].shown("share") == "72 %" and found["rate_20_pass_k"].shown("share") == "33 %"
+    assert found["rate_0_reached"].shown() == "46"
 
 
 def test_steps_are_listed_and_an_unknown_one_is_named() -> None:

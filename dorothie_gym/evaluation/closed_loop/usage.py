@@ -65,6 +65,11 @@ def usage_warnings(usage: SessionUsage) -> list[str]:
             found.append(f"{role}: the endpoint refused or changed these parameters: {', '.join(each.refused)}")
         if each.served:
             found.append(f"{role}: {each.model} was requested, and answered by {', '.join(each.served)}")
+        if each.answers and not (each.prompt_tokens and each.completion_tokens):
+            missing = "answers" if each.prompt_tokens else "prompts"
+            found.append(
+                f"{role}: the endpoint reports no tokens of {missing}; the numbers of tokens and the cost are too low"
+            )
     return found
 
 
