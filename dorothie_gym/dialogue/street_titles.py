@@ -118,7 +118,9 @@ class StreetTitles:
         """
         named = zip(names, titles, strict=False)
         self._titles = tuple(titles)
-        self._of = {name: title for name, title in named if title and name is not StreetName.UNKNOWN}
+        self._of: dict[StreetName, str] = {
+            name: title for name, title in named if title and name is not StreetName.UNKNOWN
+        }
 
     def __bool__(self) -> bool:
         """Returns whether a name of the vocabulary stands for another one."""
@@ -154,7 +156,7 @@ class StreetTitles:
     @functools.cached_property
     def _names_said(self) -> tuple[re.Pattern[str], dict[str, StreetName]]:
         """Pattern of the names of the vocabulary that stand for titles, and the name of each spelling."""
-        of_form = {form: name for name in self._of for form in _forms(name)}
+        of_form: dict[str, StreetName] = {form: name for name in self._of for form in _forms(name)}
         forms = "|".join(re.escape(form) for form in sorted(of_form, key=len, reverse=True))
         return re.compile(rf"(?<![\w'])({forms})(?!\w){_KIND_BEHIND}", re.IGNORECASE), of_form
 

@@ -11,6 +11,7 @@ from typing import Final
 
 from dorothie_gym.errors import InputFileError, TownError
 from dorothie_gym.maps import opendrive  # lazy: its parser is slow to import
+from dorothie_gym.maps.street_map_facts import read_facts, rename_roads
 from dorothie_gym.support.files import write_atomically
 from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 from dorothie_gym.support.installation import pip_install
@@ -47,10 +48,12 @@ def is_street_map(path: str | Path) -> bool:
 
 
 def convert_street_map(path: str | Path, out: str | Path) -> None:
-    """Writes the streets of an OpenStreetMap file as OpenDRIVE, for cars on the right.
+    """Writes the streets of an OpenStreetMap file as OpenDRIVE.
 
     Names of streets, lights, one-way streets, roundabouts, speed limits and numbers of lanes are kept; lanes for buses
-    are kept from cars. Streets without a way to the largest part of the map are left out.
+    are kept from cars. Streets without a way to the largest part of the map are left out. Cars drive on the left where
+    most roundabouts show it, and on the right otherwise. Names in letters that pictures cannot draw become those in
+    Latin letters (`name:en`), if the map has them.
 
     Args:
         path: XML file of OpenStreetMap (`.osm`, also compressed as `.osm.gz`).
@@ -67,12 +70,15 @@ def convert_street_map(path: str | Path, out: str | Path) -> None:
         raise TownError(str(path), "file", f"cannot be read ({error.strerror}); check the path") from error
     except InputFileError as error:
         raise TownError(str(path), "file", error.reason) from None
+    facts = read_facts(source)
+    side = ["--lefthand"] if facts.left_hand else []
     with tempfile.TemporaryDirectory(prefix="dorothie-gym-") as folder:
         found = Path(folder) / f"{Path(out).stem}.xodr"
         files = ["--osm-files", str(source.resolve()), "--opendrive-output", str(found)]
-        _run([_netconvert(str(path)), *files, *OPTIONS], str(path))
+        _run([_netconvert(str(path)), *files, *OPTIONS, *side], str(path))
         if not found.is_file():
             raise TownError(str(path), "file", "has no streets for cars")
+        found.write_bytes(rename_roads(found.read_bytes(), facts.latin_names))
         try:
             opendrive.import_opendrive(found)
         except TownError as error:

@@ -209,7 +209,7 @@ class Town:
         """Name and content: equal for towns with equal parts, which copies of a town in other processes are."""
         parts = [self.lanes, self.links, self.junctions, self.streets, self.sites]
         beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes, self.cruise]
-        side = [] if self.traffic is DrivingSide.RIGHT else [self.traffic]
+        side: list[object] = [] if self.traffic is DrivingSide.RIGHT else [self.traffic]
         side += ["titled"] if self.titled else []
         return TownIdentity(name=self.name, content=digest_of([*parts, *beside, *side]))
 

@@ -300,7 +300,7 @@ def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...
     In a town with titles, the longest streets with titles are named first; a title with a name of the vocabulary in it,
     such as "N Broadway", gets this one.
     """
-    shuffled = [STREET_NAMES[int(i)] for i in rng.permutation(len(STREET_NAMES))]
+    shuffled: list[StreetName] = [STREET_NAMES[int(i)] for i in rng.permutation(len(STREET_NAMES))]
     if any(town.street_titles):
         return _name_titled(town, shuffled)
     names: list[StreetName] = []

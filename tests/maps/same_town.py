@@ -42,7 +42,7 @@ def bits(value: Any) -> Any:
 
 
 def town_bits(town: Town) -> Any:
-    return town.name, bits(town.cruise), {part: bits(getattr(town, part)) for part in PARTS}
+    return town.name, bits(town.cruise), town.titled, {part: bits(getattr(town, part)) for part in PARTS}
 
 
 def town_with_everything() -> Town:

@@ -43,7 +43,7 @@ def _document(**changes: object) -> bytes:
 
 
 def test_an_archive_holds_all_parts_of_a_town() -> None:
-    assert set(inspect.signature(Town).parameters) == {"name", "traffic", "cruise", *PARTS}
+    assert set(inspect.signature(Town).parameters) == {"name", "traffic", "cruise", "titled", *PARTS}
 
 
 def test_a_town_with_all_parts_is_restored_bit_for_bit() -> None:
@@ -59,6 +59,12 @@ def test_an_empty_town_is_restored() -> None:
 def test_a_cruise_speed_that_is_no_number_is_refused(cruise: object) -> None:
     with pytest.raises(TownArchiveError, match="cruise"):
         unpack(_document(cruise=cruise), "key")
+
+
+@pytest.mark.parametrize("titled", [1, "yes", None])
+def test_titles_that_are_no_truth_value_are_refused(titled: object) -> None:
+    with pytest.raises(TownArchiveError, match="titles"):
+        unpack(_document(titled=titled), "key")
 
 
 @pytest.mark.parametrize("name", [*town_names(), "Town02", "Town05"])

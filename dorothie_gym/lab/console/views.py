@@ -62,10 +62,12 @@ def static_view(observation: ObservationMapping, town: Town) -> RoleView:
     """
     names = [StreetName(int(i)) for i in observation["street_names"][: len(town.streets)]]
     labels = ["" if name is StreetName.UNKNOWN else name.label for name in names]
-    titles = titles_of(observation, town).labels(labels)
+    titles = titles_of(observation, town)
+    streets = titles.labels(labels)
+    named = {label: title for label, title in zip(labels, streets, strict=True) if label and label != title}
     return {
-        "streets": titles,
-        "titles": {label: title for label, title in zip(labels, titles, strict=True) if label and label != title},
+        "streets": streets,
+        **({"titles": named} if titles else {}),
         "story": observation.get("story", ""),
     }
 
