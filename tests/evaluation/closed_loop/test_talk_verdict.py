@@ -82,7 +82,7 @@ def test_a_street_is_closed_beside_a_vehicle_that_stands_in_the_way() -> None:
         action, state = closer.step(seen, state)  # nothing was placed: the prop is not in the observation
         places.append(AdWizardAction.decode(action, host.limits).place)
     assert len({place.lane for place in places}) == 1
-    assert [place.metres - places[0].metres for place in places] == [0, 6, -6]
+    assert [place.metres - places[0].metres for place in places] == [0, 7, -7]
 
 
 def test_a_question_without_need_fails_and_a_plain_request_is_done(tmp_path: Path) -> None:
