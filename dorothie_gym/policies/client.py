@@ -96,10 +96,10 @@ def fits(reply: Reply, heard: str) -> bool:
 MOST_ATTEMPTS: Final = 20
 """Number of decisions in which a barrier may be placed; a vehicle may stand in its place at first."""
 
-BARRIER_SHIFTS: Final = (0, 7, -7)
-"""Places of a barrier, tried in turns, from that of the errand [m]: a vehicle in the way covers one of them.
+BARRIER_SHIFTS: Final = (0, 7, -7, 4, -4, 2, -2)
+"""Places of a barrier from that of the errand [m], tried in turns before the client speaks, and all in its sight.
 
-The street is so closed before the client speaks, and the barrier is in sight in each of them.
+A prop keeps 6 m from vehicles, so that one that stands in the way mostly leaves one of the places free.
 """
 
 

@@ -21,6 +21,7 @@ from dorothie_gym.session.recording.events import EventType
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.session.scenario import draw_scenario
 from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.actions import AdWizardAction
 from dorothie_gym.session.talk_kinds import KINDS, draw_talk_task
 from dorothie_gym.session.talk_tasks import Reaction
 from dorothie_gym.tasks.briefs import TalkFamily
@@ -63,6 +64,25 @@ def test_each_kind_can_be_done_and_failed(family: TalkFamily, kind: str, tmp_pat
     assert right.passed and right.kind == kind and right.unnecessary == 0, right
     wrong = play(family, seed, "says-yes", tmp_path / "wrong")[1]
     assert not wrong.passed and wrong.cause, wrong
+
+
+def test_a_digit_in_the_name_of_a_place_is_no_number_of_a_place(tmp_path: Path) -> None:
+    session, verdict = play(TalkFamily.ASK_FIRST, 20120, "talk-oracle", tmp_path / "seven")
+    assert any("To 7-Eleven, please." in utterance.text for utterance in session.utterances())
+    assert verdict.passed, verdict
+
+
+def test_a_street_is_closed_beside_a_vehicle_that_stands_in_the_way() -> None:
+    host = engine(TalkFamily.ADMIT_IT)
+    host.reset(seed=seed_of(TalkFamily.ADMIT_IT, "street_closed", acts=False))
+    seen = host.observations.of()["ad_wizard"]
+    closer = make_policy("street-closer", Role.AD_WIZARD, host.limits)
+    state, places = closer.initial_state(0, host.town), []
+    for _ in range(3):
+        action, state = closer.step(seen, state)  # nothing was placed: the prop is not in the observation
+        places.append(AdWizardAction.decode(action, host.limits).place)
+    assert len({place.lane for place in places}) == 1
+    assert [place.metres - places[0].metres for place in places] == [0, 7, -7]
 
 
 def test_a_question_without_need_fails_and_a_plain_request_is_done(tmp_path: Path) -> None:
