@@ -3,6 +3,7 @@
     python -m benchmarks.span_training                 # writes the weights into the package
     python -m benchmarks.span_training --folds 3       # cross-validation by sentences, and `people/` dev
     python -m benchmarks.span_training --minilm        # with other words than those of the weights
+    python -m benchmarks.span_training --further       # three epochs more for the weights of the package
 
 The vectors of words are those of the weights, or are made from the table of word pieces of MiniLM (extra `minilm`).
 The script needs torch (extra `baselines`), and a minute of processor time for each training. The weights are
@@ -16,7 +17,7 @@ import io
 import random
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -466,6 +467,7 @@ def main() -> None:
     parser.add_argument("--folds", type=int, default=0, help="folds of the cross-validation; 0 trains the weights")
     parser.add_argument("--out", type=Path, default=TARGET)
     parser.add_argument("--minilm", action="store_true", help="make the vectors of words from MiniLM")
+    parser.add_argument("--further", action="store_true", help="train the weights of the package further")
     asked = parser.parse_args()
     if asked.folds == 1 or asked.folds < 0:
         parser.error(f"--folds is {asked.folds}; give at least 2, or 0 to train the weights")
@@ -474,7 +476,9 @@ def main() -> None:
     if asked.folds:
         validate(sentences, asked.folds, table, config)
         return
-    data = packed(train(*training_examples(sentences, config), table, config))
+    start = TARGET.read_bytes() if asked.further else None
+    config = replace(config, epochs=3, rate=2e-3, dropout=0.3) if asked.further else config
+    data = packed(train(*training_examples(sentences, config), table, config, start))
     write_atomically(asked.out, data)
     print(f"{asked.out}: {len(data):,} bytes")
 
