@@ -432,6 +432,11 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return ConditionRelation.BEFORE if stops else ConditionRelation.AFTER
         return ConditionRelation.PAST if match.kind == "across" else ConditionRelation(match.kind)
 
+    def _earlier(self, place: int) -> int:
+        """Reads a place of the trip behind "to" or "at": "back to the last stop"."""
+        match = self.grammar.references.longest(self.words, place) if self.word_at(place - 1) in ("to", "at") else None
+        return place if match is None or match.length < _LEAST_NAMED else self._noun(place)
+
     def _noun(self, place: int) -> int:
         if self.words[place] == "just" and place + 1 < len(self.words) and self._acts(place + 1):
             return place  # "just turn back", no "just turn"
@@ -456,6 +461,9 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
 _Rule: TypeAlias = Callable[[_Reader, int], int]
 """Reads what begins at a token; returns the token behind it, or the token itself if the rule does not apply."""
 
+_LEAST_NAMED: Final = 2
+"""Words of a place of the trip that is no mere "here"."""
+
 _STOPS: Final = frozenset({"last", "only"})
 """Words that count stops as ordinals do."""
 
@@ -470,6 +478,7 @@ def _rules_from(word: str) -> tuple[_Rule, ...]:
     rules: tuple[tuple[_Rule, bool], ...] = (
         (_Reader._contingency, grammar.contingencies.may_begin(word)),
         (_Reader._cancelled, word in _CANCELLING),
+        (_Reader._earlier, grammar.references.may_begin(word)),
         (_Reader._stop_noun, counts or word in _STOPS),
         (_Reader._ranked, word in _RANKS),
         (_Reader.read_direction, counts or begins_direction(word, grammar)),

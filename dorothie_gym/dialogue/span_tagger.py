@@ -66,8 +66,8 @@ _STEP: Final = 12
 _MARGIN: Final = 2.0
 """Lead in log odds with which the tagger overrules the rules; chosen by cross-validation (benchmarks/people)."""
 
-_SURE: Final = 1.5
-"""Log odds with which an action is added to those of the rules, or taken from them; chosen by cross-validation."""
+_SURE: Final = 2.0
+"""Log odds with which an action is added to those of the rules, or taken from them."""
 
 _LOWEST: Final = -(2**30)
 

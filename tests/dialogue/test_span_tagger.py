@@ -120,24 +120,6 @@ def test_actions_are_those_of_independent_sums() -> None:
             assert tagger.actions(values, summary, move, frozenset(ruled)) == wanted
 
 
-@pytest.mark.parametrize(
-    ("before", "text", "actions"),
-    [
-        ("", "they've put cones all over the left lane", set()),
-        ("", "some guy parked his truck in our lane", set()),
-        ("Which side do you want to get out on?", "the left, by the gate", set()),
-        ("Which house is yours?", "the white one with the fence, on the right", set()),
-        ("", "straight across at the crossroads, please", {ActionValue.LANE_FOLLOW}),
-        ("", "on the left please, next to that gate", {ActionValue.STOP}),
-        ("", "stop on the right, by the hedge", {ActionValue.STOP}),
-    ],
-)
-def test_a_span_names_the_actions_of_the_own_car(before: str, text: str, actions: set[ActionValue]) -> None:
-    after = guess_spans(before)[-1].act.move if before else None
-    found = {value for span in guess_spans(text, after) for value in span.act.slots if isinstance(value, ActionValue)}
-    assert found == actions
-
-
 def test_actions_that_the_tagger_does_not_know_are_kept() -> None:
     tagger = load_tagger()
     features = features_of("which way now")
