@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.policies.test_yes_no_answers import hears
 
 from dorothie_gym.dialogue import understand
 from dorothie_gym.dialogue.realization_context import Direction
@@ -24,6 +23,7 @@ from dorothie_gym.policies.participant.answer_parts import addition
 from dorothie_gym.policies.participant.dialogue_update import listen
 from dorothie_gym.policies.participant.unprompted_remarks import _knows_how_far
 from tests.policies.co_wizard.rides import Ride
+from tests.policies.participant.test_answers import hears
 from tests.policies.said import with_words
 from tests.policies.test_repairs import Human
 
