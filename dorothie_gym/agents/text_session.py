@@ -21,11 +21,12 @@ from dorothie_gym.evaluation.rollout.play import personas_of, pitches_of, usage_
 from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.casting import partners_of
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.language_model.answer_schema import MAX_ANSWER, AnswerSchema, ChoiceField
 from dorothie_gym.policies.language_model.config import QUIET_TIME
 from dorothie_gym.policies.language_model.faults import CallError, Fault
 from dorothie_gym.policies.language_model.turns import RoleTurns
-from dorothie_gym.policies.policy import Players, policy_seed, replace
+from dorothie_gym.policies.policy import Players, replace
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.session_engine import SessionEngine
 
@@ -269,12 +270,9 @@ class TextSession:
         """Plays until an answer is requested, and returns the turn."""
         engine = self.engine
         while not engine.over:
-            own = engine.observations.of([self.role])[str(self.role)]
-            self._observation: ObservationMapping = {
-                **own,
-                "action_mask": engine.mask(self.role),
-                "refusal_reason": engine.refusal(self.role),
-            }
+            own, info = engine.observations.of([self.role])[str(self.role)], engine.info(self.role)
+            further = {name: info[name] for name in ("action_mask", "refusal_reason")}
+            self._observation: ObservationMapping = {**own, **further}
             self._state = self._turns.attend(self._observation, self._state)
             if self._turns.is_due(self._observation, self._state):
                 page, self._schema = self._turns.page(self._observation, self._state)

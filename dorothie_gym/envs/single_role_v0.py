@@ -15,7 +15,8 @@ from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.evaluation.tier_settings import tier_settings
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.casting import partners_of
-from dorothie_gym.policies.policy import AnyPolicy, checked_decision, policy_inputs, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, checked_decision, policy_inputs
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop

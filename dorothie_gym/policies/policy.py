@@ -14,16 +14,14 @@ from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeAlias, TypeVar
 
-import numpy as np
-
 from dorothie_gym.errors import ActionError
-from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.spaces.fields import SpaceLimits
 
 if TYPE_CHECKING:
     from dataclasses import replace as replace
 
     from dorothie_gym.maps.town import Town
+    from dorothie_gym.ontology.roles import Role
     from dorothie_gym.session.spaces.actions import ActionDict, AnyAction, RoleAction
     from dorothie_gym.session.spaces.observations import ObservationMapping
 else:
@@ -54,9 +52,6 @@ DECISION_INTERVAL: Final = 0.5
 
 DESCRIPTION: Final = "model.json"
 """Name of the file that describes a trained policy in its folder."""
-
-_SEED_BRANCH: Final = 2
-"""Branch of the session's seed that policies draw from; the environment uses other branches."""
 
 
 class Policy(ABC, Generic[State]):
@@ -190,19 +185,6 @@ class DecisionClock:
         return DecisionClock(time=now, interval=elapsed if elapsed > 0.0 else self.interval)
 
 
-def policy_seed(seed: int, role: Role, trial: int = 0) -> int:
-    """Returns the seed of a role's policy in the session of a seed: 32 bits, different for each role.
-
-    Args:
-        seed: seed of the session.
-        role: the role.
-        trial: number of the trial, of several of one scenario.
-    """
-    repeated = [trial] if trial else []
-    branch = np.random.SeedSequence([seed, _SEED_BRANCH, AGENT_ROLES.index(role), *repeated])
-    return int(branch.generate_state(1)[0])
-
-
 # --- inputs of the policies of a session ------------------------------------------------------------------------------
 
 
@@ -230,8 +212,8 @@ class ObservedSession(Protocol):
         """Returns the mask of a role's action space at the current decision."""
         ...
 
-    def refusal(self, role: Role) -> str:
-        """Returns why the last action of a role was refused; empty if it was not."""
+    def info(self, role: Role) -> Mapping[str, object]:
+        """Returns the info dictionary of a role at the current decision."""
         ...
 
 
@@ -261,7 +243,7 @@ def _inputs(
         if policy.reads_mask:
             observation = {**observation, "action_mask": session.mask(role)}
         if policy.reads_refusals:
-            observation = {**observation, "refusal_reason": session.refusal(role)}
+            observation = {**observation, "refusal_reason": session.info(role)["refusal_reason"]}
         inputs[role] = observation
     return inputs
 

@@ -129,8 +129,7 @@ class SessionEngine(Restorable):
             if seed is not None:
                 self._seeds = np.random.default_rng(seed)
             session_seed = seed if seed is not None else int(self._seeds.integers(2**31))
-            town = self.town_of(session_seed)
-            config = self.config
+            town, config = self.town_of(session_seed), self.config
             scenario = draw_scenario(town, self.template, session_seed, config.stops, config.talk, config.storyboards)
         else:
             town = self.town_of(scenario.seed)
@@ -252,10 +251,6 @@ class SessionEngine(Restorable):
         """Returns the mask of a role's action space at the current decision."""
         return self.session.observer.masks.mask(role)
 
-    def refusal(self, role: Role) -> str:
-        """Returns why the last action of a role was refused, its parts joined by "; "; empty if nothing was."""
-        return "; ".join(self.session.log.refused[role])
-
     def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:
         """Returns the info dictionary of a role, always with the same keys; the caller owns its contents.
 
@@ -268,7 +263,7 @@ class SessionEngine(Restorable):
             "action_mask": session.observer.masks.mask(role),
             "reward_terms": dict(terms) if terms else dict.fromkeys(term_names(role), 0.0),
             "refused": {kind: bool(reason) for kind, reason in session.log.refusals[role].items()},
-            "refusal_reason": self.refusal(role),
+            "refusal_reason": "; ".join(session.log.refused[role]),
             "infractions": session.log.infractions,
         }
 

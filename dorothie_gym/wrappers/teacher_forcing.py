@@ -15,7 +15,8 @@ from dorothie_gym.archive.visibility import Task
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError, StateError
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.actor_table import actors_around
 from dorothie_gym.session.recorder import LightStates

@@ -19,7 +19,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.spaces import noop
 from dorothie_gym.sim.config import WorldConfig

@@ -16,8 +16,8 @@ from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import AdWizardState, ScriptedAdWizard
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.navigation.observation_fields import DECISION_FREQUENCY
-from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.session.observations import LazyObservations
 from dorothie_gym.session.spaces import AdWizardAction, Observation, SpaceLimits
 from dorothie_gym.sim.state.codes import Walk

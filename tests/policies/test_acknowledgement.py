@@ -10,7 +10,7 @@ from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.intentions import Intentions
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.speech import SpeechState
 
 

@@ -11,7 +11,8 @@ import pytest
 from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
-from dorothie_gym.policies.policy import AnyPolicy, Players, TypedPolicy, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, Players, TypedPolicy
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine

@@ -12,7 +12,7 @@ import dorothie_gym
 from dorothie_gym.envs.single_role_v0 import SingleRole
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, RandomPolicy, SilentPolicy, make_policy
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.session.spaces import SpaceLimits, noop, observation_space
 
 

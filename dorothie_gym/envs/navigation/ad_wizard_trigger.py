@@ -24,8 +24,9 @@ from dorothie_gym.policies.ad_wizard import (
     idle_until,
     suits_roadblock,
 )
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.observation_parser import place_ahead
-from dorothie_gym.policies.policy import policy_seed, replace
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception
 from dorothie_gym.session.spaces.actions import ActionDecoder, RoleAction
 from dorothie_gym.session.spaces.fields import STORY_LENGTH, SpaceLimits, plain_text

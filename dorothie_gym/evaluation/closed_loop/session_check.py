@@ -23,7 +23,8 @@ from dorothie_gym.evaluation.rollout.play import USAGE_FILE, play_session, with_
 from dorothie_gym.evaluation.rollout.recorded_policy import RecordedPolicy, recorded_persona
 from dorothie_gym.evaluation.rollout.reference_drives import scenario_with_reference
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.policies.policy import AnyPolicy, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.session.config import ChannelKind
 from dorothie_gym.session.recording.events import EndReason, EventType
 from dorothie_gym.session.recording.files import (

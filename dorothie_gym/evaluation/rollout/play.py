@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from dorothie_gym.evaluation.rollout.folder import noticing_deletion
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.batch_players import BatchPlayers
-from dorothie_gym.policies.policy import AnyPolicy, Players, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, Players
 from dorothie_gym.session.recorder import SessionRecorder
 from dorothie_gym.session.recording.files import to_page
 from dorothie_gym.session.recording.writer import SessionWriter

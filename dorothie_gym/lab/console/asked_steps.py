@@ -9,8 +9,8 @@ from dorothie_gym.dialogue.plan_words import spoken_step
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.heard_utterance import heard_utterance
-from dorothie_gym.policies.policy import policy_seed
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState

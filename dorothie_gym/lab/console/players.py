@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.evaluation.rollout.play import with_personas
 from dorothie_gym.lab.console.seating import Occupancy, SeatPlan
-from dorothie_gym.policies.policy import AnyPolicy, TypedPolicy, checked_decision, policy_inputs, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, TypedPolicy, checked_decision, policy_inputs
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.roles import Role

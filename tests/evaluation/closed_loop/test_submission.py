@@ -28,7 +28,8 @@ from dorothie_gym.evaluation.rollout.play import with_personas
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player, find_player
-from dorothie_gym.policies.policy import policy_inputs, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import policy_inputs
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recorder import SessionRecorder
 from dorothie_gym.session.recording import Session, SessionWriter

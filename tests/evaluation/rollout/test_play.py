@@ -10,7 +10,7 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording import Session
 

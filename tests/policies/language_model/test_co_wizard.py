@@ -10,8 +10,8 @@ import pytest
 from dorothie_gym.evaluation.rollout import resimulate
 from dorothie_gym.maps import DEVELOPMENT_TOWNS, SEEN_TOWNS
 from dorothie_gym.ontology import Role
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.language_model import LanguageModelPolicy
-from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.recording import Session
 from dorothie_gym.session.session_engine import SessionEngine

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.language_model import LanguageModelPolicy
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
 from dorothie_gym.policies.language_model.cassette import Reply
 from dorothie_gym.policies.language_model.faults import CallError
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
-from dorothie_gym.policies.policy import policy_inputs, policy_seed
+from dorothie_gym.policies.policy import policy_inputs
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import action_space, plain_text

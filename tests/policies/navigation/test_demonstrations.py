@@ -9,12 +9,12 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy
 from dorothie_gym.policies.navigation.actions import physical_of
 from dorothie_gym.policies.navigation.demonstrations import DemonstrationRecorder, action_of
 from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
-from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.spaces import CoWizardAction, Physical, noop
 from tests.envs.navigation_drivers import obey

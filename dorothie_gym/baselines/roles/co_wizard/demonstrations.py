@@ -34,8 +34,9 @@ from dorothie_gym.baselines.roles.learned_role.decision import Attention
 from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.participant.policy import ScriptedParticipant
-from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
+from dorothie_gym.policies.policy import AnyPolicy, replace
 from dorothie_gym.session.spaces.observations import ObservationMapping
 
 if TYPE_CHECKING:

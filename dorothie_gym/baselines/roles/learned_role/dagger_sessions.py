@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 import numpy as np
 
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.persona import parse_traits
-from dorothie_gym.policies.policy import AnyPolicy, Players, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, Players
 from dorothie_gym.session.session_engine import SessionEngine
 
 if TYPE_CHECKING:

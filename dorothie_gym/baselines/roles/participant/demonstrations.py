@@ -29,7 +29,8 @@ from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_action
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
-from dorothie_gym.policies.policy import AnyPolicy, policy_seed, replace
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, replace
 from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
 
 if TYPE_CHECKING:

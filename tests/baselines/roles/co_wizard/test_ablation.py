@@ -12,7 +12,8 @@ from dorothie_gym.baselines.roles.co_wizard.policy import LearnedDecision
 from dorothie_gym.baselines.roles.learned_role.dagger_sessions import observed
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy, pretrained_folder
-from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
+from dorothie_gym.policies.decision_random import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs
 from dorothie_gym.session.session_engine import SessionEngine
 
 DECISIONS = 140

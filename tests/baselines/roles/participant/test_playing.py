@@ -18,9 +18,10 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Wording, guess_spans, load_lexicon, understand
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, act_builders
+from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.heard_utterance import HeardUtterance
 from dorothie_gym.policies.participant.order_wording import order
-from dorothie_gym.policies.policy import policy_inputs, policy_seed
+from dorothie_gym.policies.policy import policy_inputs
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
