@@ -173,3 +173,11 @@ def _drives_as_planned(state: CoWizardState, view: CoWizardView) -> bool:
     told = intentions.directive is not None or intentions.wish is not None
     blocked = view.time - state.dialogue.blocked_at < DETOUR_TIME
     return not (told or blocked or view.motion is Motion.HAZARD)
+
+
+def accept_change(state: CoWizardState, change: Proposition, rng: np.random.Generator) -> None:
+    """Acknowledges a change of the tasks: repeats it, or only shows that it was heard, drawn at random."""
+    if rng.random() < state.config.accepts_changes:
+        state.say(intend(Function.ACCEPT, change))
+    else:
+        state.say(intend(Function.POSITIVE_FEEDBACK, change, elided=act_builders.arguments_of(change)))

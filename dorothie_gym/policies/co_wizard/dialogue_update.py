@@ -15,7 +15,13 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders
-from dorothie_gym.policies.co_wizard.acknowledgement import STEERING_AWAY, acknowledge, sign_of_hearing, what_keeps
+from dorothie_gym.policies.co_wizard.acknowledgement import (
+    STEERING_AWAY,
+    accept_change,
+    acknowledge,
+    sign_of_hearing,
+    what_keeps,
+)
 from dorothie_gym.policies.co_wizard.answer_merging import in_one_breath, is_plain_sign, still_due
 from dorothie_gym.policies.co_wizard.answers import (
     answer_check,
@@ -75,7 +81,6 @@ from dorothie_gym.policies.view_range import camera_fault
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
-    from dorothie_gym.dialogue.propositions import Proposition
     from dorothie_gym.policies.co_wizard.state import CoWizardState
     from dorothie_gym.policies.co_wizard.view import CoWizardView
 
@@ -270,15 +275,7 @@ def _abandoned_place(
         set_goal(state, view, others[0], act_builders.named_streets(act), rng, dropped=dropped)
     else:
         abandon(state, dropped)
-        _accept_change(state, act_builders.errand(dropped, GoalStatus.ABANDONED), rng)
-
-
-def _accept_change(state: CoWizardState, change: Proposition, rng: np.random.Generator) -> None:
-    """Acknowledges a change of the tasks: repeats it, or only shows that it was heard, drawn at random."""
-    if rng.random() < state.config.accepts_changes:
-        state.say(intend(Function.ACCEPT, change))
-    else:
-        state.say(intend(Function.POSITIVE_FEEDBACK, change, elided=act_builders.arguments_of(change)))
+        accept_change(state, act_builders.errand(dropped, GoalStatus.ABANDONED), rng)
 
 
 def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetName) -> None:
@@ -323,7 +320,7 @@ def _explanation(
         if name is None:
             state.say(sign_of_hearing("told"))
         else:
-            _accept_change(state, act_builders.errand(name, GoalStatus.ABANDONED), rng)
+            accept_change(state, act_builders.errand(name, GoalStatus.ABANDONED), rng)
     elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
         _mentioned_place(state, view, act, words, name, rng)
     elif act.values(Slot.STREET):
