@@ -348,7 +348,7 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
     path = Path(name_or_path)
     if isinstance(name_or_path, str) and path.suffix == "" and path.name == name_or_path and not path.exists():
         known, hint = ", ".join(template_names()), did_you_mean(name_or_path, template_names())
-        reason = f"there is no such template; {hint}use one of {known}, generated:SEED, or a .json file"
+        reason = f"there is no such template; {hint}use one of {known}, or a .json file"
         raise StoryboardError(name_or_path, "name", reason)
     try:
         text = read_text(path, MAX_SMALL_JSON)
