@@ -3,10 +3,9 @@
     python -m benchmarks.span_training                 # writes the weights into the package
     python -m benchmarks.span_training --folds 3       # cross-validation by sentences, and `people/` dev
     python -m benchmarks.span_training --minilm        # with other words than those of the weights
-    python -m benchmarks.span_training --further       # three epochs more for the weights of the package
 
 The vectors of words are those of the weights, or are made from the table of word pieces of MiniLM (extra `minilm`).
-The script needs torch (extra `baselines`), and a minute of processor time for each training. The weights are
+The script needs torch (extra `baselines`), and two minutes of processor time for each training. The weights are
 reproducible with one processor and one version of torch; others round differently.
 """
 
@@ -17,7 +16,7 @@ import io
 import random
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -222,32 +221,6 @@ class SpanNetwork(nn.Module):
         return losses + action_weight * self.action_losses(batch, values, summary)
 
 
-def resume(network: SpanNetwork, data: bytes) -> None:
-    """Sets the weights of a network to those of a weights file; the layer of actions is left as it is."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        stored = {name: torch.from_numpy(file[name].astype(np.float32)) for name in file.files}
-    shifts, scale = stored["shifts"].int().tolist(), int(stored["scale"][0])
-    found: dict[Tensor, tuple[str, int]] = {}
-    for name in ("groups", "marks", "begins", "rules", "places", "befores"):
-        found[getattr(network, name).weight] = name, INPUT_BITS
-    for layer, convolution in enumerate(network.convolutions):
-        bits = shifts[layer] + HIDDEN_BITS - (INPUT_BITS if layer == 0 else HIDDEN_BITS)
-        found[convolution.weight] = f"convolution{layer}", bits
-        found[cast("Tensor", convolution.bias)] = f"bias{layer}", shifts[layer] + HIDDEN_BITS
-    found[network.pooled.weight] = "pooled", shifts[len(DILATIONS)]
-    found[network.pooled.bias] = "pooled_bias", shifts[len(DILATIONS)] + HIDDEN_BITS
-    found[network.output.weight] = "output", scale - HIDDEN_BITS
-    found[network.output.bias], found[network.pairs] = ("output_bias", scale), ("pairs", scale)
-    with torch.no_grad():
-        for parameter, (name, bits) in found.items():
-            values = stored[name] / 2.0**bits
-            if name.startswith("convolution"):
-                values = values.permute(2, 1, 0)
-            elif name in ("pooled", "output"):
-                values = values.T
-            parameter.copy_(values)
-
-
 def collate(network: SpanNetwork, examples: Sequence[Example], rng: random.Random, forgotten: float) -> dict[str, Any]:
     """Returns a batch of sentences, padded at their ends."""
     size, number = len(examples), max(len(row.labels) for row in examples)
@@ -295,7 +268,6 @@ def train(
     weights: Sequence[float],
     table: WordVectors,
     config: TrainingConfig,
-    start: bytes | None = None,
 ) -> SpanNetwork:
     """Returns a network trained on weighted sentences, with one thread.
 
@@ -304,14 +276,11 @@ def train(
         weights: their weights.
         table: words with their vectors.
         config: settings.
-        start: weights file with which the training starts.
     """
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     rng = random.Random(config.seed)
     network = SpanNetwork(table, config)
-    if start is not None:
-        resume(network, start)
     parameters = [value for value in network.parameters() if value.requires_grad]
     optimiser = torch.optim.AdamW(parameters, lr=config.rate, weight_decay=1e-4)
     steps = config.epochs * len(_batches(examples, config, random.Random(0)))
@@ -467,7 +436,6 @@ def main() -> None:
     parser.add_argument("--folds", type=int, default=0, help="folds of the cross-validation; 0 trains the weights")
     parser.add_argument("--out", type=Path, default=TARGET)
     parser.add_argument("--minilm", action="store_true", help="make the vectors of words from MiniLM")
-    parser.add_argument("--further", action="store_true", help="train the weights of the package further")
     asked = parser.parse_args()
     if asked.folds == 1 or asked.folds < 0:
         parser.error(f"--folds is {asked.folds}; give at least 2, or 0 to train the weights")
@@ -476,9 +444,7 @@ def main() -> None:
     if asked.folds:
         validate(sentences, asked.folds, table, config)
         return
-    start = TARGET.read_bytes() if asked.further else None
-    config = replace(config, epochs=3, rate=2e-3, dropout=0.3) if asked.further else config
-    data = packed(train(*training_examples(sentences, config), table, config, start))
+    data = packed(train(*training_examples(sentences, config), table, config))
     write_atomically(asked.out, data)
     print(f"{asked.out}: {len(data):,} bytes")
 
