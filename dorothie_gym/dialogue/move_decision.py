@@ -17,7 +17,7 @@ from dorothie_gym.dialogue.lexicon import split_words
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_reading import read_plan
-from dorothie_gym.dialogue.reactions import corrects, denials, insists, short_answer
+from dorothie_gym.dialogue.reactions import corrects, denials, insists, is_greeting, short_answer
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.dialogue.signs import is_mere_sign
@@ -356,6 +356,7 @@ def in_context(
     """Returns the act of a span among the others of its utterance.
 
     An answer, or a correction, goes on over the orders that follow it; without a question, "the second left" is none.
+    A greeting answers no question.
 
     Args:
         act: act of the span alone.
@@ -364,6 +365,8 @@ def in_context(
         after: move of the other speaker before the utterance.
     """
     move, ordered = act.move, bool(parsed.plan.steps)
+    if move is DialogueMove.REPLY_W and not ordered and not act.slots and is_greeting(parsed.text):
+        move = DialogueMove.IRRELEVANT  # "hello, how are you?" after "where to?"
     answers = after is DialogueMove.QUERY_W or "i'd say" in parsed.masked
     if move is DialogueMove.REPLY_W and ordered and not answers:
         move = DialogueMove.INSTRUCT

@@ -163,7 +163,8 @@ class SpanTagger:
             ruled: actions that the rules find in it; others than `ACTIONS` are kept.
         """
         scores = self.acted_bias + self.acted_moves[self.moves.index(move)]
-        scores = scores + np.concatenate((values.max(axis=0), summary)) @ self.acted
+        both = np.concatenate((values.max(axis=0), summary))
+        scores = scores + (both[:, None] * self.acted).sum(axis=0)
         signs = [action in ruled for action in ACTIONS]
         scores = scores + self.acted_rules[signs].sum(axis=0)
         found = zip(ACTIONS, signs, scores.tolist(), strict=True)

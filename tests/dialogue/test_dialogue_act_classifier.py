@@ -116,7 +116,7 @@ def test_previous_move_determines_the_move_of_an_answer(text, after, move):
         ("no, don't turn left", ["ReplyN"]),
         ("There's a barrier ahead. Shall I find another way?", ["Explain", "QueryYN"]),
         ("so to the Shell we still have that house for later", ["Instruct", "Explain"]),
-        ("it should be on Bishop also it's on the other side", ["Explain", "Explain"]),
+        ("it's past the KFC also there's a bus in front of it", ["Explain", "Explain"]),
         ("the house we passed on the way to the Ikea", ["Explain"]),
         ("Turn left, did you get that?", ["Instruct", "Align"]),
         ("We are done here, so the Ikea next.", ["Explain", "Instruct"]),

@@ -97,6 +97,6 @@ def test_end_of_a_lane_is_worded_as_a_cause_and_as_a_reason_for_a_switch() -> No
 
 
 def test_request_to_leave_a_lane_that_ends_is_understood() -> None:
-    spans = guess_spans("get over to the left, this lane ends", Role.PARTICIPANT)
+    spans = guess_spans("get over to the left, this lane ends")
     assert [span.act.move for span in spans] == [DialogueMove.INSTRUCT, DialogueMove.EXPLAIN]
     assert spans[0].act.values(Slot.ACTION) == (ActionValue.LANE_SWITCH,)

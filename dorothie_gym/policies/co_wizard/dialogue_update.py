@@ -122,7 +122,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     heard = without_purposes(without_looks(heard, looks))
     refused = refuse_unmet(state, heard)
     planned = planned_acts(state, heard) - looks.keys() - refused
-    if unclear or (_mishears(state, view, heard, rng) and not planned and not looks):
+    if (unclear or (_mishears(state, view, heard, rng) and not planned and not looks)) and not refused:
         ask_back(state, view, heard.words)
         state.say(*before)
         return
@@ -134,7 +134,8 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
             take_up_look(state, looks[number], rng)
         if number in looks or number in refused:
             continue
-        asks = act.move in _IDLE and heard.words.question and heard.words.asked is not None
+        idle = act.move in _IDLE or (act.move is DialogueMove.REPLY_W and heard.classified and not act.slots)
+        asks = idle and heard.words.question and heard.words.asked is not None
         react = answer_open if asks else _REACTIONS.get(act.move)
         if react is not None and number not in planned:
             # an act without content is judged by the whole utterance: how short it is tells whether it was misheard

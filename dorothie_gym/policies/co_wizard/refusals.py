@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _REQUESTING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.QUERY_YN, DialogueMove.CLARIFY})
 """Moves by which something is asked for."""
 
+_UNDECIDED: Final = frozenset({DialogueMove.IRRELEVANT, DialogueMove.ACKNOWLEDGE, DialogueMove.CONFUSE})
+"""Moves that words without anything to drive for may be taken for: "turn the radio up"."""
+
 _ASKING: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CHECK})
 """Moves that want an answer."""
 
@@ -34,7 +37,8 @@ def refuse_unmet(state: CoWizardState, heard: HeardUtterance) -> frozenset[int]:
     """
     refused = set[int]()
     for number, act in enumerate(heard.acts):
-        reason = unmet_request(heard.words_of(number).text) if act.move in _REQUESTING else None
+        asks = act.move in _REQUESTING or (heard.classified and act.move in _UNDECIDED)
+        reason = unmet_request(heard.words_of(number).text) if asks else None
         if reason is not None:
             refused.add(number)
             if number == min(refused):
