@@ -155,4 +155,4 @@ def _stored() -> Mapping[Split, tuple[AgentTask, ...]]:
             for town, seed, reference in page[split].get(stage, ())
         )
         for split in Split
-    }  # fmt: skip
+    }

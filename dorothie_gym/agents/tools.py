@@ -81,18 +81,22 @@ _NOTE = _field_tool("note", "note", "Replaces your note, which later pages show.
 _DRIVE = _field_tool("drive", "drive", "Chooses what the car does.", 'one of the choices under "You can drive"')
 _GOAL = _field_tool("set_goal", "goal", "Sets the place that you drive to.", "a place of the page, or none")
 _MARK = _field_tool(
-    "mark", "mark", "Marks where you suppose a goal that is not on your map.",
+    "mark",
+    "mark",
+    "Marks where you suppose a goal that is not on your map.",
     '"here", "20 m ahead", "beside PLACE" or "on STREET"',
-)  # fmt: skip
+)
 _STATUS = _field_tool("set_status", "status", "Sets the status of the goal.", "such as Complete or Abandoned")
 _GUIDE = _field_tool("guide", "guide", "Sets the place that you guide the car to.", "a place of the page, or none")
 _CHANGE = _field_tool("change", "change", "Makes a change.", 'one of the choices under "You can change"')
 _MESSAGE = _field_tool("message", "message", "Sets the message that goes with a change.", "the message")
 _LOOK = ToolSpec(name=LOOK, description="Shows the page again, without time passing.")
 _WAIT = ToolSpec(
-    name=WAIT, description="Carries out what you have chosen, and lets time pass until something happens.",
-    argument=_SECONDS, meaning="longest time to wait [s]; usually 10",
-)  # fmt: skip
+    name=WAIT,
+    description="Carries out what you have chosen, and lets time pass until something happens.",
+    argument=_SECONDS,
+    meaning="longest time to wait [s]; usually 10",
+)
 
 TOOLS: Final[Mapping[Role, tuple[ToolSpec, ...]]] = MappingProxyType(
     {

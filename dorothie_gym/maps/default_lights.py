@@ -67,9 +67,14 @@ class _Approach:
 def _ending(lane: Lane) -> Lane:
     """Returns the last piece of a lane, whose heading is that of the lane at its end."""
     return Lane(
-        id=lane.id, road_id=lane.road_id, lane_id=lane.lane_id, junction_id=lane.junction_id, points=lane.points[-2:],
-        widths=lane.widths[-2:], speed_limit=lane.speed_limit,
-    )  # fmt: skip
+        id=lane.id,
+        road_id=lane.road_id,
+        lane_id=lane.lane_id,
+        junction_id=lane.junction_id,
+        points=lane.points[-2:],
+        widths=lane.widths[-2:],
+        speed_limit=lane.speed_limit,
+    )
 
 
 def split_lights(name: str) -> tuple[str, Lights]:

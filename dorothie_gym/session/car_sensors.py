@@ -81,12 +81,15 @@ def car_sensor_fields(sensors: SensorConfig, frames: int) -> tuple[FieldSpec, ..
     if sensors.imu:
         fields += [
             real(
-                "accelerometer", frames, AXES, unit="m/s^2",
+                "accelerometer",
+                frames,
+                AXES,
+                unit="m/s^2",
                 meaning="specific force ahead, to the right and up at each frame (30 Hz) since the previous decision",
             ),
             real("gyroscope", frames, AXES, unit="rad/s", meaning="rates of roll, pitch and yaw at the same frames"),
             real("compass", 1, low=0.0, high=2.0 * np.pi, unit="rad", meaning="direction, clockwise from north"),
-        ]  # fmt: skip
+        ]
     if sensors.gnss:
         meaning = "latitude and longitude of the last fix, and the time since that fix"
         fields.append(real("gnss", len(GnssColumn), unit="deg, deg, s", meaning=meaning))

@@ -83,9 +83,15 @@ _CYCLIST_RADIUS = 0.5 * pm.hypot(CYCLIST_LENGTH, CYCLIST_WIDTH)
 
 @compiled
 def _put_vehicle(
-    town: TownArrays, world: WorldArrays, number: int, kind: int, lane: int, station: float, desired: float,
+    town: TownArrays,
+    world: WorldArrays,
+    number: int,
+    kind: int,
+    lane: int,
+    station: float,
+    desired: float,
     pool: NDArray[np.int64],
-) -> None:  # fmt: skip
+) -> None:
     """Places a new vehicle in a free row; see `add_vehicle`, and for `pool` `randomness.seed_of`."""
     vehicle = world.vehicles[number]
     vehicle.kind, vehicle.key, vehicle.touched, vehicle.odometer = kind, new_key(world), False, 0.0
@@ -323,9 +329,15 @@ TRIES = 40
 
 
 def populate(
-    network: TownNetwork, town: TownArrays, world: WorldArrays, *, seed: int, vehicles: int, pedestrians: int,
+    network: TownNetwork,
+    town: TownArrays,
+    world: WorldArrays,
+    *,
+    seed: int,
+    vehicles: int,
+    pedestrians: int,
     cyclists: float = CYCLIST_SHARE,
-) -> None:  # fmt: skip
+) -> None:
     """Adds traffic and pedestrians at random places, as many as fit, none of them close to the ego.
 
     Args:
@@ -367,9 +379,15 @@ def _rideable(network: TownNetwork) -> NDArray[np.bool_]:
 @direct
 @compiled
 def _fill_lanes(
-    town: TownArrays, world: WorldArrays, lanes: NDArray[np.int64], stations: Array, rideable: NDArray[np.bool_],
-    cycles: NDArray[np.bool_], shares: Array, pool: NDArray[np.int64],
-) -> int:  # fmt: skip
+    town: TownArrays,
+    world: WorldArrays,
+    lanes: NDArray[np.int64],
+    stations: Array,
+    rideable: NDArray[np.bool_],
+    cycles: NDArray[np.bool_],
+    shares: Array,
+    pool: NDArray[np.int64],
+) -> int:
     """Adds vehicles at the first free places among the given ones; returns their number.
 
     Args:

@@ -83,9 +83,15 @@ class World(CachedViews, Restorable):
     _batch_of: WorldArrays | None = None
 
     def __init__(
-        self, town: Town, config: WorldConfig, *, seed: np.random.SeedSequence, departure: tuple[int, float],
-        network: TownNetwork | None = None, arrays: WorldArrays | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        town: Town,
+        config: WorldConfig,
+        *,
+        seed: np.random.SeedSequence,
+        departure: tuple[int, float],
+        network: TownNetwork | None = None,
+        arrays: WorldArrays | None = None,
+    ) -> None:
         """Builds the world.
 
         Args:

@@ -131,8 +131,13 @@ _MOST_STOREYS: Final = 3
 _GARDENS: Final = tuple(Garden)
 
 _COATS: Final[tuple[Colour, ...]] = (
-    (248, 226, 40), (206, 36, 40), (40, 150, 70), (44, 92, 200), (128, 70, 170), (36, 176, 180),
-)  # fmt: skip
+    (248, 226, 40),
+    (206, 36, 40),
+    (40, 150, 70),
+    (44, 92, 200),
+    (128, 70, 170),
+    (36, 176, 180),
+)
 
 _TROUSERS: Final[tuple[Colour, ...]] = ((40, 60, 140), (236, 234, 228), (24, 24, 26), (112, 68, 38), (190, 40, 44))
 """Trousers; none is gray, as white ones look in the shade. Together with `_COATS`, 30 sites differ."""

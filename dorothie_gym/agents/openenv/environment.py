@@ -96,11 +96,16 @@ class DorothieEnvironment(Environment[TextAction, TextObservation, State]):
     def _observation(self, session: TextSession, turn: Turn) -> TextObservation:
         before, self._score = self._score, session.score
         return TextObservation(
-            page=turn.page, system=turn.system if self._state.step_count == 0 else "", done=turn.done,
-            reward=round(self._score - before, 6), time=turn.time, truncated=turn.truncated, error=turn.error,
+            page=turn.page,
+            system=turn.system if self._state.step_count == 0 else "",
+            done=turn.done,
+            reward=round(self._score - before, 6),
+            time=turn.time,
+            truncated=turn.truncated,
+            error=turn.error,
             choices={name: list(labels) for name, labels in turn.choices.items()},
             outcome=session.finish().numbers() if turn.done else {},
-        )  # fmt: skip
+        )
 
 
 def _played(session: TextSession, action: TextAction) -> Turn:

@@ -94,9 +94,12 @@ def _widen(town: TownDraft, rng: np.random.Generator, *, median: bool) -> None:
     usable = [
         street
         for street in town.streets
-        if street.lanes == 1 and not street.one_way and _has_room(town.graph, street.chain, block, angle)
-        and street.chain.length(town.graph) >= _SHORTEST_WIDE and sum(street.chain.turns(town.graph)) <= _STRAIGHT
-    ]  # fmt: skip
+        if street.lanes == 1
+        and not street.one_way
+        and _has_room(town.graph, street.chain, block, angle)
+        and street.chain.length(town.graph) >= _SHORTEST_WIDE
+        and sum(street.chain.turns(town.graph)) <= _STRAIGHT
+    ]
     if usable:
         usable.sort(key=lambda street: _distance_from_centre(town.graph, street.chain))
         street = usable[int(rng.integers(min(2, len(usable))))]

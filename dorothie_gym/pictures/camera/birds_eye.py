@@ -36,10 +36,20 @@ _BUILDING, _NOTHING = int(ObjectClass.BUILDING.value), int(ObjectClass.UNLABELED
 
 @concurrent
 def draw_birds_eye(
-    view: View, metres: float, buffer: VisibilityBuffer, town: Mesh, cells: CellTable, overlay: Mesh,
-    overlay_cells: CellTable, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord],
-    ground: GroundArrays, corners: Array, classes: NDArray[np.uint8],
-) -> None:  # fmt: skip
+    view: View,
+    metres: float,
+    buffer: VisibilityBuffer,
+    town: Mesh,
+    cells: CellTable,
+    overlay: Mesh,
+    overlay_cells: CellTable,
+    bank: Mesh,
+    ranges: NDArray[np.int32],
+    bodies: RecordArray[PlacementRecord],
+    ground: GroundArrays,
+    corners: Array,
+    classes: NDArray[np.uint8],
+) -> None:
     """Writes the classes of the squares of a grid around a camera, whose heading points up the picture.
 
     Args:

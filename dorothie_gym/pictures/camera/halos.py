@@ -60,9 +60,14 @@ class Halos(NamedTuple):
 def no_halos(count: int = 0) -> Halos:
     """Returns lenses that are not lit."""
     return Halos(
-        np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count), np.zeros((count, 3)), np.zeros(count, np.bool_),
-        np.zeros(count), np.zeros(count, np.int64),
-    )  # fmt: skip
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros(count),
+        np.zeros((count, 3)),
+        np.zeros(count, np.bool_),
+        np.zeros(count),
+        np.zeros(count, np.int64),
+    )
 
 
 @concurrent
@@ -114,9 +119,15 @@ def _depth(view: View, halos: Halos, k: int) -> float:
 
 @compiled
 def _add_halo(
-    view: View, optics: Optics, buffer: VisibilityBuffer, side: int, halos: Halos, k: int, depth: float,
+    view: View,
+    optics: Optics,
+    buffer: VisibilityBuffer,
+    side: int,
+    halos: Halos,
+    k: int,
+    depth: float,
     picture: NDArray[np.uint8],
-) -> None:  # fmt: skip
+) -> None:
     """Draws the halo of one lens as far as it is visible."""
     x, y, z = (
         halos.centres[k, 0] - view.origin[0],

@@ -48,9 +48,15 @@ def new_labels(width: int, height: int) -> Labels:
 
 @concurrent
 def write_labels(
-    view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays,
-    samples: Samples, labels: Labels,
-) -> None:  # fmt: skip
+    view: View,
+    buffer: VisibilityBuffer,
+    town: Mesh,
+    overlay: Mesh,
+    bodies: Mesh,
+    ground: GroundArrays,
+    samples: Samples,
+    labels: Labels,
+) -> None:
     """Writes the labels of the pixels of a buffer.
 
     Args:
@@ -95,9 +101,15 @@ def _write_depths(view: View, mesh: Mesh, row: int, x: float, y: float, depth: N
 
 @inlined
 def _write_classes(
-    view: View, sheet: int, x: float, y: float, depth: NDArray[np.float32], ground: GroundArrays, samples: Samples,
+    view: View,
+    sheet: int,
+    x: float,
+    y: float,
+    depth: NDArray[np.float32],
+    ground: GroundArrays,
+    samples: Samples,
     semantic: NDArray[np.uint8],
-) -> None:  # fmt: skip
+) -> None:
     """Writes the classes of neighbours in a row that see the ground, of which the first is at (x, y) [pixels]."""
     values, parts, axes = samples.values, samples.indices, view.axes
     x0, y0, rightward, downward = view.origin[0], view.origin[1], axes[0, 0], axes[0, 1]

@@ -100,10 +100,16 @@ def new_mesh(*columns: NDArray[Any]) -> Mesh:
 def empty_mesh(count: int = 0) -> Mesh:
     """Returns a mesh of `count` triangles without extent."""
     return new_mesh(
-        np.zeros((count, 3, 3), np.float32), np.zeros((count, 3), np.float32), np.zeros((count, 4), np.float32),
-        np.zeros((count, 4), np.float32), np.zeros((count, 3), np.uint8), np.zeros(count, np.int16),
-        np.zeros(count, np.uint8), np.zeros(count, np.uint8), np.zeros(count, np.int32),
-    )  # fmt: skip
+        np.zeros((count, 3, 3), np.float32),
+        np.zeros((count, 3), np.float32),
+        np.zeros((count, 4), np.float32),
+        np.zeros((count, 4), np.float32),
+        np.zeros((count, 3), np.uint8),
+        np.zeros(count, np.int16),
+        np.zeros(count, np.uint8),
+        np.zeros(count, np.uint8),
+        np.zeros(count, np.int32),
+    )
 
 
 def joined(meshes: Iterable[Mesh]) -> Mesh:
@@ -297,9 +303,18 @@ class MeshBuilder:
     ) -> None:
         """Adds an upright box around a centre (2,) [m]; other arguments as in `prism`."""
         self.prism(
-            oriented(_UNIT * (length, width), centre, heading), low, high, colour=colour, kind=kind,
-            top_colour=top_colour, repeat=repeat, texture=texture, surface=surface, instance=instance, closed=closed,
-        )  # fmt: skip
+            oriented(_UNIT * (length, width), centre, heading),
+            low,
+            high,
+            colour=colour,
+            kind=kind,
+            top_colour=top_colour,
+            repeat=repeat,
+            texture=texture,
+            surface=surface,
+            instance=instance,
+            closed=closed,
+        )
 
     def add(self, mesh: Mesh) -> None:
         """Adds the triangles of a mesh."""

@@ -89,8 +89,14 @@ def light_numbers(light: Daylight) -> tuple[float, ...]:
     colours = (light.sun, light.sunshine, light.ambient, light.horizon, light.air)
     return (
         *(value for colour in colours for value in colour.tolist()),
-        light.fog, light.fog_start, light.rain, light.wetness, light.lamps, light.head_lights, light.beams,
-    )  # fmt: skip
+        light.fog,
+        light.fog_start,
+        light.rain,
+        light.wetness,
+        light.lamps,
+        light.head_lights,
+        light.beams,
+    )
 
 
 def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, pose: CameraPose) -> Optics:

@@ -108,9 +108,15 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
 
 @inlined
 def _add_long(
-    optics: Optics, ground: GroundArrays, sheet: int, values: Array, places: NDArray[np.int64], k: int, along: float,
+    optics: Optics,
+    ground: GroundArrays,
+    sheet: int,
+    values: Array,
+    places: NDArray[np.int64],
+    k: int,
+    along: float,
     across: float,
-) -> None:  # fmt: skip
+) -> None:
     """Writes the colour of a sample with a long footprint, where the view of the ground is grazing."""
     x, y = values[X + k], values[Y + k]
     dx, dy = x - optics.x, y - optics.y

@@ -95,9 +95,15 @@ def ray_grid(azimuths: Array, altitudes: Array, reach: float, *, whole: bool) ->
     slopes = pn.tan(altitudes)
     step = float(azimuths[1] - azimuths[0]) if len(azimuths) > 1 else 2.0 * math.pi
     return RayGrid(
-        pn.cos(azimuths), pn.sin(azimuths), slopes, np.sqrt(1.0 + slopes * slopes), azimuths[:1].copy(),
-        np.array([step]), np.array([whole]), np.array([reach]),
-    )  # fmt: skip
+        pn.cos(azimuths),
+        pn.sin(azimuths),
+        slopes,
+        np.sqrt(1.0 + slopes * slopes),
+        azimuths[:1].copy(),
+        np.array([step]),
+        np.array([whole]),
+        np.array([reach]),
+    )
 
 
 def new_scan(columns: int, rows: int) -> Scan:
@@ -109,10 +115,20 @@ def new_scan(columns: int, rows: int) -> Scan:
 
 @concurrent
 def scan_scene(
-    view: View, grid: RayGrid, scan: Scan, town: Mesh, cells: CellTable, overlay: Mesh, overlay_cells: CellTable,
-    bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord], box: Array,
+    view: View,
+    grid: RayGrid,
+    scan: Scan,
+    town: Mesh,
+    cells: CellTable,
+    overlay: Mesh,
+    overlay_cells: CellTable,
+    bank: Mesh,
+    ranges: NDArray[np.int32],
+    boxes: NDArray[np.float32],
+    bodies: RecordArray[PlacementRecord],
+    box: Array,
     placed: Mesh,
-) -> int:  # fmt: skip
+) -> int:
     """Finds the nearest surfaces of a scene; returns the number of triangles of bodies.
 
     Args:
@@ -295,9 +311,15 @@ def _fill(grid: RayGrid, scan: Scan, values: Array, k: int, number: int) -> None
         if max(near, far) >= NEAREST:
             one, two = _slope(near, low, far, high), _slope(far, high, near, low)
             _fill_column(
-                scan.nearness[at], scan.triangles[at], grid.slopes, min(one, two), max(one, two), nf * cos + nr * sin,
-                nu, number,
-            )  # fmt: skip
+                scan.nearness[at],
+                scan.triangles[at],
+                grid.slopes,
+                min(one, two),
+                max(one, two),
+                nf * cos + nr * sin,
+                nu,
+                number,
+            )
 
 
 @inlined
@@ -311,9 +333,15 @@ def _slope(near: float, low: float, far: float, high: float) -> float:
 
 @inlined
 def _fill_column(
-    nearness: NDArray[np.float32], triangles: NDArray[np.int32], slopes: Array, low: float, high: float, level: float,
-    rise: float, number: int,
-) -> None:  # fmt: skip
+    nearness: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    slopes: Array,
+    low: float,
+    high: float,
+    level: float,
+    rise: float,
+    number: int,
+) -> None:
     """Enters a surface into the rays of a column with slopes in [low, high)."""
     identity = np.int32(number)
     for k in range(len(slopes)):

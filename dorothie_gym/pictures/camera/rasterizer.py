@@ -84,11 +84,17 @@ class VisibilityBuffer(NamedTuple):
 def new_buffer(width: int, height: int) -> VisibilityBuffer:
     """Returns a buffer for a picture."""
     return VisibilityBuffer(
-        np.zeros((height, width), np.float32), np.full((height, width), SKY, np.int32),
-        np.zeros(_QUANTITIES * _STRETCH), np.zeros(_BATCH, np.int32), np.zeros(_ROOM, np.int64),
-        np.zeros((12, _ROOM), np.float32), np.zeros(height + _ROWS, np.int64), np.zeros(height + _ROWS, np.int64),
-        np.zeros((3, 3)), np.zeros((4, 2)),
-    )  # fmt: skip
+        np.zeros((height, width), np.float32),
+        np.full((height, width), SKY, np.int32),
+        np.zeros(_QUANTITIES * _STRETCH),
+        np.zeros(_BATCH, np.int32),
+        np.zeros(_ROOM, np.int64),
+        np.zeros((12, _ROOM), np.float32),
+        np.zeros(height + _ROWS, np.int64),
+        np.zeros(height + _ROWS, np.int64),
+        np.zeros((3, 3)),
+        np.zeros((4, 2)),
+    )
 
 
 @concurrent

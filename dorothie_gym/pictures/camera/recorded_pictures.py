@@ -332,9 +332,15 @@ def _ends(crossings: NDArray[np.void], end: int) -> Array:
 
 @compiled
 def _follow(
-    town: TownArrays, x: Array, y: Array, heading: Array, before: NDArray[np.int64], begun: Array, heights: Array,
+    town: TownArrays,
+    x: Array,
+    y: Array,
+    heading: Array,
+    before: NDArray[np.int64],
+    begun: Array,
+    heights: Array,
     odometers: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Writes heights and distances of the rows (m,) of actors, those of earlier records first.
 
     Args:

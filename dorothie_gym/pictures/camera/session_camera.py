@@ -98,9 +98,14 @@ class SessionCamera:
         x, y = car.position.tolist()
         pose = self.pose_on(x, y, float(car.height), float(car.heading))
         return self.render_from(
-            pose, world.actors.arrays, world.weather, time=world.time, head_lights=world.ego.lights,
-            faults=world.faults, before=before,
-        )  # fmt: skip
+            pose,
+            world.actors.arrays,
+            world.weather,
+            time=world.time,
+            head_lights=world.ego.lights,
+            faults=world.faults,
+            before=before,
+        )
 
     def render_from(
         self,

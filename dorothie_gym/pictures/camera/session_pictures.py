@@ -113,9 +113,12 @@ class SessionPictures(CachedViews):
         assert lidar is not None
         swept = lidar.config.rate / self._config.decision_frequency  # turns in a decision
         found = lidar.turn(
-            car_state(world), world.actors.arrays, world.weather, faults=world.faults,
+            car_state(world),
+            world.actors.arrays,
+            world.weather,
+            faults=world.faults,
             sector=((decision - 1) * swept, decision * swept),
-        )  # fmt: skip
+        )
         return {LIDAR_FIELDS[output]: getattr(found, output.value) for output in lidar.config.outputs}
 
     def _detect(self) -> dict[str, NDArray[np.generic]]:

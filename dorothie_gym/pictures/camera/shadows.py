@@ -82,10 +82,16 @@ def new_shadow_maps(*, enabled: bool = True) -> ShadowMaps:
     """Returns empty maps; without `enabled` they are of one square."""
     side, bodies = (_SIDE, _BODIES) if enabled else (1, 1)
     return ShadowMaps(
-        np.full((side, side), _NOTHING, np.int16), np.full((_TILES, _TILES, 2), np.iinfo(np.int32).min, np.int32),
-        np.full((bodies, bodies), _NOTHING, np.int16), np.zeros((_PARTS, 4), np.int64), np.zeros(1, np.int64),
-        np.zeros(2), np.zeros(4, np.int64), np.zeros(1), np.zeros((3, 3)),
-    )  # fmt: skip
+        np.full((side, side), _NOTHING, np.int16),
+        np.full((_TILES, _TILES, 2), np.iinfo(np.int32).min, np.int32),
+        np.full((bodies, bodies), _NOTHING, np.int16),
+        np.zeros((_PARTS, 4), np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(2),
+        np.zeros(4, np.int64),
+        np.zeros(1),
+        np.zeros((3, 3)),
+    )
 
 
 def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
@@ -102,9 +108,17 @@ def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
 
 @concurrent
 def draw_shadows(
-    view: View, maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable,
-    bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord],
-) -> None:  # fmt: skip
+    view: View,
+    maps: ShadowMaps,
+    town: Mesh,
+    town_cells: CellTable,
+    overlay: Mesh,
+    overlay_cells: CellTable,
+    bank: Mesh,
+    ranges: NDArray[np.int32],
+    boxes: NDArray[np.float32],
+    bodies: RecordArray[PlacementRecord],
+) -> None:
     """Draws the tiles in view that the map does not hold, and the map of bodies whose shadows may be seen.
 
     Args:

@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.view import CoWizardView
     from dorothie_gym.policies.heard_utterance import HeardUtterance
 
-_MOVES: Final = frozenset(
-    {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY}
-)  # fmt: skip
+_MOVES: Final = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
 _SOMEBODY: Final = re.compile(r"\blook (?:out )?for (?:somebody|someone|a person)\b", re.IGNORECASE)
 """Beginning of a description of a person, also where its colours were misheard."""
 

@@ -119,9 +119,15 @@ class Intentions:
     def turning_round(self, until: float, *, creeping: bool) -> Intentions:
         """Carries out an instruction to turn round, given up after `until` [s]."""
         return replace(
-            self, wish=Wish.U_TURN, wish_until=until, creeping=creeping, directive=None, halted=False, nudge=None,
+            self,
+            wish=Wish.U_TURN,
+            wish_until=until,
+            creeping=creeping,
+            directive=None,
+            halted=False,
+            nudge=None,
             arrived=False,
-        )  # fmt: skip
+        )
 
     def switching(self, wish: Wish, until: float) -> Intentions:
         """Carries out an instruction to switch lanes, given up after `until` [s]."""

@@ -38,9 +38,13 @@ _BEFORE_LINE: Final = 6.0  # room to the stop line when the car stops before a j
 _BEHIND_JUNCTION: Final = 12.0  # room behind a junction when the car stops "past the lights" [m]
 
 _OFFSETS: Final[Mapping[ConditionRelation, float]] = MappingProxyType(
-    {ConditionRelation.PAST: 12.0, ConditionRelation.AFTER: 12.0, ConditionRelation.BEFORE: -12.0,
-     ConditionRelation.SEEN: -35.0}
-)  # fmt: skip
+    {
+        ConditionRelation.PAST: 12.0,
+        ConditionRelation.AFTER: 12.0,
+        ConditionRelation.BEFORE: -12.0,
+        ConditionRelation.SEEN: -35.0,
+    }
+)
 """Distance from a place beside the road at which a step is due [m]."""
 
 

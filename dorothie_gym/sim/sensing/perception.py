@@ -71,10 +71,16 @@ _UNIT = 2.0**-53
 
 @compiled
 def see(
-    vehicles: RecordArray[VehicleRecord], pedestrians: RecordArray[PedestrianRecord],
-    props: RecordArray[PropRecord], seen: RecordArray[SeenRecord], eye: EyeRecord,
-    x: float, y: float, frame: int, skip: int,
-) -> int:  # fmt: skip
+    vehicles: RecordArray[VehicleRecord],
+    pedestrians: RecordArray[PedestrianRecord],
+    props: RecordArray[PropRecord],
+    seen: RecordArray[SeenRecord],
+    eye: EyeRecord,
+    x: float,
+    y: float,
+    frame: int,
+    skip: int,
+) -> int:
     """Looks at all bodies within `visibility.CLEAR_SIGHT`.
 
     Bodies within the range of sight are always perceived, those beyond it now and then. A clear noon has no errors.

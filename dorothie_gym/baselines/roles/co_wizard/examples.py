@@ -69,9 +69,13 @@ class LessonInputs(NamedTuple):
 
 
 def make_example(
-    percept: CoWizardPercept, inputs: Callable[[], LessonInputs], lesson: Lesson, rng: np.random.Generator, *,
+    percept: CoWizardPercept,
+    inputs: Callable[[], LessonInputs],
+    lesson: Lesson,
+    rng: np.random.Generator,
+    *,
     talks: bool = True,
-) -> Example | None:  # fmt: skip
+) -> Example | None:
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:

@@ -86,9 +86,17 @@ def car_values(memory: WorkingMemory, view: CoWizardView) -> list[float]:
 
 _LIMITS: Final = tuple(Limit)
 _CAR: Final = (
-    *[NUMBER] * 6, choice(len(Motion)), choice(len(HAZARDS) + 1), NUMBER, choice(len(PHYSICAL)), *[NUMBER] * 3,
-    TIME, *[NUMBER] * 4, choice(len(Limit)), *[NUMBER] * 8,
-)  # fmt: skip
+    *[NUMBER] * 6,
+    choice(len(Motion)),
+    choice(len(HAZARDS) + 1),
+    NUMBER,
+    choice(len(PHYSICAL)),
+    *[NUMBER] * 3,
+    TIME,
+    *[NUMBER] * 4,
+    choice(len(Limit)),
+    *[NUMBER] * 8,
+)
 
 
 def state_values(
@@ -140,8 +148,14 @@ def _road(memory: WorkingMemory, view: CoWizardView) -> list[float]:
 
 
 _ROAD: Final = (
-    NUMBER, DISTANCE, *[NUMBER] * 4, *[NUMBER] * len(Direction), *[NUMBER] * 7, *[NUMBER] * len(HAZARDS), DISTANCE,
-)  # fmt: skip
+    NUMBER,
+    DISTANCE,
+    *[NUMBER] * 4,
+    *[NUMBER] * len(Direction),
+    *[NUMBER] * 7,
+    *[NUMBER] * len(HAZARDS),
+    DISTANCE,
+)
 
 
 def ordered_exit(memory: WorkingMemory, view: CoWizardView, choice: Choice | None) -> Exit | None:
@@ -173,9 +187,22 @@ def _route(memory: WorkingMemory, view: CoWizardView, step: RouteStep | None) ->
 
 
 _ROUTE: Final = (
-    NUMBER, DISTANCE, NUMBER, NUMBER, choice(len(PHYSICAL)), DISTANCE, NUMBER, NUMBER, DISTANCE, NUMBER, DISTANCE,
-    *[NUMBER] * 5, AGE, NUMBER, NUMBER,
-)  # fmt: skip
+    NUMBER,
+    DISTANCE,
+    NUMBER,
+    NUMBER,
+    choice(len(PHYSICAL)),
+    DISTANCE,
+    NUMBER,
+    NUMBER,
+    DISTANCE,
+    NUMBER,
+    DISTANCE,
+    *[NUMBER] * 5,
+    AGE,
+    NUMBER,
+    NUMBER,
+)
 
 
 def _remembered(memory: WorkingMemory, view: CoWizardView) -> list[float]:

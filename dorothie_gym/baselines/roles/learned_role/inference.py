@@ -89,9 +89,15 @@ def write_means(rows: Integers, table: Floats, outputs: Floats) -> None:
 
 @compiled
 def write_scores(
-    hidden: Floats, options: Floats, counts: Integers, weights: Floats, last: Floats, bias: np.float32,
-    scores: Floats, layer: Floats,
-) -> None:  # fmt: skip
+    hidden: Floats,
+    options: Floats,
+    counts: Integers,
+    weights: Floats,
+    last: Floats,
+    bias: np.float32,
+    scores: Floats,
+    layer: Floats,
+) -> None:
     """Writes the scores of options: two layers over a hidden layer and an option, the first one a sum of two.
 
     Args:

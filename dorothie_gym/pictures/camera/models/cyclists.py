@@ -46,9 +46,15 @@ class Rider:
     def palette(self) -> Palette:
         """Colours of the parts."""
         return {
-            Part.PAINT: self.frame, Part.TOP: self.top, Part.EXTRA: self.helmet, Part.SKIN: self.skin,
-            Part.TROUSERS: (46, 50, 64), Part.SHOES: (36, 36, 38), Part.TYRE: (28, 28, 30), Part.TRIM: (40, 40, 42),
-        }  # fmt: skip
+            Part.PAINT: self.frame,
+            Part.TOP: self.top,
+            Part.EXTRA: self.helmet,
+            Part.SKIN: self.skin,
+            Part.TROUSERS: (46, 50, 64),
+            Part.SHOES: (36, 36, 38),
+            Part.TYRE: (28, 28, 30),
+            Part.TRIM: (40, 40, 42),
+        }
 
 
 RIDERS = (

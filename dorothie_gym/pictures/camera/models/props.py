@@ -21,9 +21,15 @@ if TYPE_CHECKING:
     from dorothie_gym.pictures.camera.mesh import Mesh
 
 _PALETTE: Palette = {
-    Part.ORANGE: (240, 98, 24), Part.WHITE: (255, 255, 255), Part.METAL: (122, 126, 128), Part.TRIM: (44, 46, 48),
-    Part.PAINT: (44, 98, 66), Part.EXTRA: (36, 40, 42), Part.TROUSERS: (94, 76, 58), Part.TOP: (84, 118, 52),
-}  # fmt: skip
+    Part.ORANGE: (240, 98, 24),
+    Part.WHITE: (255, 255, 255),
+    Part.METAL: (122, 126, 128),
+    Part.TRIM: (44, 46, 48),
+    Part.PAINT: (44, 98, 66),
+    Part.EXTRA: (36, 40, 42),
+    Part.TROUSERS: (94, 76, 58),
+    Part.TOP: (84, 118, 52),
+}
 
 
 def _cone(model: ModelBuilder, kind: PropKind) -> None:

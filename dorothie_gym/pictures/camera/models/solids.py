@@ -75,9 +75,15 @@ class ModelBuilder:
         return self._builder.build()
 
     def panel(
-        self, corners: ArrayLike, slot: Part, *, texture: int = PLAIN, repeats: tuple[float, float] = (1.0, 1.0),
-        shade: float = 1.0, two_sided: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        corners: ArrayLike,
+        slot: Part,
+        *,
+        texture: int = PLAIN,
+        repeats: tuple[float, float] = (1.0, 1.0),
+        shade: float = 1.0,
+        two_sided: bool = False,
+    ) -> None:
         """Adds a quadrilateral (4, 3): lower left, upper left, upper right, lower right, seen from its visible side."""
         self._builder.quad(
             corners, colour=_code(slot, shade), kind=self._kind, texture=texture, repeats=repeats, two_sided=two_sided

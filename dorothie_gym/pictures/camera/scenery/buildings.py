@@ -296,14 +296,25 @@ def add_building(builder: MeshBuilder, building: Building, outline: Array, low: 
     if building.style is Style.HOUSE:
         look = house_look(building.tone)
         add_roof(
-            builder, look.roof, building.centre, building.heading, (building.depth, building.length), top,
-            tiles=look.tiles, gable=colour * 0.9,
-        )  # fmt: skip
+            builder,
+            look.roof,
+            building.centre,
+            building.heading,
+            (building.depth, building.length),
+            top,
+            tiles=look.tiles,
+            gable=colour * 0.9,
+        )
         front = building.at(-0.03, 0.25 * building.length)
         builder.panel(
-            (*front, base + 1.05), building.heading, 1.05, 2.1, colour=look.door, kind=ObjectClass.BUILDING,
+            (*front, base + 1.05),
+            building.heading,
+            1.05,
+            2.1,
+            colour=look.door,
+            kind=ObjectClass.BUILDING,
             texture=Texture.DOOR,
-        )  # fmt: skip
+        )
         return
     flat = _FLAT_ROOFS[building.tone // 64 % len(_FLAT_ROOFS)]
     builder.prism(outline, top, top + 0.6, colour=colour * 0.82, top_colour=flat, kind=ObjectClass.BUILDING)

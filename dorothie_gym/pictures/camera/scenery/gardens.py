@@ -91,9 +91,15 @@ class _Run:
     def box(self, deep: tuple[float, float], height: float, colour: Rgb) -> None:
         """Adds a box of leaves."""
         self._builder.prism(
-            self._corners(deep), self._low, self._high + height, colour=colour, kind=ObjectClass.VEGETATION,
-            top_colour=np.array(colour) * 1.12, texture=Texture.LEAVES, repeat=(1.6, 1.6),
-        )  # fmt: skip
+            self._corners(deep),
+            self._low,
+            self._high + height,
+            colour=colour,
+            kind=ObjectClass.VEGETATION,
+            top_colour=np.array(colour) * 1.12,
+            texture=Texture.LEAVES,
+            repeat=(1.6, 1.6),
+        )
 
     def fence(self, distance: float) -> None:
         """Adds two rails, and posts or pickets at a distance [m] from each other, visible from both sides."""
@@ -115,9 +121,13 @@ class _Run:
         """Adds a bed with blooms at a distance [m] from each other."""
         deep = min(_BED[0], self._plot.depth)
         self._builder.prism(
-            self._corners((0.0, deep)), self._low, self._high + _BED[1], colour=_SOIL, kind=ObjectClass.VEGETATION,
+            self._corners((0.0, deep)),
+            self._low,
+            self._high + _BED[1],
+            colour=_SOIL,
+            kind=ObjectClass.VEGETATION,
             top_colour=_LEAVES[self._plot.tone % len(_LEAVES)],
-        )  # fmt: skip
+        )
         low, high = self._right
         count = max(1, int((high - low) / distance))
         for k in range(count):
@@ -150,8 +160,13 @@ def small_tree() -> Mesh:
     rng = np.random.default_rng(110)
     builder = MeshBuilder()
     builder.prism(
-        disc((0.0, 0.0), 0.09, 4), -0.2, 1.4, colour=_BARK, kind=ObjectClass.VEGETATION, texture=Texture.BARK,
+        disc((0.0, 0.0), 0.09, 4),
+        -0.2,
+        1.4,
+        colour=_BARK,
+        kind=ObjectClass.VEGETATION,
+        texture=Texture.BARK,
         closed=(False, False),
-    )  # fmt: skip
+    )
     add_clump(builder, (0.0, 0.0, 2.0), (1.0, 1.05), np.array(_LEAVES[1], dtype=np.float64), rng, sides=6)
     return builder.build()

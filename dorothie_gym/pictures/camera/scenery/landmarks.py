@@ -154,9 +154,15 @@ class _Works:
         ring = self.rectangle(deep, right)
         inner = self.rectangle((deep[0] + shrunk, deep[1] - shrunk), (right[0] + shrunk, right[1] - shrunk))
         self.builder.prism(
-            ring, self.base + up[0], self.base + up[1], top=inner, colour=colour, top_colour=top, kind=kind,
+            ring,
+            self.base + up[0],
+            self.base + up[1],
+            top=inner,
+            colour=colour,
+            top_colour=top,
+            kind=kind,
             closed=(bottom, True),
-        )  # fmt: skip
+        )
 
     def foundation(self, deep: tuple[float, float], right: tuple[float, float]) -> None:
         """Fills the ground below a building on a slope."""
@@ -179,9 +185,15 @@ class _Works:
             surface = Surface.EMISSIVE
         x, y = self.lot.at(deep, right)
         self.builder.panel(
-            (x, y, self.base + up), self.lot.heading + turned, width, height, colour=colour, kind=kind,
-            texture=texture, surface=surface,
-        )  # fmt: skip
+            (x, y, self.base + up),
+            self.lot.heading + turned,
+            width,
+            height,
+            colour=colour,
+            kind=kind,
+            texture=texture,
+            surface=surface,
+        )
 
     def pole(self, deep: float, right: float, high: float, radius: float = 0.16, colour: Rgb = _METAL) -> None:
         """Adds a pole from the ground to a height."""
@@ -209,9 +221,15 @@ class _Works:
         )
         for side in (1.0, -1.0):
             self.panel(
-                deep, right + side * 0.22, up + 0.06 + height / 2.0, width, height, texture=texture,
-                turned=-side * math.pi / 2.0, kind=ObjectClass.STATIC,
-            )  # fmt: skip
+                deep,
+                right + side * 0.22,
+                up + 0.06 + height / 2.0,
+                width,
+                height,
+                texture=texture,
+                turned=-side * math.pi / 2.0,
+                kind=ObjectClass.STATIC,
+            )
 
 
 def _store(works: _Works, design: StoreDesign, texture: Texture) -> None:
@@ -348,10 +366,16 @@ def _house(works: _Works) -> None:
     works.foundation(deep, (-side, side))
     works.box(deep, (-side, side), (0.0, walls), design.wall)
     add_roof(
-        works.builder, Roof.HIPPED if lot.key // _HIPPED % 2 else Roof.ALONG, lot.at((deep[0] + deep[1]) / 2.0, 0.0),
-        lot.heading, (deep[1] - deep[0], length), works.base + walls, tiles=design.roof,
-        gable=np.array(design.wall, dtype=np.float64), slope=_SLOPES[design.storeys],
-    )  # fmt: skip
+        works.builder,
+        Roof.HIPPED if lot.key // _HIPPED % 2 else Roof.ALONG,
+        lot.at((deep[0] + deep[1]) / 2.0, 0.0),
+        lot.heading,
+        (deep[1] - deep[0], length),
+        works.base + walls,
+        tiles=design.roof,
+        gable=np.array(design.wall, dtype=np.float64),
+        slope=_SLOPES[design.storeys],
+    )
     works.panel(deep[0] - 0.03, 0.0, 1.1, 1.2, 2.2, texture=Texture.DOOR)
     for storey in range(design.storeys):
         for right in (-0.6 * side, 0.6 * side) if storey == 0 else (-0.6 * side, 0.0, 0.6 * side):

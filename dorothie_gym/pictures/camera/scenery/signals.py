@@ -200,9 +200,15 @@ def _round(x: float, z: float, radius: float, corners: int, turn: float = 0.0) -
 
 
 def _polygon(
-    builder: MeshBuilder, corners: Array, colour: tuple[int, int, int], kind: ObjectClass, *,
-    texture: Texture = Texture.PLAIN, surface: Surface = Surface.NONE, backwards: bool = False,
-) -> None:  # fmt: skip
+    builder: MeshBuilder,
+    corners: Array,
+    colour: tuple[int, int, int],
+    kind: ObjectClass,
+    *,
+    texture: Texture = Texture.PLAIN,
+    surface: Surface = Surface.NONE,
+    backwards: bool = False,
+) -> None:
     """Adds a convex polygon (n, 3), anticlockwise for a viewer who looks along x, with one repeat of a texture."""
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     size = float(np.ptp(corners[:, 1:], axis=0).max())

@@ -284,17 +284,27 @@ def build_boards(layers: MapLayers, boards: list[Board], ground: Heights) -> Mes
             for across in (-0.3 * width, 0.3 * width):
                 foot = oriented([(0.06, across)], board.at, board.look)[0]
                 builder.prism(
-                    disc(foot, 0.05, 3), low - _BOARD_HEIGHT - 0.3, low + tall, colour=_METAL, kind=ObjectClass.POLE,
+                    disc(foot, 0.05, 3),
+                    low - _BOARD_HEIGHT - 0.3,
+                    low + tall,
+                    colour=_METAL,
+                    kind=ObjectClass.POLE,
                     closed=(False, False),
-                )  # fmt: skip
+                )
         else:
             low = board.height + _OVERHEAD
             _add_arm(builder, board, board.post, foot_beside_road(layers, ground, board.post, board.height), low, tall)
         for k, street in enumerate(reversed(board.streets)):
             builder.panel(
-                (*board.at, low + (k + 0.5) * height), board.look, width, height, colour=(235, 235, 235),
-                kind=ObjectClass.TRAFFIC_SIGN, texture=STREET_NAMES + street, surface=Surface.EMISSIVE,
-            )  # fmt: skip
+                (*board.at, low + (k + 0.5) * height),
+                board.look,
+                width,
+                height,
+                colour=(235, 235, 235),
+                kind=ObjectClass.TRAFFIC_SIGN,
+                texture=STREET_NAMES + street,
+                surface=Surface.EMISSIVE,
+            )
         back = (*oriented([(0.02, 0.0)], board.at, board.look)[0].tolist(), low + tall / 2.0)
         builder.panel(back, board.look + math.pi, width, tall, colour=_BACK, kind=ObjectClass.TRAFFIC_SIGN)
     return builder.build()

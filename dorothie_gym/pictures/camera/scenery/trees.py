@@ -65,9 +65,15 @@ def tree_form(form: int) -> Mesh:
     builder = MeshBuilder()
     colour = np.array(_GREENS[form], dtype=np.float64)
     builder.prism(
-        disc((0.0, 0.0), 0.085, 4), -0.1, 1.3, top=disc((0.0, 0.0), 0.05, 4), colour=_BARK, kind=ObjectClass.VEGETATION,
-        texture=Texture.BARK, closed=(False, False),
-    )  # fmt: skip
+        disc((0.0, 0.0), 0.085, 4),
+        -0.1,
+        1.3,
+        top=disc((0.0, 0.0), 0.05, 4),
+        colour=_BARK,
+        kind=ObjectClass.VEGETATION,
+        texture=Texture.BARK,
+        closed=(False, False),
+    )
     add_clump(builder, (0.0, 0.0, 1.75), (1.0, 0.85), colour, rng, sides=7)
     for k in range(2):
         heading = 2.6 * k + form
