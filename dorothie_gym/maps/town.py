@@ -169,8 +169,9 @@ class Town:
         titled: whether people are to see and hear the names that the map has for its streets.
 
     Attributes:
-        name, lanes, links, junctions, streets, sites, signals, crosswalks, sidewalks, programmes, traffic, cruise,
-            titled: the arguments; sequences as tuples.
+        name, lanes, links, junctions, streets, sites: the arguments; sequences as tuples.
+        signals, crosswalks, sidewalks: likewise.
+        programmes, traffic, cruise, titled: likewise.
     """
 
     def __init__(

@@ -32,6 +32,9 @@ OTHER_TOWNS = [name for name in town_names() if name not in ("brookside", "midto
 CAMERA_ELSEWHERE = "sessions with a camera in other towns"
 """Sessions for which the scenes of two further towns are built, which takes most of the time."""
 
+SLOW = (CAMERA_ELSEWHERE, "sessions in other towns", "towns, console and environments")
+"""Batches of which `test_all_sessions_are_equal` compares most parts, or one of each kind, with the same digests."""
+
 BATCHES: dict[str, tuple[str, ...]] = {
     "sessions in brookside and midtown": ("sessions/brookside *", "sessions/midtown *"),
     "sessions in other towns": tuple(f"sessions/{name} [!c]*" for name in OTHER_TOWNS),
@@ -121,7 +124,7 @@ def test_towns_and_a_session_are_as_before() -> None:
 @pytest.mark.long
 @pytest.mark.timeout(900)  # other tests use the cores, too
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name == CAMERA_ELSEWHERE else name for name in BATCHES]
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in BATCHES]
 )
 def test_digests_are_as_before(name: str) -> None:
     if any(pattern.split("/")[0] in TEXTS for pattern in BATCHES[name]):
