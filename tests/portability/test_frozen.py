@@ -32,8 +32,13 @@ OTHER_TOWNS = [name for name in town_names() if name not in ("brookside", "midto
 CAMERA_ELSEWHERE = "sessions with a camera in other towns"
 """Sessions for which the scenes of two further towns are built, which takes most of the time."""
 
-SLOW = (CAMERA_ELSEWHERE, "sessions in other towns", "towns, console and environments")
-"""Batches of which `test_all_sessions_are_equal` compares most parts, or one of each kind, with the same digests."""
+SLOW = (
+    CAMERA_ELSEWHERE,
+    "sessions in other towns",
+    "towns, console and environments",
+    "models, predictions and leaderboard",
+)
+"""Batches of a minute, most of whose kinds `test_all_sessions_are_equal` compares with the same digests."""
 
 BATCHES: dict[str, tuple[str, ...]] = {
     "sessions in brookside and midtown": ("sessions/brookside *", "sessions/midtown *"),
