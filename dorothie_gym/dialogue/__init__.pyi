@@ -59,4 +59,5 @@ from .routes import StepChange as StepChange
 from .routes import StepCondition as StepCondition
 from .speaker_style import SpeakerStyle as SpeakerStyle
 from .speaker_style import draw_style as draw_style
+from .street_titles import StreetTitles as StreetTitles
 from .transactions import Annotator as Annotator

@@ -16,7 +16,7 @@ from dorothie_gym.session.config import ChannelKind, EnvConfig
 from dorothie_gym.sim.config import AutomaticBraking, WorldConfig
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.briefs import TalkFamily
-from dorothie_gym.tasks.generated_storyboards import StoryboardSource
+from dorothie_gym.tasks.storyboard_specification import StoryboardSource
 
 HELD_OUT_PERSONAS: Final = ("scripted:talkativeness=0.8..1", "scripted:certainty=0..0.2")
 """Participants with traits that no learned role has met in training (`learned_role.dagger_sessions.TRAINED`)."""

@@ -21,7 +21,7 @@ from dorothie_gym.session.sensor_config import (
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
 from dorothie_gym.tasks.briefs import TalkFamily
-from dorothie_gym.tasks.generated_storyboards import StoryboardSource
+from dorothie_gym.tasks.storyboard_specification import StoryboardSource
 
 # --- First-person camera ----------------------------------------------------------------------------------------------
 

@@ -13,21 +13,20 @@ import gymnasium
 import numpy as np
 from msgspec import Meta
 
-from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
-from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
+from dorothie_gym import dialogue, tasks  # lazy: words and storyboards are read when a session begins
 from dorothie_gym.errors import SessionError, StoryboardError, did_you_mean, short_repr
 from dorothie_gym.maps.site_inference import connected_sites
 from dorothie_gym.ontology.slots import StreetName
-from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
-from dorothie_gym.session.recording.street_titles import STREET_TITLES
+from dorothie_gym.session.recording.header import STREET_TITLES, SessionHeader, SubgoalRow
 from dorothie_gym.session.talk_kinds import draw_talk_task
 from dorothie_gym.session.talk_tasks import storyboard_of
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.input_files import checked, raising
-from dorothie_gym.tasks.generated_storyboards import MOST_SEED, STOPS, StoryboardSource, StoryboardSpecification
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
+from dorothie_gym.tasks.storyboard_specification import MOST_SEED, STOPS, StoryboardSource, StoryboardSpecification
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.street_titles import StreetTitles
     from dorothie_gym.maps.town import Town
     from dorothie_gym.session.config import EnvConfig
     from dorothie_gym.tasks.briefs import TalkFamily
@@ -116,8 +115,8 @@ class Scenario:
 
     @cached_property
     def titles(self) -> StreetTitles:
-        """Names of the map for the streets; towns without have none."""
-        return StreetTitles(self.street_names, self.street_titles) if self.street_titles else NO_TITLES
+        """Names of the map for the streets; false where the map has none."""
+        return dialogue.StreetTitles(self.street_names, self.street_titles)
 
     @property
     def street_labels(self) -> list[str]:

@@ -6,8 +6,6 @@ from .catalogue import LandmarkKind as LandmarkKind
 from .catalogue import catalogue as catalogue
 from .catalogue import map_label as map_label
 from .catalogue import map_labels as map_labels
-from .generated_storyboards import StoryboardSource as StoryboardSource
-from .generated_storyboards import StoryboardSpecification as StoryboardSpecification
 from .generated_storyboards import generate_template as generate_template
 from .parsing import is_shipped_story as is_shipped_story
 from .parsing import is_template_name as is_template_name
@@ -27,3 +25,5 @@ from .storyboard import TaskMessages as TaskMessages
 from .storyboard import TaskState as TaskState
 from .storyboard import Variable as Variable
 from .storyboard import with_reason as with_reason
+from .storyboard_specification import StoryboardSource as StoryboardSource
+from .storyboard_specification import StoryboardSpecification as StoryboardSpecification

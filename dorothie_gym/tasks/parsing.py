@@ -15,7 +15,7 @@ from dorothie_gym.support.files import JsonValue
 from dorothie_gym.support.input_files import MAX_SMALL_JSON, parse_json, read_text
 from dorothie_gym.tasks.binding import cast, longest_values
 from dorothie_gym.tasks.catalogue import find_kind
-from dorothie_gym.tasks.generated_storyboards import generate_template, is_generated, parse_specification
+from dorothie_gym.tasks.generated_storyboards import generate_template
 from dorothie_gym.tasks.storyboard import (
     MESSAGE_LENGTH,
     Channel,
@@ -28,6 +28,7 @@ from dorothie_gym.tasks.storyboard import (
     references,
     variable_of,
 )
+from dorothie_gym.tasks.storyboard_specification import is_generated, parse_specification
 
 MAX_LIVE_SUBGOALS = 6
 """Maximum number of subgoals without a trigger: two to six landmarks to visit (paper, "Task Configuration")."""

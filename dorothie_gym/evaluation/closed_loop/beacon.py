@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final, TypedDict
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.generated.specification import FIRST_TEST_SEED, MOST_SEED, PREFIX
 from dorothie_gym.support.copying import shared
-from dorothie_gym.tasks.generated_storyboards import StoryboardSource
+from dorothie_gym.tasks.storyboard_specification import StoryboardSource
 
 if TYPE_CHECKING:
     from dorothie_gym.session.config import EnvConfig

@@ -31,6 +31,9 @@ NATIVE: Final = "dorothie_gym"
 ANNOTATION_FIELD: Final = "annotation"
 """Field of `extra` of a copy with the labels of an annotator: annotator (name)."""
 
+STREET_TITLES: Final = "street_titles"
+"""Field of `extra` with the names that the map has for its streets, empty where it has none."""
+
 _VERSION: Final = re.compile(r"(\d{1,4})\.(\d{1,4})")
 
 

@@ -9,13 +9,11 @@ from msgspec import Meta
 from dorothie_gym.dialogue.street_titles import NO_TITLES, StreetTitles
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology.slots import StreetName
+from dorothie_gym.session.recording.header import STREET_TITLES
 from dorothie_gym.support.input_files import checked, raising
 
 if TYPE_CHECKING:
     from dorothie_gym.session.recording.header import SessionHeader
-
-STREET_TITLES: Final = "street_titles"
-"""Field of `SessionHeader.extra` with the names that the map has for its streets, empty where it has none."""
 
 _Title: TypeAlias = Annotated[str, Meta(max_length=200)]
 _NAMES: Final = {name.label: name for name in StreetName}
