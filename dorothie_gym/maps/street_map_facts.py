@@ -1,4 +1,4 @@
-"""What netconvert does not read in an OpenStreetMap file: the side of the road, and names in Latin letters."""
+"""Facts of an OpenStreetMap file that netconvert does not read: the side of the road, and names in Latin letters."""
 
 from __future__ import annotations
 

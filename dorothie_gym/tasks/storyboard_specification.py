@@ -19,7 +19,7 @@ MOST_SEED: Final = 1_000_000_000_000
 STOPS: Final = (2, 6)
 """Range of the number of stops, the subgoals at the start (paper, "Task Configuration")."""
 
-_NAME: Final = re.compile(rf"{PREFIX}([0-9]{{1,12}})(?:,stops=([0-9]+))?")
+_NAME: Final = re.compile(rf"{PREFIX}([0-9]{{1,24}})(?:,stops=([0-9]+))?")
 
 
 class StoryboardSource(enum.StrEnum):
