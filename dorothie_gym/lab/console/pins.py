@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.tasks.catalogue import catalogue, map_label
 
 if TYPE_CHECKING:
@@ -29,6 +29,11 @@ class Pin(NamedTuple):
     lane: int
     station: float
     street: int
+
+
+def drawn_names(streets: Iterable[StreetName]) -> list[str]:
+    """Returns the names of streets in a session as maps draw them; empty for streets without one."""
+    return ["" if name is StreetName.UNKNOWN else name.label for name in streets]
 
 
 def pin_rows(

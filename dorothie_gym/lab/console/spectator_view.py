@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from dorothie_gym.lab.console.pins import Pin, pin_rows
+from dorothie_gym.lab.console.pins import Pin, drawn_names, pin_rows
 from dorothie_gym.lab.console.views import KMH, RoleView, weather_shares
-from dorothie_gym.ontology.slots import ObjectClass, StreetName
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.pictures.views.exception_words import exception_words
 from dorothie_gym.session.recording.events import Event, EventType
 
@@ -62,8 +62,7 @@ def spectator_view(session: LiveSession, places: LaneLookup) -> RoleView:
 
 def _streets(session: LiveSession) -> list[str]:
     """Returns the name of each street on the map; empty for streets without one."""
-    names = ["" if name is StreetName.UNKNOWN else name.label for name in session.scenario.street_names]
-    return session.scenario.titles.labels(names)
+    return session.scenario.titles.labels(drawn_names(session.scenario.street_names))
 
 
 def _pins(landmarks: Sequence[Landmark]) -> list[Pin]:

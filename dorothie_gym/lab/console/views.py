@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.lab.console.pins import Pin, pin_rows
+from dorothie_gym.lab.console.pins import Pin, drawn_names, pin_rows
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
@@ -60,8 +60,7 @@ def static_view(observation: ObservationMapping, town: Town) -> RoleView:
         observation: observation of the role.
         town: the map.
     """
-    names = [StreetName(int(i)) for i in observation["street_names"][: len(town.streets)]]
-    labels = ["" if name is StreetName.UNKNOWN else name.label for name in names]
+    labels = drawn_names(StreetName(int(i)) for i in observation["street_names"][: len(town.streets)])
     titles = titles_of(observation, town)
     streets = titles.labels(labels)
     named = {label: title for label, title in zip(labels, streets, strict=True) if label and label != title}
@@ -201,9 +200,9 @@ def _landmarks(observation: ObservationMapping, places: LaneLookup) -> list[list
         for row in observation["landmarks"]
         if row[LandmarkColumn.NAME]
     ]
-    names = [StreetName(int(name)) for name in observation["street_names"]]
-    labels = ["" if name is StreetName.UNKNOWN else name.label for name in names]
-    streets = titles_of(observation, places.town).labels(labels[: len(places.town.streets)])
+    number = len(places.town.streets)
+    labels = drawn_names(StreetName(int(i)) for i in observation["street_names"][:number])
+    streets = titles_of(observation, places.town).labels(labels)
     return [list(row) for row in pin_rows(pins, streets, places)]
 
 
