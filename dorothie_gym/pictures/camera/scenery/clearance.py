@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -49,6 +50,8 @@ _SEEN_FROM = (42.0, 26.0)  # [m] before the stop at a site
 _SIGN = (2.4, 3.4)  # [m] extent of signs in front of and behind the front of a lot
 BESIDE_LOT = 1.2
 """Room at both sides of a lot, for a sign [m]."""
+
+_MIDDLE = 4.0  # [m] to each side of the middle of a lot: its door and the place where people wait
 
 _UNIT = np.array([[0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]])
 _LOTS = ((20.0, 15.0), (16.0, 12.0), (13.0, 10.0), (10.0, 8.0), (8.0, 7.0), (6.0, 5.0), (4.0, 4.0))
@@ -125,6 +128,11 @@ class Clearance:
         return tuple(self._lot(site, taken) for site in self._layers.town.sites)
 
     @cached_property
+    def lots_with_fronts(self) -> shapely.STRtree:
+        """Lots, and the ground between their middles and their streets: thin posts may stand at the flanks."""
+        return shapely.STRtree([shape for lot in self.lots for shape in (_ground_of(lot), _with_view(lot, _MIDDLE))])
+
+    @cached_property
     def reserved(self) -> shapely.STRtree:
         """Lots, the ground between them and their streets, and the lines of sight of approaching cars."""
         town = self._layers.town
@@ -160,10 +168,18 @@ def free_of(polygons: NDArray[np.object_], tree: shapely.STRtree) -> NDArray[np.
     return free
 
 
-def _with_view(lot: Lot) -> shapely.Polygon:
-    """Returns a lot with room at its sides and in front of it."""
+def _ground_of(lot: Lot) -> shapely.Polygon:
+    """Returns a lot with a margin."""
+    side = lot.length / 2.0 + 0.5
+    return shapely.Polygon(
+        [lot.at(-0.5, -side), lot.at(-0.5, side), lot.at(lot.depth + 0.5, side), lot.at(lot.depth + 0.5, -side)]
+    )
+
+
+def _with_view(lot: Lot, widest: float = math.inf) -> shapely.Polygon:
+    """Returns a lot with room at its sides and in front of it, at most a width [m] to each side of its middle."""
     ahead = float(pn.hypot(lot.front[0] - lot.place[0], lot.front[1] - lot.place[1])) + 5.0
-    side = lot.length / 2.0 + 2.5
+    side = min(lot.length / 2.0 + 2.5, widest)
     return shapely.Polygon(
         [lot.at(-ahead, -side), lot.at(-ahead, side), lot.at(lot.depth + 1.0, side), lot.at(lot.depth + 1.0, -side)]
     )

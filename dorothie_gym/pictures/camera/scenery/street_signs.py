@@ -41,9 +41,11 @@ _POST_APART = 0.8  # [m] from the post of such a board to others
 _BOARD_APART = 3.0  # [m] from a board to posts and other boards
 # distances [m] before a stop line and after a junction, the best first; the others only where none of them has room
 _BEFORE = ((33.0, 31.0, 35.0, 29.0, 37.0, 27.0, 40.0), (24.0, 20.0, 16.0))
-_AFTER = ((38.0, 36.0, 40.0, 34.0, 42.0), (31.0, 28.0, 25.0, 22.0, 18.0))
+_AFTER = ((38.0, 36.0, 40.0, 34.0, 42.0), (46.0, 50.0, 54.0), (31.0, 28.0, 25.0, 22.0, 18.0))
 _ROADSIDE = (0.7, 1.2, 1.8, 2.6, 3.6)  # [m] from the edge of the road to the near edge of a board
-_SAME_DRIVERS = 16.0  # [m] between two boards at the same height for the same drivers
+# [m] between two boards for the same drivers: at the roadside, and above the road, where the farther one looks lower
+_SAME_DRIVERS, _SAME_DRIVERS_OVERHEAD = 16.0, 10.0
+_ABREAST = 8.0  # [m] between the middles of lanes side by side
 _READ_FROM = 18.0  # [m] before a board, from where nothing may hide it
 _SHORTEST = 24.0  # [m] lanes with boards
 _MOST_NAMES = 2  # on a board
@@ -143,11 +145,11 @@ def plan_boards(layers: MapLayers, clearance: Clearance, taken: Array) -> list[B
     found: list[Board] = []
     kept = np.asarray(taken, dtype=np.float64).reshape(-1, 2)
     for lane in town.lanes:
-        if lane.in_junction or lane.street == NO_STREET or lane.id in layers.borders.outer_neighbour:
+        if lane.in_junction or lane.street == NO_STREET:
             continue
         for spots, streets in (
-            (_before_junction(layers, lane), _crossing_streets(town, lane)),
-            (_after_junction(town, lane), (lane.street,)),
+            (_before_junction(layers, lane), _crossing_streets(layers, lane)),
+            (_after_junction(layers, lane), (lane.street,)),
         ):
             board = _first_apart(_boards(layers, clearance, spots, streets, kept), found) if streets else None
             if board is not None:
@@ -164,8 +166,9 @@ def _first_apart(boards: Iterator[Board], others: list[Board]) -> Board | None:
     """
     best, farthest = None, _BOARD_APART
     for board in boards:
-        away = min((_apart(board, other) for other in others), default=_SAME_DRIVERS)
-        if away >= _SAME_DRIVERS:
+        wanted = _SAME_DRIVERS if board.post is None else _SAME_DRIVERS_OVERHEAD
+        away = min((_apart(board, other) for other in others), default=wanted)
+        if away >= wanted:
             return board
         if away > farthest:
             best, farthest = board, away
@@ -186,17 +189,38 @@ def _view_of(board: Board) -> shapely.Polygon:
     return shapely.Polygon(oriented(corners, board.at, board.look))
 
 
-def _crossing_streets(town: Town, lane: Lane) -> tuple[int, ...]:
-    """Returns the streets other than its own that a lane leads to over a junction, left ones first."""
-    exits = sorted((e for e in town.exits(lane.id) if e.junction_id >= 0), key=lambda e: e.angle, reverse=True)
-    others = dict.fromkeys(town.lanes[e.lane].street for e in exits)
+def _crossing_streets(layers: MapLayers, lane: Lane) -> tuple[int, ...]:
+    """Returns the streets other than its own that an approach leads to over a junction, left ones first."""
+    town, inner = layers.town, layers.borders.inner_neighbour
+    approach = [lane]
+    while (beside := inner.get(approach[-1].id)) is not None:
+        if not _abreast(approach[-1], town.lanes[beside], -_BEFORE[0][0]):
+            break
+        approach.append(town.lanes[beside])
+    exits = [e for each in approach for e in town.exits(each.id) if e.junction_id >= 0]
+    others = dict.fromkeys(town.lanes[e.lane].street for e in sorted(exits, key=lambda e: e.angle, reverse=True))
     return tuple(street for street in others if street not in (lane.street, NO_STREET))[:_MOST_NAMES]
+
+
+def _at_kerb(layers: MapLayers, lane: Lane, from_start: float) -> bool:
+    """Returns whether no lane in the same direction lies between a place on a lane and the kerb, see `_abreast`."""
+    beside = layers.borders.outer_neighbour.get(lane.id)
+    return beside is None or not _abreast(lane, layers.town.lanes[beside], from_start)
+
+
+def _abreast(lane: Lane, other: Lane, from_start: float) -> bool:
+    """Returns whether two lanes are side by side at a distance from their starts, from their ends if it is negative."""
+    one, two = (
+        each.position(min(from_start, each.length) if from_start >= 0.0 else max(0.0, each.length + from_start))
+        for each in (lane, other)
+    )
+    return pm.dist(one.tolist(), two.tolist()) < _ABREAST
 
 
 def _before_junction(layers: MapLayers, lane: Lane) -> list[list[tuple[Lane, float]]]:
     """Returns places on the way to a stop line, which may be on the lanes before."""
     stop = layers.stops.get(lane.id)
-    if stop is None:
+    if stop is None or not _at_kerb(layers, lane, -_BEFORE[0][0]):
         return []
     places = [[_back(layers.town, lane, stop, distance) for distance in group] for group in _BEFORE]
     return [[place for place in group if place is not None] for group in places]
@@ -216,9 +240,11 @@ def _back(town: Town, lane: Lane, station: float, distance: float) -> tuple[Lane
     return lane, station - distance
 
 
-def _after_junction(town: Town, lane: Lane) -> list[list[tuple[Lane, float]]]:
+def _after_junction(layers: MapLayers, lane: Lane) -> list[list[tuple[Lane, float]]]:
     """Returns places on a lane that begins at a junction."""
-    if lane.length < _SHORTEST or not any(town.lanes[k].in_junction for k in town.predecessors(lane.id)):
+    town = layers.town
+    begins = any(town.lanes[k].in_junction for k in town.predecessors(lane.id))
+    if not begins or lane.length < _SHORTEST or not _at_kerb(layers, lane, _AFTER[0][0]):
         return []
     return [[(lane, station) for station in group if station < lane.length - 2.0] for group in _AFTER]
 
@@ -234,10 +260,12 @@ def _boards(
     sign = layers.town.traffic.sign
     for group, overhead in product(spots, (False, True)):
         for lane, station in group:
-            heading, height = lane.heading_at(station), lane.height_at(station)
+            height = lane.height_at(station)
             if layers.raised.hold(np.array([(*lane.position(station).tolist(), height)]))[0]:
                 continue
-            x, y = lane.position(max(0.0, station - _READ_FROM)).tolist()
+            # parallel to the windscreen of a driver who reads it: in a curve the road itself has turned away by then
+            eye = max(0.0, station - _READ_FROM)
+            heading, (x, y) = lane.heading_at(eye), lane.position(eye).tolist()
             edge = lane.width_at(station) / 2.0
             for aside in _ROADSIDE:
                 post = lane.position(station, sign * (edge + aside))
@@ -264,7 +292,8 @@ def _is_free(
         return False
     if post is not None:
         spot = np.array([shapely.Point(*post.tolist()).buffer(0.3)], dtype=np.object_)
-        return clearance.has_room(float(post[0]), float(post[1]), 0.2) and bool(free_of(spot, clearance.reserved)[0])
+        free = bool(free_of(spot, clearance.lots_with_fronts)[0])
+        return free and clearance.has_room(float(post[0]), float(post[1]), 0.2)
     ground = np.array([shapely.LineString(ends).buffer(0.15)], dtype=np.object_)
     if not all(free_of(ground, tree)[0] for tree in (clearance.lanes, clearance.trees, clearance.reserved)):
         return False
