@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
 def build_town_scene(town: Town) -> TownScene:
     """Returns the scene of a town; it depends on the town and its name only."""
-    ground = build_ground(town)
-    scenery = build_scenery(MapLayers(town), ground)
+    layers = MapLayers(town)
+    ground = build_ground(layers)
+    scenery = build_scenery(layers, ground)
     mesh, cells, _ = sorted_by_cell(joined([ground.mesh, scenery.mesh]))
     return TownScene(
         ground=Ground(mesh, ground.arrays),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -129,11 +130,25 @@ class MapLayers:
         """Levels of the bridges, lower ones first."""
         return sorted({part.level for part in self.stretches if part.level > 0})
 
+    def at_scale(self, scale: float, border: float) -> MapLayers:
+        """Returns the layers of the same town for another scale [px/m] and another width of country [m].
+
+        It shares what does not depend on them.
+        """
+        other = copy.copy(self)
+        other.__dict__.pop("shapes", None)
+        other.__dict__["_streets"] = self._streets
+        other.detail, other._border = markings.MapDetail.at(scale), border
+        return other
+
     @cached_property
     def shapes(self) -> list[Shape]:
         """All polygons, in the order of painting."""
-        ground = streets(self.town, self._samples, self.borders.lines, self.stretches, self.pockets)
-        return [*landscape(self.town, self._border), *ground, *self._layers(list(self._paint()))]
+        return [*landscape(self.town, self._border), *self._streets, *self._layers(list(self._paint()))]
+
+    @cached_property
+    def _streets(self) -> list[Shape]:
+        return list(streets(self.town, self._samples, self.borders.lines, self.stretches, self.pockets))
 
     def ground_shapes(self) -> list[Shape]:
         """Returns the polygons on the ground without bridges, as if streets under bridges lay in the open.

@@ -305,7 +305,7 @@ def test_no_lamp_or_light_stands_on_asphalt(name: str) -> None:
     own = np.array([post.at for post in layers.posts]).reshape(-1, 2)
     if len(own):
         poles = poles[np.hypot(*(poles[:, None] - own).transpose(2, 0, 1)).min(axis=1) > 0.3]
-    sheet = ground_arrays(town_sheets(load_town(name)))
+    sheet = ground_arrays(town_sheets(MapLayers(load_town(name))))
     for feet in (lamps, poles):
         kinds = [LOOKS[Material(material_at(sheet, GROUND_SHEET, x, y))].kind for x, y in feet.tolist()]
         assert ObjectClass.ROAD not in kinds

@@ -35,6 +35,7 @@ from dorothie_gym.pictures.camera.scene_cache import town_scene
 from dorothie_gym.pictures.camera.session_camera import SessionCamera
 from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.pictures.maps.levels import stretches
+from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.shapes import TownSamples
 from dorothie_gym.session.config import CameraConfig, CameraOutput, EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
@@ -198,7 +199,7 @@ def test_instances_are_the_bodies_that_rays_reach(name: str, count: int) -> None
 @pytest.mark.parametrize(("name", "count"), TOWNS)
 def test_classes_of_the_ground_are_those_of_the_map_there(name: str, count: int) -> None:
     stage = stage_of(name)
-    sheets = [Painting(sheet.polygons, sheet.outside) for sheet in town_sheets(stage.town)]
+    sheets = [Painting(sheet.polygons, sheet.outside) for sheet in town_sheets(MapLayers(stage.town))]
     world, right, wrong = stage.engine.session.world, dict.fromkeys(CLASSES, 0), dict.fromkeys(CLASSES, 0)
     for pose in poses_in(stage.town, count):
         frame = stage.camera.render_from(pose, world.actors.arrays, world.weather, time=world.time)

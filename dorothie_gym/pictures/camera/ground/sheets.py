@@ -13,10 +13,9 @@ from dorothie_gym.pictures.camera.ground.cells import Painted
 from dorothie_gym.pictures.camera.ground.materials import MATERIALS, SYMBOLS, Material
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.levels import LevelStretch
-from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
     from dorothie_gym.pictures.maps.shapes import Shape
 
 BORDER = 80.0
@@ -55,9 +54,9 @@ def painted(shapes: Iterable[Shape]) -> tuple[Painted, ...]:
     )
 
 
-def town_sheets(town: Town) -> tuple[Sheet, ...]:
+def town_sheets(layers: MapLayers) -> tuple[Sheet, ...]:
     """Returns the sheets of a town: the ground, the bridges level by level, and the tunnels if there are any."""
-    layers = MapLayers(town, scale=MAP_SCALE, border=BORDER)
+    town, layers = layers.town, layers.at_scale(MAP_SCALE, BORDER)
     x0, y0, x1, y1 = town_bounds(town, BORDER)
     ground = painted(layers.ground_shapes() if layers.bridge_levels else layers.shapes)
     if layers.bridge_levels:

@@ -29,14 +29,14 @@ from dorothie_gym.pictures.camera.ground.surface import add_faces, add_sheet, fi
 from dorothie_gym.pictures.camera.mesh import MeshBuilder
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.town import Town
+    from dorothie_gym.pictures.maps.map_layers import MapLayers
 
 _SLIVER = 0.05  # [m] width
 
 
-def build_ground(town: Town) -> Ground:
+def build_ground(layers: MapLayers) -> Ground:
     """Returns the ground of a town, out to the horizon."""
-    sheets = town_sheets(town)
+    town, sheets = layers.town, town_sheets(layers)
     arrays = ground_arrays(sheets)
     stretches = [part for sheet in sheets for part in sheet.stretches]
     field = HeightField(town, stretches)

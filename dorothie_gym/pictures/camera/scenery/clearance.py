@@ -90,8 +90,7 @@ class Clearance:
         self.blocks = shapely.STRtree(
             [shapely.Polygon(s.points).buffer(0.0) for s in drawn if s.colour == palette.BLOCK]
         )
-        self.views = shapely.STRtree([])
-        """Ground between drivers and the lights and boards that are for them, see `keep_views`."""
+        self._views: list[shapely.Polygon] = []
         ground = [shape for shape in drawn if shape.colour not in _NOT_GROUND]
         self._ground = shapely.STRtree([shapely.Polygon(shape.points) for shape in ground])
         self._paved = np.array([shape.colour in _ASPHALT for shape in ground], dtype=bool)
@@ -114,7 +113,13 @@ class Clearance:
 
     def keep_views(self, views: Sequence[shapely.Polygon]) -> None:
         """Adds ground that buildings must leave free, so that lights and boards are seen."""
-        self.views = shapely.STRtree([*self.views.geometries, *views])
+        self._views += views
+        self.__dict__.pop("views", None)
+
+    @cached_property
+    def views(self) -> shapely.STRtree:
+        """Ground between drivers and the lights and boards that are for them, see `keep_views`."""
+        return shapely.STRtree(self._views)
 
     def has_room(self, x: float, y: float, radius: float) -> bool:
         """Returns whether a post of a radius [m] stands on no lane, and not on other asphalt such as a lay-by."""

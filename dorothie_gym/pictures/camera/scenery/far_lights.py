@@ -40,6 +40,7 @@ _WAIST = 0.62  # [m] from a line of sight to other lights, which are 0.74 m wide
 _ASIDE = 0.6  # cost of a metre to the side, in metres ahead
 _TREES = (palette.TREE, palette.COUNTRY_TREE, palette.MEDIAN_TREE)
 _READ = 0.5  # least cosine between the direction of a light and that of the driver who sees it
+_CHUNK = 400  # places that are examined at once
 _TRIED = 60  # places whose ground is looked at
 
 
@@ -131,9 +132,15 @@ class FarSides:
         order = np.argsort(ahead + _ASIDE * np.abs(aside - 2.0 * side), kind="stable")
         c, s = pm.cos(eye.heading), pm.sin(eye.heading)
         points = np.column_stack((eye.x + ahead * c - aside * s, eye.y + ahead * s + aside * c))[order]
-        points = points[self._has_room(points, np.array(others).reshape(-1, 2))]
-        kept = points[self.sees(eye, points, others)][:_TRIED]
-        yield from ((x, y) for x, y in kept.tolist())
+        left, taken = _TRIED, np.array(others).reshape(-1, 2)
+        for first in range(0, len(points), _CHUNK):
+            some = points[first : first + _CHUNK]
+            some = some[self._has_room(some, taken)]
+            some = some[self.sees(eye, some, others)][:left]
+            yield from ((x, y) for x, y in some.tolist())
+            left -= len(some)
+            if left == 0:
+                return
 
     def _has_room(self, points: Array, others: Array) -> NDArray[np.bool_]:
         """Returns which places (n, 2) [m] are at a kerb, off roads, crosswalks and parapets, and not at a post."""

@@ -176,10 +176,11 @@ def _first_apart(boards: Iterator[Board], others: list[Board]) -> Board | None:
 
 
 def _apart(board: Board, other: Board) -> float:
-    """Returns the distance of two boards at the same height for the same drivers [m], otherwise infinity."""
-    facing = pm.cos(board.look) * pm.cos(other.look) + pm.sin(board.look) * pm.sin(other.look) > 0.5
-    alike = facing and (board.post is None) == (other.post is None)
-    return pm.dist(board.at, other.at) if alike else math.inf
+    """Returns the distance of two boards at the same height for the same drivers [m]; far apart, infinity."""
+    away = pm.dist(board.at, other.at)
+    if away > _SAME_DRIVERS or (board.post is None) != (other.post is None):
+        return math.inf
+    return away if pm.cos(board.look - other.look) > 0.5 else math.inf
 
 
 def _view_of(board: Board) -> shapely.Polygon:

@@ -103,7 +103,7 @@ def test_materials_around_a_point_are_those_of_the_corners(seed: int, count: int
 @pytest.mark.parametrize("name", ["brookside", "midtown", "Town01", pytest.param("Town05", marks=pytest.mark.slow)])
 def test_ground_of_a_town_is_what_its_map_shows(name: str) -> None:
     town = load_town(name if name in town_names() else str(shared_map(name)))
-    sheets = town_sheets(town)
+    sheets = town_sheets(MapLayers(town))
     ground = ground_arrays(sheets)
     layers = MapLayers(town, scale=MAP_SCALE)
     shapes = [shape for shape in layers.shapes if shape.colour not in SYMBOLS]
@@ -177,7 +177,7 @@ def test_edge_of_paint_is_blended_over_the_footprint_of_a_pixel() -> None:
 
 
 def test_beyond_the_map_lies_country_to_the_horizon() -> None:
-    ground = ground_arrays(town_sheets(load_town("brookside")))
+    ground = ground_arrays(town_sheets(MapLayers(load_town("brookside"))))
     far = np.array([[5000.0, 5000.0], [-3000.0, 100.0]])
     assert (found(ground, far) == Material.COUNTRY).all()
     assert material_at(ground, 0, 1e7, -1e7) == Material.COUNTRY
@@ -186,7 +186,7 @@ def test_beyond_the_map_lies_country_to_the_horizon() -> None:
 
 
 def test_arrays_are_the_same_when_built_again() -> None:
-    first, second = (ground_arrays(town_sheets(load_town("brookside"))) for _ in range(2))
+    first, second = (ground_arrays(town_sheets(MapLayers(load_town("brookside")))) for _ in range(2))
     for name in GroundArrays._fields:
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes(), name
     assert first.nbytes < 8e6

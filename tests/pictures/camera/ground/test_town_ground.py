@@ -18,6 +18,7 @@ from dorothie_gym.pictures.camera.ground.town_ground import build_ground
 from dorothie_gym.pictures.camera.mesh import Mesh, Surface
 from dorothie_gym.pictures.maps.ground import town_bounds
 from dorothie_gym.pictures.maps.levels import LevelLookup, stretches
+from dorothie_gym.pictures.maps.map_layers import MapLayers
 from dorothie_gym.pictures.maps.shapes import TownSamples
 from tests.maps.opendrive_text import shared_map
 
@@ -30,7 +31,7 @@ def town_of(name: str) -> Town:
 
 @cache
 def ground_of(name: str) -> Ground:
-    return build_ground(town_of(name))
+    return build_ground(MapLayers(town_of(name)))
 
 
 def distances(mesh: Mesh, origins: Array, ways: Array) -> Array:
@@ -184,7 +185,7 @@ def test_bridges_and_tunnels_are_sheets_of_their_own() -> None:
 
 
 def test_ground_is_the_same_when_built_again() -> None:
-    first, second = ground_of("brookside"), build_ground(town_of("brookside"))
+    first, second = ground_of("brookside"), build_ground(MapLayers(town_of("brookside")))
     for name in Mesh._fields:
         assert getattr(first.mesh, name).tobytes() == getattr(second.mesh, name).tobytes(), name
     for name in GroundArrays._fields:
