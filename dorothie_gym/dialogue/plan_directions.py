@@ -32,6 +32,31 @@ _HUGGING: Final = frozenset({"hug", "hugging"})
 _JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
 """Words between a lane and a direction that has nothing to do with it."""
 
+_SIDEWAYS: Final = frozenset(
+    [
+        *("move", "moving", "shift", "shifting", "slide", "sliding", "scoot", "scooting", "edge", "edging"),
+        *("drift", "drifting", "nudge", "ease", "inch", "scooch", "budge", "sidle", "hop", "squeeze"),
+        *("keep", "keeping", "stay", "staying", "stick", "sticking", "remain", "remaining"),
+    ]
+)
+"""Verbs by which the car goes or keeps to one side of its road, rather than turns."""
+
+_TO_SIDES: Final = frozenset({"to", "on", "in"})
+_STEERING: Final = frozenset({"go", "going", "swing", "pull", "steer", "come", "be", "get", "drive", "", ",", "and"})
+"""Words in front of a side to which the car is to go a little."""
+
+_LITTLE: Final = frozenset({"bit", "little", "touch", "tad", "smidge", "hair", "slightly"})
+_SLIGHT: Final = _LITTLE | {"a", "wee", "just", "some", "more", "over", "across", "further"}
+"""Words that tell how far the car is to go to a side: "a little more"."""
+
+_SHIFTED: Final = frozenset(
+    [
+        *("", ",", "?", "and", "then", "please", "now", "when", "if", "once", "before", "until", "till", "for"),
+        *("past", "around", "round", "as", "so", "because", "we're", "again", "instead", "after"),
+    ]
+)
+"""Words behind a side to which the car is to go."""
+
 _LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
 _CHANGING: Final = frozenset({"change", "changing", "switch", "switching"})
 
@@ -130,7 +155,28 @@ class DirectionReader(TokenReader):
         if self._is_other_lane(begin, place):
             self.items.append(LaneItem(found.direction))
             return place + (self.word_at(place) == "one")
-        return None
+        aside = self._aside(found)
+        if aside is not None:
+            self.items.append(LaneItem(found.direction))
+        return aside
+
+    def _aside(self, found: _Phrase) -> int | None:
+        """Returns the token behind a side to which the car is to move or keep: "move left a little"; None if it turns."""
+        begin, end, preposition = found.begin, found.place, found.preposition
+        if not preposition and self.word_at(begin - 1) in _TO_SIDES and self.word_at(begin - 2) in _SIDEWAYS:
+            begin, preposition = begin - 1, self.word_at(begin - 1)  # "keep to" has been read already
+        if found.hand or found.ordinal is not None or found.several or preposition not in ("", *_TO_SIDES):
+            return None
+        while self.word_at(begin - 1) in _SLIGHT:
+            begin -= 1
+        while self.word_at(end) in _SLIGHT:
+            end += 1
+        verb, near = self.word_at(begin - 1), {*self.words[begin : found.begin], *self.words[found.place : end]}
+        slightly = not _LITTLE.isdisjoint(near) and preposition in ("", "to")
+        if not (verb in _SIDEWAYS or (slightly and verb in _STEERING)):
+            return None
+        here = self.word_at(end) == "here" and (preposition != "" or found.direction is Direction.LEFT)
+        return end if here or self.word_at(end) in _SHIFTED else None
 
     def _turn_or_side(self, found: _Phrase) -> int:
         """Reads a turn or a side of the street; returns the token behind it."""
