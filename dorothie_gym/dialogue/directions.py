@@ -99,7 +99,9 @@ def word_lists() -> WordLists:
     return WordLists(**{name: frozenset(strings(f"cues.yaml: {name}", words)) for name, words in lists.items()})
 
 
-_KEEPING = frozenset({"keep", "keeping", "stay", "staying", "move", "moving", "stick", "sit", "hold", "wait", "park", "stop"})
+_KEEPING = frozenset(
+    {"keep", "keeping", "stay", "staying", "move", "moving", "stick", "sit", "hold", "wait", "park", "stop"}
+)
 _PLACED = frozenset(
     ["on", "along", "behind", "where", "here", "there", "up", "past", "by", "beside", "next", "outside", "opposite"]
 )

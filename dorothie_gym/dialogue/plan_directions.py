@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from dorothie_gym.dialogue.plan_items import SIDES, ActionItem, LaneItem, SideItem, TokenReader, TurnItem
+from dorothie_gym.dialogue.plan_items import (
+    PLURAL_SIDES,
+    SIDES,
+    ActionItem,
+    BoundaryItem,
+    LaneItem,
+    SideItem,
+    TokenReader,
+    TurnItem,
+)
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ObjectClass
 
@@ -14,6 +23,9 @@ if TYPE_CHECKING:
 _SIDE_WORDS: Final = frozenset({"on", "at", "to", "in", "into", "onto", "along", "down"})
 _BESIDE: Final = frozenset({"on", "at", "along", "down"})
 _DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
+_MORE: Final = frozenset({"more", "further", "straight", "consecutive", "easy"})
+"""Words between a number of turns and their side: "two more rights"."""
+
 _EDGES: Final = frozenset({"side", "side's", "kerb", "curb", "edge"})
 """Nouns that make left and right a side of the street."""
 
@@ -112,12 +124,12 @@ class DirectionReader(TokenReader):
             place += 1
         if ordinal is None:
             ordinal, place = self.ordinal(place)
-        while self.word_at(place) in _DEGREES:
+        while self.word_at(place) in _DEGREES or (ordinal is not None and self.word_at(place) in _MORE):
             place += 1
         direction = SIDES.get(self.word_at(place))
         if direction is None:
             return None
-        several = self.word_at(place) in ("lefts", "rights")
+        several = self.word_at(place) in PLURAL_SIDES
         place += 1
         if ordinal is None and self.word_at(place) == "after" and self.word_at(place + 1) in ("next", "this"):
             ordinal, place = 2, place + 2  # "the left after next"
@@ -161,7 +173,7 @@ class DirectionReader(TokenReader):
         return aside
 
     def _aside(self, found: _Phrase) -> int | None:
-        """Returns the token behind a side to which the car is to move or keep: "move left a little"; None if it turns."""
+        """Returns the token behind a side to which the car is to move or keep: "move left a bit"; None if it turns."""
         begin, end, preposition = found.begin, found.place, found.preposition
         if not preposition and self.word_at(begin - 1) in _TO_SIDES and self.word_at(begin - 2) in _SIDEWAYS:
             begin, preposition = begin - 1, self.word_at(begin - 1)  # "keep to" has been read already
@@ -194,9 +206,19 @@ class DirectionReader(TokenReader):
             stated = before.endswith("'s") or before in _BEING or found.begin - 1 in self.contracted
             self.items.append(SideItem(found.direction, stated))
         else:
-            count = found.ordinal or 1 if found.several else 1
+            count, place = (found.ordinal or 1, place) if found.several else self._times(place)
+            last = self.items[-1] if self.items else None
+            if self.word_at(place - 1) == "again" and isinstance(last, BoundaryItem) and last.kind == ",":
+                self.items[-1] = BoundaryItem("then", last.place)  # "left, left again"
             self.items.append(TurnItem(found.direction, None if found.several else found.ordinal, min(count, 4)))
         return place
+
+    def _times(self, place: int) -> tuple[int, int]:
+        """Returns how often a turn is to be taken, and the token behind it: "right twice", "left three times"."""
+        if self.word_at(place) == "twice":
+            return 2, place + 1
+        number, behind = self.ordinal(place)
+        return (number, behind + 1) if number and self.word_at(behind) == "times" else (1, place)
 
     def _is_other_lane(self, begin: int, place: int) -> bool:
         """Returns whether a side tells one of the lanes spoken of: "switch lanes, the right one"."""

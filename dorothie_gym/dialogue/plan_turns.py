@@ -87,6 +87,7 @@ class TurnReader(PlanState):
         if frame.action is StepAction.TURN and frame.direction is None:
             frame.direction = item.direction
             frame.ordinal = frame.ordinal or item.ordinal
+            self._repeat(item)
             return True
         if frame.action is StepAction.U_TURN:
             return True
@@ -167,8 +168,11 @@ class TurnReader(PlanState):
         return True
 
     def _repeat(self, item: TurnItem) -> None:
+        """Adds the other turns of a number of them; what follows is about the first: "two lefts after the KFC"."""
+        first = self.frame
         for _ in range(item.times - 1):
             self.open_step(StepAction.TURN).direction = item.direction
+        self.frame = first
 
     def read_lane(self, item: LaneItem) -> None:
         """Reads a lane by its side."""
