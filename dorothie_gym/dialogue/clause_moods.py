@@ -28,6 +28,9 @@ _BASE_FORMS: Final = frozenset({"speed", "proceed", "need", "bring", "swing"})
 _ORDERED_LAST: Final = frozenset({"next", "first", "now", "please", "instead", "then"})
 """Last words of an errand without a verb."""
 
+_ORDERED_FIRST: Final = frozenset({"now", "so", "just", "then", "next", "instead", "back", "straight", "home"})
+"""First words of one behind a statement: "the party's off, now the Ikea"."""
+
 _LOCATING: Final = frozenset({"by", "next", "near", "close", "beside", "opposite", "just"})
 """First words of phrases that tell where something stands."""
 
@@ -231,7 +234,7 @@ class ClauseReader:
         """Returns whether a clause goes on with nothing but a name: "it's on the left, the Panera, stop there"."""
         grammar, words = route_grammar(), self.words
         end = next((number for number in range(place, len(words)) if words[number] in (",", "?")), len(words))
-        if words[end - 1] in _ORDERED_LAST:
+        if words[end - 1] in _ORDERED_LAST or not _ORDERED_FIRST.isdisjoint(words[place : place + 1]):
             return False  # "that's the Coco ticked off, the KFC next"
         named = any(words[number].startswith("#") for number in range(place, end))
         quiet = all(

@@ -30,6 +30,9 @@ _HESITATIONS = frozenset({"uh", "er", "erm", "um", "hm", "hmm"})
 _ASKING = (["do"], ["did"], ["d'you"], ["don't"], ["didn't"], ["if"])
 """Words in front of a "you know" that asks."""
 
+_FEW = 4
+"""Most words of an errand without a verb."""
+
 _NAMES_FILE = "15_names.talk"
 _PERSON = "#person"
 _OR_NOT = (["or", "no"], ["or", "not"], ["or", "what"])
@@ -115,13 +118,20 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
     while place < len(words):
         match = fillers.longest(words, place)
         knows = match is not None and words[place] == "you" and kept[-1:] in _ASKING
-        if match is None or knows:
+        if match is None or knows or _asks_for_name(kept, words[place:]):
             kept.append(words[place])
             match = None
         elif words[place] in _HESITATIONS and _counts_again(kept, words[place + match.length :]):
             kept.append("sorry")
         place += 1 if match is None else match.length
     return without_asides(kept, lists) if kept else words
+
+
+def _asks_for_name(before: Sequence[str], behind: Sequence[str]) -> bool:
+    """Returns whether a "please" stands behind a few words of their own, and orders what they name: "..., home please"."""
+    if behind[0] != "please" or behind[1:2] not in ([], [","], ["?"]) or "," not in before:
+        return False
+    return 1 <= before[::-1].index(",") <= _FEW
 
 
 def _counts_again(before: Sequence[str], behind: Sequence[str]) -> bool:
