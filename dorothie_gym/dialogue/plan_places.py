@@ -28,23 +28,16 @@ _INITIAL: Final = frozenset(
 )
 """Verbs whose object can be an opportunity to turn: "take the second"."""
 
-FETCHING: Final = frozenset(
-    {
-        "fetch",
-        "fetching",
-        "grab",
-        "grabbing",
-        "meet",
-        "meeting",
-        "collect",
-        "collecting",
-        "pick",
-        "picking",
-        "after",
-        "once",
-    }
+_FETCHING: Final = frozenset(
+    [
+        *("fetch", "fetching", "grab", "grabbing", "meet", "meeting", "collect"),
+        *("collecting", "pick", "picking", "scoop", "scooping", "after", "once"),
+    ]
 )
 """First words of phrases by which somebody is fetched."""
+
+_CALLING: Final = frozenset({"swing", "pop", "drop", "call", "come", "nip"})
+"""First words of phrases with a "for" by which somebody is fetched: "swing by for my brother"."""
 
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
 """Relations of an errand to another place than its own."""
@@ -317,7 +310,7 @@ class PlaceReader(PlanState):
                 frame.relation, frame.at = ConditionRelation.FROM, place
         elif frame.word in ("grab", "grabbing", "hit") and _names_only_street(place):
             frame.action, frame.place = StepAction.FOLLOW, place
-        elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
+        elif fetches(frame) and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
         elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
             frame.action = StepAction.LANE  # "go round this bus"
@@ -497,3 +490,8 @@ class PlaceReader(PlanState):
 
 def _names_only_street(place: PlaceReference) -> bool:
     return place.to_json().keys() == {"street"}
+
+
+def fetches(frame: Frame) -> bool:
+    """Returns whether the words of an errand may mean that somebody is to be fetched."""
+    return frame.word in _FETCHING or (frame.last == "for" and frame.word in _CALLING)
