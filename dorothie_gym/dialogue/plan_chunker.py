@@ -29,7 +29,7 @@ from dorothie_gym.dialogue.plan_items import (
 from dorothie_gym.dialogue.plan_nouns import NounReader, begins_noun_phrase
 from dorothie_gym.dialogue.plan_quantities import QuantityReader, begins_quantity
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
-from dorothie_gym.dialogue.routes import ConditionRelation
+from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
 
 _BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "got", "with", "see", "need", "want"})
@@ -93,10 +93,16 @@ _IN_VIEW: Final = (
     "is ahead",
 )
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
-_LEAVING: Final = frozenset({*_WORDY, "until", "till", "til"})
+_LEAVING: Final = frozenset({*_WORDY, "until", "till", "til", "before"})
 """First words of a relation to an object that leaves: "wait until that truck's gone"."""
 _COMING: Final = frozenset({"if", "when", "once", "as", "soon"})
 _TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
+_LASTING: Final = frozenset({"for", "this", "that", "the", "those", "these"})
+"""Words behind an order to wait, or to let pass, in front of what the car waits for."""
+_CHANGING: Final = frozenset(
+    {ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.DYNAMIC}
+)
+"""Objects that move on or change, so that one waits for them."""
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _INFINITIVES: Final = frozenset(
     {"take", "make", "get", "go", "drive", "do", "have", "keep", "be", "swing", "pull", "head", "move"}
@@ -216,6 +222,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         if self.word_at(place - 1) == "why" and self.words[place] in ("don't", "dont", "not"):
             return place + 1 + (self.word_at(place + 1) in ("you", "we", "ye"))  # "why don't you turn left"
         end = place + match.length
+        if match.kind == "advance" and self.words[place] == "before" and end in self.names:
+            match = Match("relations", "before", 1)  # "before that bus"
         if match.group == "relations":
             return self._condition(match, place)
         if self.words[place] == "so" and match.length == 1 and self.word_at(end) in _ADJECTIVES:
@@ -308,6 +316,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return "speed"  # "the limit is thirty, stick to it"
         if match.kind == "lane" and self._visits(place, end):
             return "visit"  # "let's get over there"
+        if match.kind == "u_turn" and self.words[end - 1] == "back" and self._goes_same_way(end):
+            return "follow"  # "take us back along the roads we used"
         if match.kind == "slower" and isinstance(self.names.get(end), StreetName):
             if self.words[end - 1] == "down":
                 return "follow"  # "take us down Hubbard"
@@ -315,6 +325,12 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         if match.kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
             return "stop"  # "that's where I get off", not "get off the highway"
         return f"lights_{match.kind}" if match.group == "lights" else match.kind
+
+    def _goes_same_way(self, place: int) -> bool:
+        """Returns whether the way of the drive so far is named, behind a preposition."""
+        found, _ = self.noun_phrase(place + (self.word_at(place) in ("along", "by", "on", "via", "over")))
+        named = None if found is None or found.reference is None else found.reference.reference
+        return named is Anaphor.WAY_WE_CAME and self.word_at(place) in ("along", "by", "on", "via", "over")
 
     def _keeps_speed(self, place: int, end: int) -> bool:
         """Returns whether "keep to it" is about a speed that has been named."""
@@ -406,7 +422,9 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         if self.words[place] in _LEAVING and found.reference is not None and found.reference.object is not None:
             left = self.grammar.leaving.longest(self.words, behind) if self.word_at(behind) else None
             if left is not None:  # "when this lorry is gone"
-                relation, behind = ConditionRelation.AFTER, behind + left.length
+                lasts = relation in (ConditionRelation.UNTIL, ConditionRelation.BEFORE)
+                relation = ConditionRelation.UNTIL if lasts else ConditionRelation.AFTER
+                behind += left.length
         return relation, behind
 
     def _pronoun(self, match: Match, place: int) -> int:
@@ -443,11 +461,11 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         found, behind = self.noun_phrase(place)
         if found is None:
             return place
-        if self.word_at(place - 1) == "for" and self._waits() and found.reference is not None:
+        if self.word_at(place - 1) in _LASTING and self._waits() and found.reference is not None:
             left = self.grammar.leaving.longest(self.words, behind)
-            if left is not None:
+            if left is not None or found.reference.object in _CHANGING:
                 self.items.append(ConditionItem(ConditionRelation.UNTIL, found))  # "wait for that truck to move"
-                return behind + left.length
+                return behind + (0 if left is None else left.length)
         self.items.append(found)
         return behind
 

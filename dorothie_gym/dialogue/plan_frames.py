@@ -173,7 +173,8 @@ class PlanState:
 
     def _complete(self, frame: Frame) -> None:
         """Gives a step whose clause has ended the action that its parts tell."""
-        if frame.action is None and frame.verb == "go" and frame.ends:
+        moves = frame.verb == "go" or (frame.verb in _STARTING and frame.joint == "then")  # "wait, then drive"
+        if frame.action is None and moves and frame.ends:
             frame.action = StepAction.GO
         if frame.negated and frame.forbidden and (frame.action is StepAction.GO or frame.starts):
             frame.action, frame.negated = StepAction.WAIT, False  # "don't go until the lights let you"

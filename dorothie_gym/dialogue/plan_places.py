@@ -317,6 +317,8 @@ class PlaceReader(PlanState):
                 frame.relation, frame.at = ConditionRelation.FROM, place
         elif frame.word in ("grab", "grabbing", "hit") and _names_only_street(place):
             frame.action, frame.place = StepAction.FOLLOW, place
+        elif frame.action is StepAction.VISIT and place.reference is Anaphor.WAY_WE_CAME:
+            frame.action, frame.place = StepAction.FOLLOW, place  # "return by the same way"
         elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
         elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
@@ -359,7 +361,7 @@ class PlaceReader(PlanState):
             if place.reference in (Anaphor.HERE, Anaphor.THERE) and self.frame is not None and self.frame.at is None:
                 self.frame.relation, self.frame.at = ConditionRelation.AT, self._resolved(place)
             elif place.reference is Anaphor.WAY_WE_CAME:
-                self.open_step(StepAction.FOLLOW).place = place
+                self._return_by(place)
             elif place.reference in (Anaphor.START, Anaphor.LAST_STOP):
                 self.open_step(StepAction.VISIT).place = place
             elif place.reference is not None:
@@ -375,6 +377,13 @@ class PlaceReader(PlanState):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _return_by(self, place: PlaceReference) -> None:
+        """Orders to follow the way so far, also to the place named before it: "go home the way we came"."""
+        visit = self.frame if self.frame is not None and not self.fresh else None
+        self.open_step(StepAction.FOLLOW).place = place
+        if visit is not None and visit.action is StepAction.VISIT and visit.place is not None:
+            self.frames[-2:] = [self.frames[-1], visit]
 
     def _passes_on(self, place: PlaceReference) -> bool:
         """Goes on past a second place: "past the Burger King and the Shell"."""
