@@ -28,6 +28,9 @@ _BASE_FORMS: Final = frozenset({"speed", "proceed", "need", "bring", "swing"})
 _ORDERED_LAST: Final = frozenset({"next", "first", "now", "please", "instead", "then"})
 """Last words of an errand without a verb."""
 
+_ORDERED_FIRST: Final = frozenset({"now", "so", "just", "then", "next", "instead", "back", "straight", "home"})
+"""First words of one behind a statement: "the party's off, now the Ikea"."""
+
 _LOCATING: Final = frozenset({"by", "next", "near", "close", "beside", "opposite", "just"})
 """First words of phrases that tell where something stands."""
 
@@ -43,6 +46,20 @@ _ENOUGH: Final = frozenset({"plenty", "enough", "ample", "tops", "max", "maximum
 _LISTING: Final = (["it's"], ["that's"], ["we've"], ["there's"])
 _PLAINLY: Final = frozenset({"just", "simply", "then", "now", "also", "first", "next", "always", "basically"})
 """Adverbs behind "you" of a way that is told."""
+
+_SIDES: Final = frozenset({"left", "right", "lefts", "rights"})
+_SETTING_OUT: Final = frozenset(
+    {"just", "off", "going", "gonna", "to", "here", "out", "also", "first", "now", "only", "meant"}
+)
+"""Words between "we're" and what one is about to do."""
+
+_FETCHING: Final = frozenset(
+    [
+        *("fetch", "fetching", "grab", "grabbing", "collect", "collecting", "pick", "picking", "meet", "meeting"),
+        *("scoop", "scooping"),
+    ]
+)
+"""Verbs by which somebody is fetched; a "get" of people is read as one of them."""
 
 _SHORT_VERB: Final = 3
 _NO_VERBS: Final = frozenset(
@@ -116,8 +133,8 @@ class ClauseReader:
         found = mood_of(self.words, place)
         if found in (None, ClauseMood.STATEMENT) and self._tells_to_act(self._behind_soft(place)):
             return ClauseMood.REQUEST  # "you just slow down a bit"
-        if found is ClauseMood.STATEMENT and self._advises(place):
-            return ClauseMood.REQUEST  # "I'd get in the other lane if I were you"
+        if found is ClauseMood.STATEMENT and (self._advises(place) or self._fetches(self._behind_soft(place))):
+            return ClauseMood.REQUEST  # "I'd get in the other lane if I were you"; "we're getting Nana"
         if found is ClauseMood.QUESTION and new and not self.question and self._conditions(place):
             found = None  # "where Plymouth meets Draper take a right"
         word = self.words[place] if place < len(self.words) else ""
@@ -142,6 +159,18 @@ class ClauseReader:
             place += 1
         match = route_grammar().terminals.longest(words, place) if place > begin + 1 and place < len(words) else None
         return match is not None and match.group in ("actions", "lights") and not words[place].endswith(("ed", "ing"))
+
+    def _fetches(self, place: int) -> bool:
+        """Returns whether a clause tells that somebody is to be fetched now: "we're picking up my brother"."""
+        words = self.words
+        if words[place : place + 1] not in (["i'm"], ["we're"]):
+            return False
+        place += 1
+        while place < len(words) and words[place] in _SETTING_OUT:
+            place += 1
+        if place >= len(words) or words[place] not in _FETCHING:
+            return False
+        return not route_grammar().people.isdisjoint(words[place + 1 : place + 4])
 
     def _advises(self, place: int) -> bool:
         """Returns whether a clause tells what the speaker would do in the driver's place."""
@@ -205,7 +234,7 @@ class ClauseReader:
         """Returns whether a clause goes on with nothing but a name: "it's on the left, the Panera, stop there"."""
         grammar, words = route_grammar(), self.words
         end = next((number for number in range(place, len(words)) if words[number] in (",", "?")), len(words))
-        if words[end - 1] in _ORDERED_LAST:
+        if words[end - 1] in _ORDERED_LAST or not _ORDERED_FIRST.isdisjoint(words[place : place + 1]):
             return False  # "that's the Coco ticked off, the KFC next"
         named = any(words[number].startswith("#") for number in range(place, end))
         quiet = all(
@@ -237,7 +266,7 @@ class ClauseReader:
             return False
         for number in range(place, min(place + _SUBJECT_WORDS, len(words))):
             word = words[number]
-            if word in (",", "then") or (word in ("left", "right") and words[number + 1 : number + 2] != ["lane"]):
+            if word in (",", "then") or (word in _SIDES and words[number + 1 : number + 2] != ["lane"]):
                 return False
             if self._is_finite(number, place):
                 return _ENOUGH.isdisjoint(words[number + 1 : number + 3])

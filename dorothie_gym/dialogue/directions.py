@@ -99,6 +99,15 @@ def word_lists() -> WordLists:
     return WordLists(**{name: frozenset(strings(f"cues.yaml: {name}", words)) for name, words in lists.items()})
 
 
+_KEEPING = frozenset(
+    {"keep", "keeping", "stay", "staying", "move", "moving", "stick", "sit", "hold", "wait", "park", "stop"}
+)
+_PLACED = frozenset(
+    ["on", "along", "behind", "where", "here", "there", "up", "past", "by", "beside", "next", "outside", "opposite"]
+)
+"""Words behind a "right" that only stresses them."""
+
+
 def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
     """Returns the words with each non-directional "left" or "right" replaced by "#left", "#ok" or "#tag"."""
     masked = list(words)
@@ -147,6 +156,8 @@ def _remains(words: Sequence[str], place: int) -> bool:
 def _right(before: str, after: str, following: str, place: int, lists: WordLists) -> str:
     if after in _SIDED and following != "?":
         return "right"
+    if before in _KEEPING and after in _PLACED:
+        return "#ok"  # "stay right where you are"
     if after == "?" and place > 0 and before != "all" and (before == "," or before not in lists.turning):
         return "#tag"
     if after == "now" and before in ("going", "driving", "doing"):

@@ -92,6 +92,11 @@ _ALREADY: Final = re.compile(
 )
 """Words of an errand that is done: "we did the Shell already"."""
 
+_ARRIVING: Final = re.compile(
+    r"\b(?:and|then|,) (?:then )?(?:we|you|i)(?:'re|'ll be| are| will be|'m) (?:home|done|finished)\b"
+)
+"""End of a way that is told: "two lefts and we're home"."""
+
 _LEFT_OVER: Final = re.compile(
     r"\b(?:still|only|just|got|there's|what's|is|are|have)\b"
     r".*(?<!your )(?<!the )(?<!my )(?<!our )(?<!\ba )\bleft(?= now| to do| then|$)"
@@ -110,6 +115,8 @@ def meant_values(
         spoken: the words, in lower case.
     """
     found = [value for value in named if not _is_misled(value, spoken)]
+    if parse.plan.steps and _ARRIVING.search(spoken):
+        found = [value for value in found if value not in (GoalStatus.COMPLETE, LandmarkName.HOUSE)]
     if parse.person or _FETCHED.search(spoken):
         found = [value for value in found if value is not ObjectClass.PEDESTRIAN]
         found.append(LandmarkName.PERSON)

@@ -54,6 +54,13 @@ _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\bl
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
 _BIT = r"(a|just a|a wee|another) (bit|little|touch|tad|hair)"
 _HEARING = re.compile(r"\b(hear me|(there|listening|with me|come through) \?)")
+_MISHEARD = (
+    (re.compile(r"^(?:so |to |due |dew |too |the |and )?(?=you\b)"), "do "),
+    (re.compile(r"^(?:or|our|her|hour) (?=(?:we|you|they)\b)"), "are "),
+    (re.compile(r"^(?:his|as|ease|it's) (?=(?:it|this|that|there|the)\b)"), "is "),
+)
+"""First words of questions as recognisers hear them, and what was said."""
+
 _FURTHER = re.compile(
     rf"\b({_BIT} (more|further|farther|forward|closer|ahead|longer)|(some|few) more"
     rf"|(going|go|roll|rolling|move|forward|up|ahead|on|inch|creep) {_BIT}(?! \w+er\b)"
@@ -235,7 +242,7 @@ def understand(text: str) -> ParsedText:
         further=_FURTHER.search(joined) is not None,
         affirms=_affirms(words, lists),
         question="?" in words,
-        asked=_first("questions", "asks", masked),
+        asked=_asked(masked),
         about_hearing="?" in words and _HEARING.search(spoken) is not None,
         told=_first("statements", "says", _stated(masked))
         or (None if masked == spoken else _first("statements", "says", _stated(spoken))),
@@ -248,6 +255,21 @@ def _stated(text: str) -> str:
     """Returns the words before a question in the same breath: "it's foggy" of "it's foggy, shall I slow down?"."""
     head, mark, _ = text.rpartition("?")
     return head[: max(head.rfind(","), head.rfind("."), 0)] if mark else text
+
+
+def _asked(masked: str) -> Proposition | None:
+    """Returns the proposition of a question; also where a recogniser has lost its first word: "so you see anything?"."""
+    found = _first("questions", "asks", masked)
+    if found is not None or "?" not in masked:
+        return found
+    return next(
+        (
+            _first("questions", "asks", words.sub(begin, masked, count=1))
+            for words, begin in _MISHEARD
+            if words.match(masked)
+        ),
+        None,
+    )
 
 
 def _unretracted(mentions: list[Mention], words: Sequence[str], joined: str) -> list[Mention]:

@@ -36,22 +36,10 @@ _BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "
 """Words behind which "no" says that there is none, and corrects nothing."""
 _ADJECTIVES: Final = frozenset({"fast", "slow", "quick", "quickly", "slowly", "far", "much", "hard", "close", "early"})
 _STATES: Final = frozenset(
-    {
-        "start",
-        "starts",
-        "begin",
-        "begins",
-        "end",
-        "ends",
-        "is",
-        "are",
-        "stands",
-        "lies",
-        "finishes",
-        "stops",
-        "parked",
-        "over",
-    }
+    [
+        *("start", "starts", "begin", "begins", "end", "ends", "is"),
+        *("are", "stands", "lies", "finishes", "stops", "parked", "over"),
+    ]
 )
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
@@ -68,30 +56,11 @@ _STATED: Final = frozenset({"it's", "that's", "is", "are", "was", "it'd", "gets"
 _TELLING: Final = frozenset({"to", "if", "than", "down", "via", "along", "through", "on", "that", "going", "by", "way"})
 _PRONOUNS: Final = frozenset({"it", "that", "those", "them", "this", "these", "him", "her"})
 _IN_VIEW: Final = (
-    "comes into view",
-    "comes into sight",
-    "come into view",
-    "comes in sight",
-    "appears",
-    "pops up",
-    "shows up",
-    "in view",
-    "in sight",
-    "comes up",
-    "comes along",
-    "comes on",
-    "turns up",
-    "pops into view",
-    "pops out",
-    "looms",
-    "is visible",
-    "becomes visible",
-    "is in sight",
-    "is in view",
-    "are in sight",
-    "is coming up",
+    "comes into view", "comes into sight", "come into view", "comes in sight", "appears", "pops up", "shows up",
+    "in view", "in sight", "comes up", "comes along", "comes on", "turns up", "pops into view", "pops out",
+    "looms", "is visible", "becomes visible", "is in sight", "is in view", "are in sight", "is coming up",
     "is ahead",
-)
+)  # fmt: skip
 _WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
 _LEAVING: Final = frozenset({*_WORDY, "until", "till", "til", "before"})
 """First words of a relation to an object that leaves: "wait until that truck's gone"."""
@@ -110,6 +79,9 @@ _INFINITIVES: Final = frozenset(
 _FURTHER: Final = frozenset({"further", "farther", "on", "along", "ahead"})
 _BEHIND_STOPS: Final = frozenset({"by", "at", "off", "in", "near", "opposite", "outside", "here", "there"})
 """Words behind a "stop" that is a verb."""
+
+_DEPARTING: Final = frozenset({"drop", "get", "move", "slow"})
+"""Verbs of changing the speed that are rarely used of driving somewhere."""
 
 _JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
 
@@ -294,6 +266,12 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
     def _item(self, match: Match, place: int) -> int:
         """Adds the item of a phrase; returns the token behind it."""
         end = place + match.length
+        if match.kind in ("slower", "faster") and (found := self._brought_to(place, end)) is not None:
+            visits = found.reference is not None and found.reference.landmark is not None
+            visits = visits or self.words[end - 2] not in ("up", "down")
+            end = end if visits else end - 2  # "up to the lights" tells how far
+            self.items.append(ActionItem("visit" if visits else "straight", place, end))
+            return end
         if match.kind == "accept" and self.words[place] == "follow" and self._has_place(end - 1):
             self.items.append(ActionItem("follow", place, place + 1))  # "follow that blue car"
             return place + 1
@@ -331,6 +309,14 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         found, _ = self.noun_phrase(place + (self.word_at(place) in ("along", "by", "on", "via", "over")))
         named = None if found is None or found.reference is None else found.reference.reference
         return named is Anaphor.WAY_WE_CAME and self.word_at(place) in ("along", "by", "on", "via", "over")
+
+    def _brought_to(self, place: int, end: int) -> NounPhrase | None:
+        """Returns the place to which words of changing the speed send the car: "bring her up to the lights"."""
+        if self.words[end - 1] != "to" or end >= len(self.words) or self._number(end)[0] is not None:
+            return None
+        found = self.noun_phrase(end)[0]
+        vague = found is not None and found.reference is None
+        return None if vague and self.words[place] in _DEPARTING else found
 
     def _keeps_speed(self, place: int, end: int) -> bool:
         """Returns whether "keep to it" is about a speed that has been named."""

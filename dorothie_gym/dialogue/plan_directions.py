@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from dorothie_gym.dialogue.plan_items import SIDES, ActionItem, LaneItem, SideItem, TokenReader, TurnItem
+from dorothie_gym.dialogue.plan_items import (
+    PLURAL_SIDES,
+    SIDES,
+    ActionItem,
+    BoundaryItem,
+    LaneItem,
+    SideItem,
+    TokenReader,
+    TurnItem,
+)
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ObjectClass
 
@@ -14,6 +23,9 @@ if TYPE_CHECKING:
 _SIDE_WORDS: Final = frozenset({"on", "at", "to", "in", "into", "onto", "along", "down"})
 _BESIDE: Final = frozenset({"on", "at", "along", "down"})
 _DEGREES: Final = frozenset({"immediate", "hard", "sharp", "far", "very", "available", "possible", "little", "quick"})
+_MORE: Final = frozenset({"more", "further", "straight", "consecutive", "easy"})
+"""Words between a number of turns and their side: "two more rights"."""
+
 _EDGES: Final = frozenset({"side", "side's", "kerb", "curb", "edge"})
 """Nouns that make left and right a side of the street."""
 
@@ -31,6 +43,31 @@ _OF_LANES: Final = frozenset({"lane", "lanes", "file"})
 _HUGGING: Final = frozenset({"hug", "hugging"})
 _JOINTS: Final = frozenset({",", "then", "and", "turn", "go", "take"})
 """Words between a lane and a direction that has nothing to do with it."""
+
+_SIDEWAYS: Final = frozenset(
+    [
+        *("move", "moving", "shift", "shifting", "slide", "sliding", "scoot", "scooting", "edge", "edging"),
+        *("drift", "drifting", "nudge", "ease", "inch", "scooch", "budge", "sidle", "hop", "squeeze"),
+        *("keep", "keeping", "stay", "staying", "stick", "sticking", "remain", "remaining"),
+    ]
+)
+"""Verbs by which the car goes or keeps to one side of its road, rather than turns."""
+
+_TO_SIDES: Final = frozenset({"to", "on", "in"})
+_STEERING: Final = frozenset({"go", "going", "swing", "pull", "steer", "come", "be", "get", "drive", "", ",", "and"})
+"""Words in front of a side to which the car is to go a little."""
+
+_LITTLE: Final = frozenset({"bit", "little", "touch", "tad", "smidge", "hair", "slightly"})
+_SLIGHT: Final = _LITTLE | {"a", "wee", "just", "some", "more", "over", "across", "further"}
+"""Words that tell how far the car is to go to a side: "a little more"."""
+
+_SHIFTED: Final = frozenset(
+    [
+        *("", ",", "?", "and", "then", "please", "now", "when", "if", "once", "before", "until", "till", "for"),
+        *("past", "around", "round", "as", "so", "because", "we're", "again", "instead", "after"),
+    ]
+)
+"""Words behind a side to which the car is to go."""
 
 _LANE_NOUNS: Final = (["lane"], ["one"], ["other"])
 _CHANGING: Final = frozenset({"change", "changing", "switch", "switching"})
@@ -87,12 +124,12 @@ class DirectionReader(TokenReader):
             place += 1
         if ordinal is None:
             ordinal, place = self.ordinal(place)
-        while self.word_at(place) in _DEGREES:
+        while self.word_at(place) in _DEGREES or (ordinal is not None and self.word_at(place) in _MORE):
             place += 1
         direction = SIDES.get(self.word_at(place))
         if direction is None:
             return None
-        several = self.word_at(place) in ("lefts", "rights")
+        several = self.word_at(place) in PLURAL_SIDES
         place += 1
         if ordinal is None and self.word_at(place) == "after" and self.word_at(place + 1) in ("next", "this"):
             ordinal, place = 2, place + 2  # "the left after next"
@@ -130,7 +167,28 @@ class DirectionReader(TokenReader):
         if self._is_other_lane(begin, place):
             self.items.append(LaneItem(found.direction))
             return place + (self.word_at(place) == "one")
-        return None
+        aside = self._aside(found)
+        if aside is not None:
+            self.items.append(LaneItem(found.direction))
+        return aside
+
+    def _aside(self, found: _Phrase) -> int | None:
+        """Returns the token behind a side to which the car is to move or keep: "move left a bit"; None if it turns."""
+        begin, end, preposition = found.begin, found.place, found.preposition
+        if not preposition and self.word_at(begin - 1) in _TO_SIDES and self.word_at(begin - 2) in _SIDEWAYS:
+            begin, preposition = begin - 1, self.word_at(begin - 1)  # "keep to" has been read already
+        if found.hand or found.ordinal is not None or found.several or preposition not in ("", *_TO_SIDES):
+            return None
+        while self.word_at(begin - 1) in _SLIGHT:
+            begin -= 1
+        while self.word_at(end) in _SLIGHT:
+            end += 1
+        verb, near = self.word_at(begin - 1), {*self.words[begin : found.begin], *self.words[found.place : end]}
+        slightly = not _LITTLE.isdisjoint(near) and preposition in ("", "to")
+        if not (verb in _SIDEWAYS or (slightly and verb in _STEERING)):
+            return None
+        here = self.word_at(end) == "here" and (preposition != "" or found.direction is Direction.LEFT)
+        return end if here or self.word_at(end) in _SHIFTED else None
 
     def _turn_or_side(self, found: _Phrase) -> int:
         """Reads a turn or a side of the street; returns the token behind it."""
@@ -148,9 +206,19 @@ class DirectionReader(TokenReader):
             stated = before.endswith("'s") or before in _BEING or found.begin - 1 in self.contracted
             self.items.append(SideItem(found.direction, stated))
         else:
-            count = found.ordinal or 1 if found.several else 1
+            count, place = (found.ordinal or 1, place) if found.several else self._times(place)
+            last = self.items[-1] if self.items else None
+            if self.word_at(place - 1) == "again" and isinstance(last, BoundaryItem) and last.kind == ",":
+                self.items[-1] = BoundaryItem("then", last.place)  # "left, left again"
             self.items.append(TurnItem(found.direction, None if found.several else found.ordinal, min(count, 4)))
         return place
+
+    def _times(self, place: int) -> tuple[int, int]:
+        """Returns how often a turn is to be taken, and the token behind it: "right twice", "left three times"."""
+        if self.word_at(place) == "twice":
+            return 2, place + 1
+        number, behind = self.ordinal(place)
+        return (number, behind + 1) if number and self.word_at(behind) == "times" else (1, place)
 
     def _is_other_lane(self, begin: int, place: int) -> bool:
         """Returns whether a side tells one of the lanes spoken of: "switch lanes, the right one"."""

@@ -152,6 +152,13 @@ SIDES: Final[Mapping[str, Direction]] = {
 """Directions by their words."""
 
 
+PLURAL_SIDES: Final = frozenset({"lefts", "rights"})
+"""Directions that are counted: "two lefts"."""
+
+PAIRS: Final = frozenset({"couple", "pair"})
+"""Nouns that count two."""
+
+
 class TokenReader:
     """Tokens of a sentence, with the items found so far."""
 
@@ -174,6 +181,8 @@ class TokenReader:
         word = self.word_at(place).removesuffix("'s")
         counted = word == "following" and self.word_at(place - 1) in self.grammar.determiners
         number = 1 if counted else read_ordinal(word)
+        if word in PAIRS and self.word_at(place + 1) in ("of", "more", *PLURAL_SIDES):
+            return 2, place + 1 + (self.word_at(place + 1) not in PLURAL_SIDES)  # "a couple of lefts"
         if number is None and (word in NUMBER_WORDS or word[:1].isdigit()):
             counts = read_cardinals([word])
             number = counts[0] if counts and 2 <= counts[0] <= 9 else None
@@ -184,4 +193,4 @@ def begins_ordinal(word: str, grammar: RouteGrammar) -> bool:
     """Returns whether a word may begin what `TokenReader.ordinal` reads."""
     base = word.removesuffix("'s")
     counted = base == "following" or read_ordinal(base) is not None or base in NUMBER_WORDS or base[:1].isdigit()
-    return counted or word in grammar.determiners or word == "very"
+    return counted or word in grammar.determiners or word in ("very", *PAIRS)

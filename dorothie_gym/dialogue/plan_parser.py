@@ -26,7 +26,8 @@ from dorothie_gym.dialogue.plan_items import (
     VerbItem,
     WordItem,
 )
-from dorothie_gym.dialogue.plan_places import FETCHING, PlaceReader
+from dorothie_gym.dialogue.plan_places import PlaceReader, fetches
+from dorothie_gym.dialogue.plan_repetitions import RepetitionReader
 from dorothie_gym.dialogue.plan_speeds import SpeedReader
 from dorothie_gym.dialogue.plan_turns import TurnReader
 from dorothie_gym.dialogue.plan_waits import WaitReader
@@ -140,7 +141,7 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
+class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader, RepetitionReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:
@@ -449,7 +450,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
             if self.last_place is not None and frame.at is None:
                 frame.relation, frame.at = ConditionRelation.PAST, self.last_place
             return
-        if frame is not None and frame.action is StepAction.VISIT and frame.place is None and frame.word in FETCHING:
+        if frame is not None and frame.action is StepAction.VISIT and frame.place is None and fetches(frame):
             if item.word in route_grammar().people and not self.fresh:
                 self.fetch(frame)
             elif item.word not in route_grammar().modifiers:

@@ -1,4 +1,4 @@
-"""Places of driving plans: conditions, errands, streets to follow or avoid, and opportunities to turn."""
+"""Places of driving plans: conditions, errands, and streets to follow or avoid."""
 
 from __future__ import annotations
 
@@ -10,41 +10,27 @@ from dorothie_gym.dialogue.plan_frames import (
     FORBIDDING,
     NEEDING_PLACE,
     NEGATING,
-    PASSING,
-    REFUSING,
     Frame,
-    PlanState,
     Refusal,
     with_details,
 )
+from dorothie_gym.dialogue.plan_opportunities import OpportunityReader
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import ConditionItem, NounPhrase
 
-_INITIAL: Final = frozenset(
-    {"take", "makes", "make", "turn", "hang", "swing", "go", "want", "need", "have", "get", "be", "do"}
-)
-"""Verbs whose object can be an opportunity to turn: "take the second"."""
-
-FETCHING: Final = frozenset(
-    {
-        "fetch",
-        "fetching",
-        "grab",
-        "grabbing",
-        "meet",
-        "meeting",
-        "collect",
-        "collecting",
-        "pick",
-        "picking",
-        "after",
-        "once",
-    }
+_FETCHING: Final = frozenset(
+    [
+        *("fetch", "fetching", "grab", "grabbing", "meet", "meeting", "collect"),
+        *("collecting", "pick", "picking", "scoop", "scooping", "after", "once"),
+    ]
 )
 """First words of phrases by which somebody is fetched."""
+
+_CALLING: Final = frozenset({"swing", "pop", "drop", "call", "come", "nip"})
+"""First words of phrases with a "for" by which somebody is fetched: "swing by for my brother"."""
 
 _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, ConditionRelation.SEEN})
 """Relations of an errand to another place than its own."""
@@ -60,7 +46,7 @@ _ROUND: Final = frozenset({"round", "around", "past", "by"})
 """Last words of an order to get past another vehicle."""
 
 
-class PlaceReader(PlanState):
+class PlaceReader(OpportunityReader):
     """Reads the places of a plan."""
 
     def __init__(self) -> None:
@@ -68,7 +54,6 @@ class PlaceReader(PlanState):
         super().__init__()
         self.last_place: PlaceReference | None = None
         self.reaching: Frame | None = None  # step that ends at the next place: "down to" of "take Fuller down to"
-        self.opportunity = False  # whether a turning, a street or a junction has been mentioned
         self.person = False  # whether somebody is to be fetched
 
     def read_condition(self, item: ConditionItem) -> None:
@@ -248,7 +233,7 @@ class PlaceReader(PlanState):
         """Reads a place or an opportunity that no relation introduces."""
         place = item.reference
         if place is None:
-            self._refuse_or_follow(item)
+            self.read_opportunity(item)
             return
         if place.reference is None:
             self.last_place = place
@@ -319,7 +304,7 @@ class PlaceReader(PlanState):
             frame.action, frame.place = StepAction.FOLLOW, place
         elif frame.action is StepAction.VISIT and place.reference is Anaphor.WAY_WE_CAME:
             frame.action, frame.place = StepAction.FOLLOW, place  # "return by the same way"
-        elif frame.word in FETCHING and place.object is ObjectClass.PEDESTRIAN:
+        elif fetches(frame) and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
         elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
             frame.action = StepAction.LANE  # "go round this bus"
@@ -443,66 +428,11 @@ class PlaceReader(PlanState):
                     return True
         return False
 
-    def _refuse_or_follow(self, item: NounPhrase) -> None:
-        """Reads an opportunity, which may be refused, or counted from one that has been."""
-        passing = self.frame is not None and not self.fresh and self.frame.word in PASSING
-        if item.follows and self.refused is not None:
-            self.negation = None
-        if item.follows and self.follow_refused():
-            self.counting = self.opportunity = True
-            return
-        if item.ordinal is not None and self._counts_last(item):
-            return
-        if self.negation == "not" and self.pending.ordinal is not None and item.ordinal is not None:
-            self.negation = None  # "the second, not the first"
-            return
-        if self.negation in REFUSING or passing:
-            self.refused = Refusal(None, item.ordinal)
-        self._opportunity(item.ordinal, blocks=item.blocks)
-
-    def _counts_last(self, item: NounPhrase) -> bool:
-        """Returns whether a number behind a comma counts the turn before it: "the right turn, the first one"."""
-        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
-        if last is None or not self.fresh or self.joint != "," or item.blocks or self.negation is not None:
-            return False
-        apart = last.action is StepAction.TURN and last.direction is not None and last.ordinal is None
-        somewhere = last.at is not None and last.at.reference not in (Anaphor.HERE, Anaphor.THERE)
-        if not apart or somewhere or last.distance is not None or last.negated or self.repairing:
-            return False
-        last.ordinal, last.at = item.ordinal, None
-        return True
-
-    def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
-        self.counting = True
-        self.opportunity = self.opportunity or not blocks
-        if self.negation == "cancel" and ordinal is not None:
-            self.open_step(StepAction.TURN)  # "skip the next turn"
-            self.negation = None
-            return
-        if ordinal is None:
-            frame = self.frame
-            if frame is not None and not self.fresh and frame.action is StepAction.FOLLOW and frame.place is None:
-                frame.action = StepAction.STRAIGHT  # "stay on this road"
-            return
-        frame = self.replaced(StepAction.TURN)
-        if frame is None:
-            frame = self.frame if self.frame is not None and not self.fresh else None
-        turned = frame is not None and frame.action is StepAction.TURN and frame.direction is not None
-        if blocks and turned and self.mood in ORDERED:
-            self.open_step(StepAction.STRAIGHT).ordinal = ordinal  # "right at the KFC, two blocks, then left"
-        elif frame is not None and frame.action in (StepAction.TURN, StepAction.STOP):
-            frame.ordinal = ordinal if self.repaired or frame.ordinal is None else frame.ordinal
-        elif frame is not None and frame.action is None and frame.verb in _INITIAL and not blocks:
-            frame.action, frame.ordinal = StepAction.TURN, ordinal
-        elif frame is not None and frame.action is StepAction.STRAIGHT and frame.at is None:
-            frame.ordinal = ordinal  # "straight over two junctions"
-        elif blocks and frame is not None and frame.action is None:
-            frame.action, frame.ordinal = StepAction.STRAIGHT, ordinal
-        elif blocks and self.mood in ORDERED and self.pending.at is None:
-            self.open_step(StepAction.STRAIGHT).ordinal = ordinal  # "two blocks, then left"
-        else:
-            self.pending.ordinal = None if blocks else ordinal
-
 
 def _names_only_street(place: PlaceReference) -> bool:
     return place.to_json().keys() == {"street"}
+
+
+def fetches(frame: Frame) -> bool:
+    """Returns whether the words of an errand may mean that somebody is to be fetched."""
+    return frame.word in _FETCHING or (frame.last == "for" and frame.word in _CALLING)

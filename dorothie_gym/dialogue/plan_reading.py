@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseReader
@@ -18,12 +19,19 @@ from dorothie_gym.dialogue.plan_parser import PlanParse, Sentence, parse_plan
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.turn_phrases import plain_orders
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
+from dorothie_gym.ontology.slots import ObjectClass
+
+if TYPE_CHECKING:
+    from dorothie_gym.ontology.slots import SlotValue
 
 _SENTENCE = re.compile(r"(?<=[.!?;:\u2026])(?<!\b(?:Mr|Ms|Dr|St)\.)(?<!\bMrs\.)\s+|\s+[\u2013\u2014-]+\s+")
 _CAPITALISED = re.compile(r"(?<=[a-z,] )[A-Z][a-z]+\b")
 _HESITATIONS = frozenset({"uh", "er", "erm", "um", "hm", "hmm"})
 _ASKING = (["do"], ["did"], ["d'you"], ["don't"], ["didn't"], ["if"])
 """Words in front of a "you know" that asks."""
+
+_FEW = 4
+"""Most words of an errand without a verb."""
 
 _NAMES_FILE = "15_names.talk"
 _PERSON = "#person"
@@ -33,6 +41,8 @@ _INTO = frozenset({"in", "into", "to", "over"})
 _LANES = frozenset({"lane", "lanes"})
 _SEPARABLE = frozenset({"pick", "picking"})
 _FETCHES = frozenset({"fetch", "fetching", "grab", "grabbing", "collect", "collecting", "meet"})
+_GETS = {"get": "fetch", "getting": "fetching"}
+_PRONOUNS = frozenset({"him", "her", "them"})
 _BEHIND_NAMES = frozenset({"from", "at", "by", "on", "outside", ",", "and", "then", "first", "please", "in", "off"})
 _AT_ONCE = frozenset({"turn", "left", "right", "go", "then"})
 """Words behind which lights at the beginning are those of a junction."""
@@ -108,13 +118,20 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
     while place < len(words):
         match = fillers.longest(words, place)
         knows = match is not None and words[place] == "you" and kept[-1:] in _ASKING
-        if match is None or knows:
+        if match is None or knows or _asks_for_name(kept, words[place:]):
             kept.append(words[place])
             match = None
         elif words[place] in _HESITATIONS and _counts_again(kept, words[place + match.length :]):
             kept.append("sorry")
         place += 1 if match is None else match.length
     return without_asides(kept, lists) if kept else words
+
+
+def _asks_for_name(before: Sequence[str], behind: Sequence[str]) -> bool:
+    """Returns whether a "please" stands behind a few words of their own, and orders what they name: "..., home please"."""
+    if behind[0] != "please" or behind[1:2] not in ([], [","], ["?"]) or "," not in before:
+        return False
+    return 1 <= before[::-1].index(",") <= _FEW
 
 
 def _counts_again(before: Sequence[str], behind: Sequence[str]) -> bool:
@@ -154,8 +171,11 @@ def _first_names() -> frozenset[str]:
     return frozenset(word.lower() for word in re.findall(r"\b[A-Z][a-z]+\b", " ".join(lines)))
 
 
-def _with_people(words: list[str]) -> list[str]:
-    """Returns the words with the name of somebody who is fetched masked: "grab dave from the house"."""
+def _with_people(words: list[str], names: Mapping[int, SlotValue]) -> list[str]:
+    """Returns the words with the name of somebody who is fetched masked: "grab dave from the house".
+
+    A "get" of people is read as "fetch".
+    """
     grammar = route_grammar()
     for place in range(len(words) - 1):
         verb = words[place] in _FETCHES or words[place : place + 2] == ["pick", "up"]
@@ -166,13 +186,22 @@ def _with_people(words: list[str]) -> list[str]:
         known = known or grammar.terminals.longest([name], 0) is not None
         if verb and name.isalpha() and not known and following in _BEHIND_NAMES:
             words = [*words[:begin], _PERSON, *words[begin + 1 :]]
-        elif words[place] == "get" and "from" in words[place + 2 : place + 5] and _gets_people(words[place + 1 :]):
-            words = [*words[:place], "fetch", *words[place + 1 :]]
+        elif words[place] in _GETS and _gets_people(words, names, place + 1):
+            words = [*words[:place], _GETS[words[place]], *words[place + 1 :]]
     return words
 
 
-def _gets_people(words: Sequence[str]) -> bool:
-    return not route_grammar().people.isdisjoint(words[: list(words).index("from")])
+def _gets_people(words: Sequence[str], names: Mapping[int, SlotValue], place: int) -> bool:
+    """Returns whether somebody stands at a place behind a "get", and nothing that is got for them."""
+    grammar = route_grammar()
+    while place < len(words) and words[place] in grammar.modifiers and place not in names:
+        place += 1
+    people = grammar.people - _PRONOUNS | _first_names()
+    person = place < len(words) and (words[place] in people or names.get(place) is ObjectClass.PEDESTRIAN)
+    place += 1
+    if words[place : place + 1] == [_PERSON]:
+        place += 1  # "auntie Jo"
+    return person and (place >= len(words) or words[place] in _BEHIND_NAMES | {"?", "now", "today", "when", "before"})
 
 
 def _strangers(text: str) -> frozenset[str]:
@@ -187,8 +216,8 @@ def _sentence(text: str) -> Sentence | None:
         return None
     mentions, masked = find_names(said, statuses=False)
     strangers = _strangers(text)
-    words = _with_people([_PERSON if word in strangers else word for word in mask_directions(masked, lists)])
     names = {mention.start: mention.value for mention in mentions}
+    words = _with_people([_PERSON if word in strangers else word for word in mask_directions(masked, lists)], names)
     lead = {mention.start: mention.first for mention in mentions}
     contracted = frozenset(mention.start for mention in mentions if mention.contracted)
     clauses = ClauseReader(words=words, question=words[-1:] == ["?"] or words[-2:] in _OR_NOT, contracted=contracted)

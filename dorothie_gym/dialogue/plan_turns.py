@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 _DOWN: Final = frozenset({"down", "up", "along", "go", "pop", "nip", "duck", "head"})
 """First words of an action that goes along a road: "pop down that road on your left"."""
 
+_KEEPING: Final = frozenset({"keep", "stay", "staying", "move", "go", "pull", "edge", "nudge", "inch", "a", "bit"})
+"""First words of an action straight on that may tell a side of the road instead."""
+
 
 class TurnReader(PlanState):
     """Reads the turns, lanes and sides of a plan."""
@@ -84,6 +87,7 @@ class TurnReader(PlanState):
         if frame.action is StepAction.TURN and frame.direction is None:
             frame.direction = item.direction
             frame.ordinal = frame.ordinal or item.ordinal
+            self._repeat(item)
             return True
         if frame.action is StepAction.U_TURN:
             return True
@@ -164,8 +168,11 @@ class TurnReader(PlanState):
         return True
 
     def _repeat(self, item: TurnItem) -> None:
+        """Adds the other turns of a number of them; what follows is about the first: "two lefts after the KFC"."""
+        first = self.frame
         for _ in range(item.times - 1):
             self.open_step(StepAction.TURN).direction = item.direction
+        self.frame = first
 
     def read_lane(self, item: LaneItem) -> None:
         """Reads a lane by its side."""
@@ -176,12 +183,7 @@ class TurnReader(PlanState):
         frame = self.replaced(StepAction.LANE, StepAction.TURN)
         if frame is None:
             frame = self.frame
-            if (
-                frame is None
-                or self.fresh
-                or frame.action not in (None, StepAction.LANE, *NEEDING_PLACE)
-                or frame.place
-            ):
+            if frame is None or self.fresh or not _may_be_lane(frame):
                 frame = self.open_step(StepAction.LANE)
         frame.action, frame.direction, frame.ordinal = StepAction.LANE, item.direction, None
         frame.negated = self.negation in NEGATING
@@ -237,3 +239,9 @@ class TurnReader(PlanState):
             opened.direction = item.direction
         else:
             self.pending.side = item.direction
+
+
+def _may_be_lane(frame: Frame) -> bool:
+    """Returns whether the lane named next is what a step asks for: "keep on the left", "move a bit to the right"."""
+    keeps = frame.action is StepAction.STRAIGHT and frame.word in _KEEPING and frame.at is None and not frame.distance
+    return keeps or (frame.action in (None, StepAction.LANE, *NEEDING_PLACE) and frame.place is None)

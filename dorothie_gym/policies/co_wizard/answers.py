@@ -363,7 +363,8 @@ def answer_check(
     said = intend(
         Function.CONFIRM if held else Function.NEGATIVE_ANSWER, checked if held else checked.opposite, elided=elided
     )
-    state.say(said, *plan_remark(state, view, rng, joined=True))
+    about_way = words.asked is None or bool(act.slots)
+    state.say(said, *(plan_remark(state, view, rng, joined=True) if about_way else ()))
 
 
 def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
