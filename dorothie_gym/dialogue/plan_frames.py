@@ -19,6 +19,7 @@ from dorothie_gym.dialogue.routes import (
     StepCondition,
 )
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.slots import ObjectClass
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.slots import LandmarkName, StreetName
@@ -48,6 +49,9 @@ _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP
 """Actions with an ordinal."""
 
 _PLAIN_WAIT: Final = PlanStep(action=StepAction.WAIT)
+OVERTAKEN: Final = PlaceReference(object=ObjectClass.VEHICLES)
+"""Vehicle that is got past."""
+
 _NEXT_JUNCTION: Final = PlaceReference(ordinal=1)
 _MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
 _STARTING: Final = frozenset({"go", "move", "drive"})
@@ -75,6 +79,7 @@ class Frame:
         implied: whether its action is not named: "on the left, please".
         contingent: whether it depends on a condition of the world.
         joint: kind of the border before it: "then", "and" or ",", or "" without any.
+        replaces: action that the words name and forbid, where the step is another one.
     """
 
     action: StepAction | None = None
@@ -101,6 +106,7 @@ class Frame:
     implied: bool = False
     contingent: bool = False
     joint: str = ""
+    replaces: StepAction | None = None
 
     @property
     def starts(self) -> bool:
@@ -178,6 +184,7 @@ class PlanState:
             frame.action = StepAction.GO
         if frame.negated and frame.forbidden and (frame.action is StepAction.GO or frame.starts):
             frame.action, frame.negated = StepAction.WAIT, False  # "don't go until the lights let you"
+            frame.replaces = StepAction.GO
         if frame.action is StepAction.GO and (frame.distance is not None or frame.relation is ConditionRelation.UNTIL):
             frame.action = StepAction.STRAIGHT  # "drive on until you see the KFC"
         vague = frame.direction is None and frame.ordinal is None and frame.at is None and frame.distance is None
@@ -327,8 +334,7 @@ class PlanState:
             frame.speed = frame.bare_number if frame.speed is None and frame.change is None else frame.speed
             if frame.speed is None and frame.change is None:
                 return []
-        if frame.relation is ConditionRelation.BESIDE and frame.action in _AT_PLACES:
-            frame.relation = ConditionRelation.AT  # "by the Shell, turn left"
+        self._settle_relation(frame)
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
@@ -336,11 +342,22 @@ class PlanState:
         if frame.action is StepAction.TURN and frame.ordinal is not None and passes:
             if frame.at == PlaceReference(ordinal=max(frame.ordinal - 1, 1)) and frame.ordinal > 1:
                 frame.relation = frame.at = None  # "past three streets, at the fourth, left"
+        if frame.action in TURNING and frame.relation is ConditionRelation.UNTIL and frame.at is not None:
+            stretch = Frame(action=StepAction.STRAIGHT, relation=frame.relation, at=frame.at)
+            frame.relation = frame.at = None  # "up to the KFC, then right"
+            return [step for step in (stretch.step(), frame.step()) if step is not None]
         other, relation = _other_errand(frame), frame.relation
         if other is not None:
             frame.relation = frame.at = None
         steps = (frame.step(), other) if relation is ConditionRelation.BEFORE else (other, frame.step())
         return [step for step in steps if step is not None]
+
+    def _settle_relation(self, frame: Frame) -> None:
+        """Puts the condition of a step into the form that its action has."""
+        if frame.relation is ConditionRelation.BESIDE and frame.action in _AT_PLACES:
+            frame.relation = ConditionRelation.AT  # "by the Shell, turn left"
+        if frame.action is StepAction.LANE and frame.direction is not None and frame.at == OVERTAKEN:
+            frame.relation = frame.at = None  # "pass that bus on the left"
 
     def _avoids(self, frame: Frame) -> bool:
         """Makes a place that must not be passed one to avoid: "don't go over the bridge"; returns whether it did."""

@@ -38,10 +38,13 @@ _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, Co
 _PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
 """Relations to places that are driven by."""
 
+_ENDING: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
+"""Relations to a place up to which a stretch is driven."""
+
 _ALONG: Final = frozenset({"on", "along", "up", "down"})
 """Last words of an order to go on behind which a street is the one to go along."""
 
-_OVERTAKING: Final = frozenset({"pass", "passing"})
+_OVERTAKING: Final = frozenset({"pass", "passing", "overtake", "overtaking"})
 _ROUND: Final = frozenset({"round", "around", "past", "by"})
 """Last words of an order to get past another vehicle."""
 
@@ -120,8 +123,11 @@ class PlaceReader(OpportunityReader):
 
     def _takes(self, frame: Frame, place: PlaceReference) -> bool:
         """Returns whether a step has no place yet, or one that says less: "stop over there, where the people are"."""
-        vague = frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
-        return frame.at is None or frame.borrowed or (vague and place.reference is None)
+        return frame.at is None or frame.borrowed or (self.is_vague(frame) and place.reference is None)
+
+    def is_vague(self, frame: Frame) -> bool:
+        """Returns whether the place of a step is only "here" or "there"."""
+        return frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
 
     def _passes_next(self, frame: Frame, relation: ConditionRelation) -> bool:
         """Returns whether another place is passed behind the one of a step."""
@@ -251,7 +257,8 @@ class PlaceReader(OpportunityReader):
         elif frame.action is None:
             self._object_of_verb(frame, place)
         elif frame.action is StepAction.LANE and place.object is ObjectClass.VEHICLES:
-            pass  # "overtake that lorry"
+            if frame.word in _OVERTAKING and frame.at is None:
+                frame.relation, frame.at = ConditionRelation.PAST, place  # "overtake that lorry"
         elif frame.action is StepAction.LIGHTS and place.reference is not None:
             pass  # "it's dark out there"
         elif frame.at is None and frame.action is not StepAction.SPEED:
@@ -283,6 +290,7 @@ class PlaceReader(OpportunityReader):
             return  # "straight along here"
         if crossed and place.object is ObjectClass.VEHICLES and frame.word in _OVERTAKING:
             frame.action = StepAction.LANE  # "pass that bus on the left"
+            frame.relation, frame.at = ConditionRelation.PAST, place
             return
         if crossed and place.landmark is LandmarkName.HOUSE and frame.last == "straight":
             frame.action, frame.place = StepAction.VISIT, place  # "go straight home"
@@ -308,12 +316,15 @@ class PlaceReader(OpportunityReader):
             self.fetch(frame, place)
         elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
             frame.action = StepAction.LANE  # "go round this bus"
+            frame.relation, frame.at = ConditionRelation.PAST, place
         elif frame.action is StepAction.VISIT and place.object is not None and frame.word in ("stop", "stopping"):
             frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
             frame.action, frame.relation, frame.at = StepAction.STRAIGHT, ConditionRelation.UNTIL, place
         elif frame.action is StepAction.FOLLOW and place.landmark is not None:
             frame.action = None
+            if frame.word in ("via", "by", "go", "going"):
+                self._visit_on_way(frame, place)  # "home by way of the KFC"
         else:
             frame.place = place
             if self.negation in NEGATING:
@@ -362,6 +373,22 @@ class PlaceReader(OpportunityReader):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _visit_on_way(self, frame: Frame, place: PlaceReference) -> None:
+        """Makes a place that the way leads by an errand in front of the one that it leads to."""
+        before = self.frames.index(frame) - 1
+        aimed = before >= 0 and self.frames[before].action is StepAction.VISIT and frame.joint in ("", ",")
+        frame.action, frame.place = StepAction.VISIT, place
+        if aimed and self.frames[before].place is not None:
+            self.frames[before : before + 2] = [frame, self.frames[before]]
+
+    def end_stretch(self) -> None:
+        """Ends the stretch named last at a place behind it: "go down Hayward, past the KFC, and then left"."""
+        last = self.frames[-1] if self.frames else None
+        if last is None or self.pending.at is None or self.pending.relation not in _ENDING or last.at is not None:
+            return
+        if last.action in (StepAction.FOLLOW, StepAction.STRAIGHT) and last.distance is None and not last.negated:
+            last.relation, last.at, self.pending.at = self.pending.relation, self.pending.at, None
 
     def _return_by(self, place: PlaceReference) -> None:
         """Orders to follow the way so far, also to the place named before it: "go home the way we came"."""
@@ -418,8 +445,9 @@ class PlaceReader(OpportunityReader):
             for name in ("place", "at"):
                 old = getattr(frame, name)
                 if old is not None and old == place:
-                    self.repairing = self.mood is ClauseMood.STATEMENT  # "no, Fuller is jammed, take Beal"
-                    return self.repairing
+                    self.repairing = self.mood is ClauseMood.STATEMENT or self.negation == "not"
+                    self.negation = None if self.negation == "not" else self.negation
+                    return self.repairing  # "no, Fuller is jammed, take Beal", "no, not Fuller, Beal"
                 if old is not None and old.street is not None and _names_only_street(place):
                     place = with_details(old, street=place.street)  # "the house on Beal, no, Fuller"
                 if old is not None and (old.landmark is None) is (place.landmark is None):

@@ -24,8 +24,10 @@ class RepetitionReader(PlanState):
         turns = [frame for frame in self.frames if frame.action is not None and frame.mood is not ClauseMood.STATEMENT]
         for before, frame in itertools.pairwise(turns):
             same = frame.action is StepAction.TURN and before.action is StepAction.TURN and not before.negated
+            placed = same and frame.joint == "," and before.at is not None and before.at == frame.at
+            placed = placed and (before.direction, before.ordinal) == (frame.direction, frame.ordinal)
             counted = same and frame.joint in ("", ",") and frame.ordinal is not None and _counts_same(before, frame)
-            if counted or (same and frame.joint == "," and _says_again(before, frame)):
+            if counted or placed or (same and frame.joint == "," and _says_again(before, frame)):
                 frame.relation, frame.at = frame.relation or before.relation, frame.at or before.at
                 frame.ordinal, frame.distance = frame.ordinal or before.ordinal, frame.distance or before.distance
                 before.action = None
