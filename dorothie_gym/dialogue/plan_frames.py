@@ -356,7 +356,8 @@ class PlanState:
         """Puts the condition of a step into the form that its action has."""
         if frame.relation is ConditionRelation.BESIDE and frame.action in _AT_PLACES:
             frame.relation = ConditionRelation.AT  # "by the Shell, turn left"
-        if frame.action is StepAction.LANE and frame.direction is not None and frame.at == OVERTAKEN:
+        passed = frame.relation is ConditionRelation.PAST and frame.at == OVERTAKEN
+        if frame.action is StepAction.LANE and frame.direction is not None and passed:
             frame.relation = frame.at = None  # "pass that bus on the left"
 
     def _avoids(self, frame: Frame) -> bool:

@@ -15,6 +15,11 @@ _MOVING: Final = frozenset({ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, Object
 _PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
 _NEAR: Final = frozenset({ConditionRelation.OPPOSITE, ConditionRelation.BESIDE})
 """Relations by which a place alone tells where to stop."""
+_BESIDE: Final = frozenset(
+    {"by", "next", "beside", "near", "level", "opposite", "across", "just", "close", "alongside"}
+)
+"""First words of a sentence that only tells beside what to stop."""
+
 _FEW: Final = 6
 """Words of a sentence that names nothing but a place to pass."""
 _WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
@@ -51,7 +56,7 @@ class LeftoverReader(TurnReader, PlaceReader, SpeedReader):
             self.open_step(StepAction.STOP).implied = True
         elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
             self.open_step(StepAction.SPEED)
-        elif self.pending.at and self.pending.relation in _NEAR and _stands(self.pending.at):
+        elif self.pending.at and self.pending.relation in _NEAR and self._stands(self.pending.at):
             self.open_step(StepAction.STOP).implied = True  # "next to the Shell, please"
         elif self.pending.at and self.pending.relation in _PASSED and len(self.clauses.words) <= _FEW:
             self._go_past(self.pending.at)
@@ -75,7 +80,7 @@ class LeftoverReader(TurnReader, PlaceReader, SpeedReader):
         else:
             self.open_step(StepAction.STRAIGHT)
 
-
-def _stands(place: PlaceReference) -> bool:
-    """Returns whether a place is one beside which a car can be told to stop: no other road user."""
-    return place.landmark is not None or (place.object is not None and place.object not in _MOVING)
+    def _stands(self, place: PlaceReference) -> bool:
+        """Returns whether the words can tell to stop beside a place: by a landmark, or "by the hedge" alone."""
+        fixed = place.object is not None and place.object not in _MOVING
+        return place.landmark is not None or (fixed and self.clauses.words[0] in _BESIDE)

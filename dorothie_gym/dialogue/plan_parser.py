@@ -129,6 +129,13 @@ _TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "st
 _WAYS: Final = frozenset({"to", "down", "up", "on", "over", "along", "straight"})
 _RANKING: Final = frozenset({"accept", "defer", "advance"})
 """Kinds of actions that order what has been named."""
+_GOING: Final = (["we're"], ["i'm"])
+_HEADING: Final = frozenset({"going", "heading", "off"})
+_PLACING: Final = frozenset(
+    {ConditionRelation.AT, ConditionRelation.BESIDE, ConditionRelation.OPPOSITE, ConditionRelation.BEFORE}
+)
+"""Relations that say more precisely where "there" is."""
+_ROOM: Final = frozenset({"room", "space", "berth"})
 _OVERTAKING: Final = frozenset(
     {"round", "around", "past", "by", "pass", "passing", "overtake", "overtaking", "leapfrog"}
 )
@@ -184,9 +191,11 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
         if last is not None and last.mood in ORDERED:
             open_place = last.at is None or self.is_vague(last)
             stops = last.action in (StepAction.STOP, StepAction.WAIT) and open_place and last is self.frames[-1]
+            if self.joint == "and" and pending.relation is ConditionRelation.AFTER:
+                pending.relation = ConditionRelation.AT  # "the Ikea, and after the KFC"
             if not (stops and self.joint in ("", ",")):  # not in "stop on the right, at the KFC"
                 self.stop_between()
-            if pending.at is not None and (last.at is None or stops):
+            if pending.at is not None and (last.at is None or (stops and pending.relation in _PLACING)):
                 last.negated = last.negated and last.at is None  # "don't stop here, over there by the trees"
                 self.attach(last, pending.relation or ConditionRelation.AT, pending.at)
             last.distance = last.distance or pending.distance
@@ -206,7 +215,7 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
                     named = bool(frame.word or frame.verb in _TAKING) and step.action is StepAction.TURN
                     named = named or frame.joint == "then"
                     append_step(contingent if frame.contingent else ordered, step, named=named)
-        named = {frame.replaces for frame in self.frames if frame.replaces is not None and frame.action is not None}
+        replaced = {frame.replaces for frame in self.frames if frame.replaces is not None and frame.action is not None}
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
             described=tuple(described),
@@ -215,7 +224,7 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
             cancelled=bool(self.cancelled),
             moods=tuple(self.moods),
             repaired=self.repaired,
-            denied=frozenset(self.denied | named),
+            denied=frozenset(self.denied | replaced),
             aside=self.aside,
             waiting=waiting,
             person=self.person,
@@ -240,7 +249,9 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
             self.close()
         before = self.mood
         self._clause(item.place, new=False)
-        if item.kind == "then" and before in ORDERED and self.clauses.names_next(item.place):
+        following = self.clauses.words[item.place : item.place + 3]
+        leads = following[:1] in _GOING and not _HEADING.isdisjoint(following)  # "then we're all going to the KFC"
+        if item.kind == "then" and before in ORDERED and (leads or self.clauses.names_next(item.place)):
             self.mood = self.moods[-1] = ClauseMood.COMMAND  # "pick up Tom, and after that it's the Coco"
 
     def _contingency(self, item: ContingencyItem) -> None:
@@ -347,7 +358,10 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
             frame.speed = self.last_speed
         if item.kind == "leave":
             frame.verb, frame.implied = "leave", True
-        if action is StepAction.LANE and frame.at is None and not _OVERTAKING.isdisjoint(said):
+        if action is StepAction.AVOID and not _ROOM.isdisjoint(said):
+            frame.place = OVERTAKEN  # "give that bike more room"
+        passing = "#object" in said and not _OVERTAKING.isdisjoint(said)
+        if action is StepAction.LANE and frame.at is None and passing:
             frame.relation, frame.at = ConditionRelation.PAST, OVERTAKEN
         frame.ends = self._ends(item.end)
 
@@ -411,6 +425,9 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
             return
         if frame is not None and speeding and item.word == "it" and frame.speed is None and frame.change is None:
             frame.speed = self.last_speed  # "the limit is thirty, stick to it"
+            return
+        if frame is not None and frame.last == "behind" and frame.action is StepAction.FOLLOW and item.word in _IT:
+            frame.place = OVERTAKEN if frame.place is None else frame.place  # "stay behind it"
             return
         if frame is not None and frame.word in ("cross", "pass") and item.word in _IT and not self.fresh:
             if self.last_place is not None and frame.at is None:

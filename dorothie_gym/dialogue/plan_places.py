@@ -298,20 +298,25 @@ class PlaceReader(OpportunityReader):
         if crossed and _names_only_street(place) and frame.last in _ALONG:
             frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
             return
+        if frame.action is StepAction.GO and place.landmark is not None:
+            frame.action, frame.place = StepAction.VISIT, place  # "go on home"
+            return
         frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
         frame.at = place
 
     def _target(self, frame: Frame, place: PlaceReference) -> None:
         """Completes "take me to", "follow", "avoid" with a place."""
+        if frame.action is StepAction.FOLLOW and (place.landmark or place.object is ObjectClass.BUILDING):
+            self._lead_to(frame, place)
+            return
+        if frame.action is StepAction.VISIT and self._leads_along(frame, place):
+            frame.action, frame.place = StepAction.FOLLOW, place
+            return
         if frame.action is StepAction.TURN and frame.verb == "leave":
             if place.landmark is not None:
                 frame.action, frame.place = StepAction.VISIT, place
             else:
                 frame.relation, frame.at = ConditionRelation.FROM, place
-        elif frame.word in ("grab", "grabbing", "hit") and _names_only_street(place):
-            frame.action, frame.place = StepAction.FOLLOW, place
-        elif frame.action is StepAction.VISIT and place.reference is Anaphor.WAY_WE_CAME:
-            frame.action, frame.place = StepAction.FOLLOW, place  # "return by the same way"
         elif fetches(frame) and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
         elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
@@ -321,10 +326,6 @@ class PlaceReader(OpportunityReader):
             frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
             frame.action, frame.relation, frame.at = StepAction.STRAIGHT, ConditionRelation.UNTIL, place
-        elif frame.action is StepAction.FOLLOW and place.landmark is not None:
-            frame.action = None
-            if frame.word in ("via", "by", "go", "going"):
-                self._visit_on_way(frame, place)  # "home by way of the KFC"
         else:
             frame.place = place
             if self.negation in NEGATING:
@@ -373,6 +374,17 @@ class PlaceReader(OpportunityReader):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _leads_along(self, frame: Frame, place: PlaceReference) -> bool:
+        """Returns whether words of an errand name a way: "hit Fuller", "return by the same way"."""
+        named = frame.word in ("grab", "grabbing", "hit") or frame.last in ("by", "via", "along")
+        return place.reference is Anaphor.WAY_WE_CAME or (named and _names_only_street(place))
+
+    def _lead_to(self, frame: Frame, place: PlaceReference) -> None:
+        """Reads a place that no way is, behind words of following one."""
+        frame.action = None  # "they tore down the old school"
+        if place.landmark is not None and frame.word in ("via", "by", "go", "going"):
+            self._visit_on_way(frame, place)  # "home by way of the KFC"
 
     def _visit_on_way(self, frame: Frame, place: PlaceReference) -> None:
         """Makes a place that the way leads by an errand in front of the one that it leads to."""

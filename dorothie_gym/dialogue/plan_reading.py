@@ -52,6 +52,8 @@ _REACHING = (["you"], ["we"], ["i"], ["you'll"], ["we'll"], ["to"])
 """Words behind which one hits the lights of a junction, rather than a switch."""
 _LIGHTS = frozenset({"light", "lights"})
 _NONE: frozenset[str] = frozenset()
+_AGREEING = frozenset({"yes", "yeah", "yep", "yup", "aye", "i", "said", "okay", "ok"})
+"""Words with which a direction is only said again: "left at the sign ... yeah, left"."""
 _COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
 """First parts of names of lights that the lexicon knows."""
 
@@ -111,7 +113,11 @@ def read_plan(text: str) -> PlanParse:
 
 def _says_again(before: Sentence, sentence: Sentence) -> bool:
     """Returns whether a sentence only repeats the direction of the one before: "Left! Left, left!"."""
-    return len({*before.clauses.words, *sentence.clauses.words}) == 1
+    if len({*before.clauses.words, *sentence.clauses.words}) == 1:
+        return True
+    said = [word for word in sentence.clauses.words if word != ","]
+    rest = [word for word in said if word not in _AGREEING]
+    return len(rest) == 1 < len(said) and rest[0] in ("left", "right") and rest[0] in before.clauses.words
 
 
 def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
