@@ -178,8 +178,8 @@ class PlaceReader(OpportunityReader):
         if fetching:
             frame.relation, frame.at = ConditionRelation.AT, place  # "pick her up from the KFC"
         elif frame.action is StepAction.VISIT and frame.place is None and relation not in _LATER:
-            if _names_only_street(place) and relation is ConditionRelation.AT:
-                frame.action = StepAction.FOLLOW  # "get us onto the highway"
+            if _names_only_street(place) and relation in (ConditionRelation.AT, ConditionRelation.BESIDE):
+                frame.action = StepAction.FOLLOW  # "get us onto the highway", "go round by Murfin"
             frame.place = place
         elif self._orders_errands(frame, relation, place):
             pass
