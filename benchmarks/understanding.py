@@ -150,8 +150,8 @@ def _compare(
         after = guess_spans(sentence.before)[-1].act.move if sentence.before.strip() else None
         text = hear(sentence.text, after)
         begun = time.process_time()
-        spans = guess_spans(text, after)
-        plan = understand(text).plan
+        spans = guess_spans(text, after, sentence.before)
+        plan = understand(text, sentence.before).plan
         times.append(time.process_time() - begun)
         compared = _counts(sentence, spans, plan)
         counts[sentence.kind].update(compared)

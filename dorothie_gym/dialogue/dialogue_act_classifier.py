@@ -6,6 +6,7 @@ import functools
 import re
 from collections.abc import Sequence
 
+from dorothie_gym.dialogue.answered_sides import answering_act, asked_about, plain_answer
 from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.clause_moods import ClauseMood
 from dorothie_gym.dialogue.conversation import Span
@@ -291,21 +292,35 @@ def _slots(parsed: ParsedText, move: DialogueMove) -> frozenset[SlotValue]:
 
 
 @functools.lru_cache(maxsize=2048)
-def guess_spans(text: str, after: DialogueMove | None = None) -> tuple[Span, ...]:
+def guess_spans(text: str, after: DialogueMove | None = None, question: str = "") -> tuple[Span, ...]:
     """Segments free English into spans with one act each: by the rules, or by the trained tagger where it is surer.
 
     Args:
         text: free English; blank text gives no span.
         after: as in `guess_act`, for the first span.
+        question: words of the other speaker's last remark, see `understand`.
 
     Returns:
         Spans whose texts, joined by spaces, equal the text except for repeated spaces.
     """
+    if question:
+        return _answering_spans(text, after, question)
     spans = rule_spans(text, after)
     if not spans or all(formula_move(_plain_words(span.text)) is not None for span in spans):
         return spans  # formulas have no other move
     read = tagged(spans, span_features(spans, after))
     return read.with_actions(_retagged(text, after, spans, read.spans))
+
+
+def _answering_spans(text: str, after: DialogueMove | None, question: str) -> tuple[Span, ...]:
+    """Returns the spans of what may answer a question with a mere side."""
+    plain = plain_answer(text, question)
+    spans = guess_spans(plain, after)
+    if not spans:
+        return spans
+    act = answering_act(spans[0].act, understand(spans[0].text), asked_about(question))
+    words = spans[0].text if plain == text else " ".join(text.split()[: len(spans[0].text.split())])
+    return (Span(words, act), *spans[1:])
 
 
 def _retagged(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
+from dorothie_gym.dialogue.answered_sides import answering, asked_about, plain_answer
 from dorothie_gym.dialogue.clause_breaks import with_breaks
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
@@ -189,15 +190,19 @@ class ParsedText:
 
 
 @functools.lru_cache(maxsize=2048)
-def understand(text: str) -> ParsedText:
+def understand(text: str, question: str = "") -> ParsedText:
     """Parses free English text, in any case and with typographic or plain apostrophes.
 
     Args:
         text: the text; may be empty.
+        question: words of the other speaker's last remark, which tell what a mere "left" answers; "" for none.
 
     Returns:
         The parsed text. Every text is accepted.
     """
+    if question:
+        parsed = understand(plain_answer(text, question))
+        return answering(replace(parsed, text=text), asked_about(question))
     lists = word_lists()
     parse = read_plan(text)
     said = without_asides(
@@ -258,7 +263,7 @@ def _stated(text: str) -> str:
 
 
 def _asked(masked: str) -> Proposition | None:
-    """Returns the proposition of a question; also where a recogniser has lost its first word: "so you see anything?"."""
+    """Returns the proposition of a question; also with its first word misheard: "so you see anything?"."""
     found = _first("questions", "asks", masked)
     if found is not None or "?" not in masked:
         return found

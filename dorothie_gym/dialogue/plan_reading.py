@@ -137,7 +137,7 @@ def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
 
 
 def _asks_for_name(before: Sequence[str], behind: Sequence[str]) -> bool:
-    """Returns whether a "please" stands behind a few words of their own, and orders what they name: "..., home please"."""
+    """Returns whether a "please" stands behind a few words of their own, and orders what they name: "home please"."""
     if behind[0] != "please" or behind[1:2] not in ([], [","], ["?"]) or "," not in before:
         return False
     return 1 <= before[::-1].index(",") <= _FEW

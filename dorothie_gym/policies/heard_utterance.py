@@ -36,7 +36,7 @@ class HeardUtterance:
 
 
 def heard_utterance(
-    observation: ObservationMapping, speaker: Role, after: DialogueMove | None = None
+    observation: ObservationMapping, speaker: Role, after: DialogueMove | None = None, question: str = ""
 ) -> HeardUtterance | None:
     """Returns the utterance completed since the last decision, or None; acts that are not observed are classified.
 
@@ -44,15 +44,17 @@ def heard_utterance(
         observation: observation of the listener.
         speaker: role of the speaker.
         after: last move of the listener, as context of the classification.
+        question: words of the listener's last remark, see `understand`.
     """
     text = str(observation[f"{speaker}_text"])
     acts = heard_acts(observation, speaker)
     if not text and not acts:
         return None
-    spans = guess_spans(text, after) if acts is None or len(acts) > 1 else ()
+    spans = guess_spans(text, after, question) if acts is None or len(acts) > 1 else ()
     classified = acts is None
     if acts is None:
         acts = tuple(span.act for span in spans)
     divided = len(spans) == len(acts) > 1
-    parts = tuple(understand(span.text) for span in spans) if divided else ()
-    return HeardUtterance(acts=acts, words=understand(text), classified=classified, parts=parts)
+    parts = tuple(understand(span.text, "" if number else question) for number, span in enumerate(spans))
+    words = understand(text, question)
+    return HeardUtterance(acts=acts, words=words, classified=classified, parts=parts if divided else ())

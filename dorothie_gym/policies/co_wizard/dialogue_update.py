@@ -100,7 +100,8 @@ _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Updates the state with the participant's utterances since the last decision, and queues answers."""
     last = state.speech.last
-    heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
+    after, question = (None, "") if last is None else (last.act.move, last.text)
+    heard = heard_utterance(view.raw, Role.PARTICIPANT, after, question)
     if heard is None:
         return
     state.dialogue = state.dialogue.after_hearing(view.time, heard.words.text)

@@ -140,7 +140,7 @@ def _is_absurd(view: CoWizardView, words: ParsedText) -> bool:
 
 def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:
     """Returns whether a reply answers neither the question nor the Co-Wizard's counter-question."""
-    if words.order is not None or act.slots:
+    if words.order is not None or act.slots or (words.parse is not None and words.parse.aside):
         return False
     asked_back = act.move is DialogueMove.CLARIFY and state.speech.has_just_asked_back
     return asked_back or view.time - state.dialogue.asked_at < state.config.answer_time
