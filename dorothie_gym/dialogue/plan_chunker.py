@@ -52,7 +52,7 @@ _CHANCES: Final = frozenset({"chance", "moment", "minute", "second", "opportunit
 _COMPARED: Final = frozenset({"quicker", "faster", "slower", "quick", "fast", "slow"})
 _STATED: Final = frozenset({"it's", "that's", "is", "are", "was", "it'd", "gets", "looks", "there's"})
 _TELLING: Final = frozenset({"to", "if", "than", "down", "via", "along", "through", "on", "that", "going", "by", "way"})
-_LASTING: Final = frozenset({"for", "this", "that", "the", "those", "these"})
+_LASTING: Final = frozenset({"let", "letting", "for", "this", "that", "the", "those", "these"})
 """Words behind an order to wait, or to let pass, in front of what the car waits for."""
 _CHANGING: Final = frozenset(
     {ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.DYNAMIC}
@@ -174,7 +174,7 @@ class _Reader(DirectionReader, RelationReader):
         """Reads a phrase of the grammar; one that is a part of a longer noun phrase is left to it."""
         match = self.grammar.terminals.longest(self.words, place)
         if match is None:
-            return place
+            return self._lets_pass(place)
         if self.word_at(place - 1) == "why" and self.words[place] in ("don't", "dont", "not"):
             return place + 1 + (self.word_at(place + 1) in ("you", "we", "ye"))  # "why don't you turn left"
         end = place + match.length
@@ -182,6 +182,8 @@ class _Reader(DirectionReader, RelationReader):
             match = Match("relations", "before", 1)  # "before that bus"
         if match.group == "relations":
             return self.read_relation(match, place)
+        if match.kind == "follow" and match.length == 1 and self.word_at(end) == "there":
+            return place  # "not here, down there"
         if self.words[place] == "so" and match.length == 1 and self.word_at(end) in _ADJECTIVES:
             return end
         if match.group == "repairs" and self.words[place] == "no" and match.length == 1:
@@ -200,6 +202,14 @@ class _Reader(DirectionReader, RelationReader):
         if self._is_adverb(match, place):
             return end
         return place if self._is_part(match, place) else self._item(match, place)
+
+    def _lets_pass(self, place: int) -> int:
+        """Reads an order to wait for somebody who goes first: "let that taxi go past"."""
+        lets = self.words[place] in ("let", "letting") and self.names.get(place + 1) in _CHANGING
+        if not lets or self.grammar.leaving.longest(self.words, place + 2) is None:
+            return place
+        self.items.append(ActionItem("wait", place, place + 1))
+        return place + 1
 
     def _refuses(self, place: int) -> bool:
         """Returns whether "not that" stands before an opportunity to turn, and takes nothing back."""

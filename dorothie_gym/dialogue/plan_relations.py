@@ -61,6 +61,9 @@ class RelationReader(NounReader, QuantityReader):
         if match.kind == "after" and match.length == 1 and self.measures(end):
             return end  # "after three hundred feet"
         found, behind = self.noun_phrase(end)
+        if self.words[place:end] == ["on"] and self.lead.get(end) == "home" and found is not None:
+            self.items += [ActionItem("visit", place, end), found]  # "go on home"
+            return behind
         if found is None and match.kind == "across" and "straight" in self.words[place:end]:
             self.items.append(ActionItem("straight", place, end))
             return end
