@@ -186,6 +186,15 @@ class _Reader(DirectionReader, RelationReader):
             return place  # "not here, down there"
         if self.words[place] == "so" and match.length == 1 and self.word_at(end) in _ADJECTIVES:
             return end
+        if (denied := self._denies(match, place)) > place:
+            return denied
+        if self._is_adverb(match, place):
+            return end
+        return place if self._is_part(match, place) else self._item(match, place)
+
+    def _denies(self, match: Match, place: int) -> int:
+        """Reads words that deny or end what follows them; returns the token behind them, or the place itself."""
+        end = place + match.length
         if match.group == "repairs" and self.words[place] == "no" and match.length == 1:
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
@@ -199,9 +208,7 @@ class _Reader(DirectionReader, RelationReader):
         if self._ceases(match, place):
             self.items.append(NegationItem("cease"))  # "stop braking"
             return end
-        if self._is_adverb(match, place):
-            return end
-        return place if self._is_part(match, place) else self._item(match, place)
+        return place
 
     def _lets_pass(self, place: int) -> int:
         """Reads an order to wait for somebody who goes first: "let that taxi go past"."""

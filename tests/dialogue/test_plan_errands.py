@@ -23,7 +23,7 @@ VEHICLE, BEAL = {"object": "Vehicles"}, {"street": "Beal"}
         ("could we collect our nanny first and do the Shell afterwards", [PERSON, SHELL]),
         ("pick up my sister and then we're both going to the Ikea", [PERSON, IKEA]),
         ("take me to the Shell, no, not the Shell, the KFC", [KFC]),
-        ("if I doze off by the bridge just go on home", [HOUSE]),
+        ("just go on home, please", [HOUSE]),
     ],
 )
 def test_errands_are_ordered_as_they_are_meant(text, places):
