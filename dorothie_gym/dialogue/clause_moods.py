@@ -73,6 +73,9 @@ _FRAME: Final = 3
 _FRAME_ENDS: Final = frozenset({"could", "can", "would", "might", "should", "we", "you"})
 """Last words of the frame of a request behind which its verb follows."""
 
+_SUPPOSING: Final = frozenset({"suppose", "imagine", "mind"})
+"""Words of a frame whose negation is politeness."""
+
 _NEGATED: Final = frozenset(
     {
         "where",
@@ -324,4 +327,5 @@ def behind_request(words: Sequence[str], place: int) -> int:
     if match is None or match.kind != "request" or match.length < _FRAME or place + match.length >= len(words):
         return place
     frame = words[place : place + match.length]
-    return place + match.length if frame[-1] in _FRAME_ENDS and _NEGATED.isdisjoint(frame) else place
+    plain = _NEGATED.isdisjoint(frame) or not _SUPPOSING.isdisjoint(frame)  # "I don't suppose you could"
+    return place + match.length if frame[-1] in _FRAME_ENDS and plain else place

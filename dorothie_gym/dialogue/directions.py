@@ -108,6 +108,11 @@ _PLACED = frozenset(
 """Words behind a "right" that only stresses them."""
 
 
+_HEADING = frozenset({"go", "going", "drive", "driving", "head", "heading", "come", "get"})
+_ONWARDS = frozenset({"to", "home", "back", "through"})
+"""Words behind a "right" that means "directly": "go right home"."""
+
+
 def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
     """Returns the words with each non-directional "left" or "right" replaced by "#left", "#ok" or "#tag"."""
     masked = list(words)
@@ -126,6 +131,9 @@ def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:
             )
             if before == "," and after in ("", "?") and _is_told(words[: place - 1]):
                 masked[place] = "#ok"  # "the KFC, right"
+                continue
+            if before in _HEADING and after in _ONWARDS:
+                masked[place] = "#ok"  # "go right to the KFC"
                 continue
             if before == "," and after in _BESIDE and not _LISTED.isdisjoint(words[:place]):
                 masked[place] = "#ok"  # "stop on the left, right by the KFC"

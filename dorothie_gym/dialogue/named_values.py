@@ -41,7 +41,8 @@ _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+
 _OTHER_VEHICLES: Final = re.compile(
     r"\b(cars?|vehicles?|trucks?|lorry|lorries|vans?|bus|buses|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?"
     r"|motorbikes?|motorcyclists?|bikers?|mopeds?|scooter|suv|pickup|ambulance|bicyclist|wagon|artic|tanker|minibus|tram"
-    r"|tractor|trailer|caravan|jeep|hatchback|sedan|engine|rickshaw|slowpoke|slowcoach|hgv|semi|wheeler|ute|camper|rv"
+    r"|tractor|trailer|caravan|jeep|hatchback|sedan|engine|rickshaw|tractors|scooters|pickups|ambulances|trams|coaches|streetcar|trolley"
+    r"|minivans?|hearse|digger|bulldozer|slowpoke|slowcoach|hgv|semi|wheeler|ute|camper|rv"
     r"|convertible|limo|sunday driver|(?:much|heavy|any|oncoming|bunch of|lots of|lot of) traffic"
     r"|traffic (?:jam|ahead|like)|the traffic (?:ahead|in front)|how's the traffic)\b"
 )
@@ -87,7 +88,7 @@ _ONCE_DONE: Final = re.compile(
 """Condition of the errand that comes next."""
 
 _ALREADY: Final = re.compile(
-    r"\b(?:did|done|been|visited|finished|seen to|stopped at)\b(?: \w+){0,4} already\b"
+    r"\b(?:did|done|been(?! (?:past|by|over|down|along))|visited|finished|seen to|stopped at)\b(?: \w+){0,4} already\b"
     r"|\balready (?:did|done|been|went|visited|stopped|finished)\b"
 )
 """Words of an errand that is done: "we did the Shell already"."""

@@ -26,25 +26,23 @@ from dorothie_gym.dialogue.plan_items import (
     WordItem,
     begins_ordinal,
 )
-from dorothie_gym.dialogue.plan_nouns import NounReader, begins_noun_phrase
-from dorothie_gym.dialogue.plan_quantities import QuantityReader, begins_quantity
+from dorothie_gym.dialogue.plan_nouns import begins_noun_phrase
+from dorothie_gym.dialogue.plan_quantities import begins_quantity
+from dorothie_gym.dialogue.plan_relations import RelationReader
 from dorothie_gym.dialogue.route_grammar import Match, route_grammar
-from dorothie_gym.dialogue.routes import ConditionRelation
+from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotValue, StreetName
 
 _BEFORE_NONE: Final = frozenset({"is", "are", "there's", "was", "have", "has", "got", "with", "see", "need", "want"})
 """Words behind which "no" says that there is none, and corrects nothing."""
 _ADJECTIVES: Final = frozenset({"fast", "slow", "quick", "quickly", "slowly", "far", "much", "hard", "close", "early"})
-_STATES: Final = frozenset(
-    [
-        *("start", "starts", "begin", "begins", "end", "ends", "is"),
-        *("are", "stands", "lies", "finishes", "stops", "parked", "over"),
-    ]
-)
 _WHERE: Final = frozenset({"there", "here", "to"})
 _PRESENTING: Final = frozenset({"this", "that", "that's", "here's", "here", "there"})
 _LAST: Final = frozenset({"", ",", "?", "thanks", "cheers", "ta", "thank", "please", "driver", "and", "so", "fine"})
-_CANCELLING: Final = frozenset({"forget", "drop", "dropping", "lose", "remove", "scrub", "ditch"})
+_TAKING_OFF: Final = frozenset({"take", "taking", "knock", "strike", "leave"})
+"""Verbs of giving up an errand that has an "off" behind it: "take the KFC off the list"."""
+
+_CANCELLING: Final = frozenset({"forget", "drop", "dropping", "lose", "remove", "scrub", "ditch", *_TAKING_OFF})
 """First words of giving up an errand or a turn."""
 _BEHIND_CANCELLED: Final = frozenset({"", ",", "?", "please", "then", "and", "from", "for", "off", "now"})
 _RANKS: Final = {"first": "advance", "beforehand": "advance", "last": "defer"}
@@ -54,18 +52,12 @@ _CHANCES: Final = frozenset({"chance", "moment", "minute", "second", "opportunit
 _COMPARED: Final = frozenset({"quicker", "faster", "slower", "quick", "fast", "slow"})
 _STATED: Final = frozenset({"it's", "that's", "is", "are", "was", "it'd", "gets", "looks", "there's"})
 _TELLING: Final = frozenset({"to", "if", "than", "down", "via", "along", "through", "on", "that", "going", "by", "way"})
-_PRONOUNS: Final = frozenset({"it", "that", "those", "them", "this", "these", "him", "her"})
-_IN_VIEW: Final = (
-    "comes into view", "comes into sight", "come into view", "comes in sight", "appears", "pops up", "shows up",
-    "in view", "in sight", "comes up", "comes along", "comes on", "turns up", "pops into view", "pops out",
-    "looms", "is visible", "becomes visible", "is in sight", "is in view", "are in sight", "is coming up",
-    "is ahead",
-)  # fmt: skip
-_WORDY: Final = frozenset({"when", "once", "as", "soon", "after"})
-_LEAVING: Final = frozenset({*_WORDY, "until", "till", "til"})
-"""First words of a relation to an object that leaves: "wait until that truck's gone"."""
-_COMING: Final = frozenset({"if", "when", "once", "as", "soon"})
-_TEMPORAL: Final = frozenset({"when", "once", "as", "soon", "where", "wherever"})
+_LASTING: Final = frozenset({"let", "letting", "for", "this", "that", "the", "those", "these"})
+"""Words behind an order to wait, or to let pass, in front of what the car waits for."""
+_CHANGING: Final = frozenset(
+    {ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.DYNAMIC}
+)
+"""Objects that move on or change, so that one waits for them."""
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _INFINITIVES: Final = frozenset(
     {"take", "make", "get", "go", "drive", "do", "have", "keep", "be", "swing", "pull", "head", "move"}
@@ -76,8 +68,6 @@ _BEHIND_STOPS: Final = frozenset({"by", "at", "off", "in", "near", "opposite", "
 
 _DEPARTING: Final = frozenset({"drop", "get", "move", "slow"})
 """Verbs of changing the speed that are rarely used of driving somewhere."""
-
-_JUNCTIONS: Final = frozenset({"corner", "junction", "intersection", "crossing", "crossroads", "roundabout", "fork"})
 
 
 def read_items(
@@ -99,7 +89,7 @@ def read_items(
     return reader.read()
 
 
-class _Reader(DirectionReader, NounReader, QuantityReader):
+class _Reader(DirectionReader, RelationReader):
     def read(self) -> list[Item]:
         place, subjects = 0, self.grammar.subjects
         while place < len(self.words):
@@ -184,14 +174,27 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         """Reads a phrase of the grammar; one that is a part of a longer noun phrase is left to it."""
         match = self.grammar.terminals.longest(self.words, place)
         if match is None:
-            return place
+            return self._lets_pass(place)
         if self.word_at(place - 1) == "why" and self.words[place] in ("don't", "dont", "not"):
             return place + 1 + (self.word_at(place + 1) in ("you", "we", "ye"))  # "why don't you turn left"
         end = place + match.length
+        if match.kind == "advance" and self.words[place] == "before" and end in self.names:
+            match = Match("relations", "before", 1)  # "before that bus"
         if match.group == "relations":
-            return self._condition(match, place)
+            return self.read_relation(match, place)
+        if match.kind == "follow" and match.length == 1 and self.word_at(end) == "there":
+            return place  # "not here, down there"
         if self.words[place] == "so" and match.length == 1 and self.word_at(end) in _ADJECTIVES:
             return end
+        if (denied := self._denies(match, place)) > place:
+            return denied
+        if self._is_adverb(match, place):
+            return end
+        return place if self._is_part(match, place) else self._item(match, place)
+
+    def _denies(self, match: Match, place: int) -> int:
+        """Reads words that deny or end what follows them; returns the token behind them, or the place itself."""
+        end = place + match.length
         if match.group == "repairs" and self.words[place] == "no" and match.length == 1:
             if end in self.names or self.word_at(place - 1) in _BEFORE_NONE:
                 self.items.append(NegationItem("not"))
@@ -199,12 +202,26 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             if self.word_at(end) == "u" or self._does(end):
                 self.items.append(NegationItem("forbid"))  # "no U-turns", "no stopping"
                 return end
+        if match.group == "repairs" and self._refuses(place):
+            self.items.append(NegationItem("not"))  # "not that turning, the one after"
+            return place + 1
         if self._ceases(match, place):
             self.items.append(NegationItem("cease"))  # "stop braking"
             return end
-        if self._is_adverb(match, place):
-            return end
-        return place if self._is_part(match, place) else self._item(match, place)
+        return place
+
+    def _lets_pass(self, place: int) -> int:
+        """Reads an order to wait for somebody who goes first: "let that taxi go past"."""
+        lets = self.words[place] in ("let", "letting") and self.names.get(place + 1) in _CHANGING
+        if not lets or self.grammar.leaving.longest(self.words, place + 2) is None:
+            return place
+        self.items.append(ActionItem("wait", place, place + 1))
+        return place + 1
+
+    def _refuses(self, place: int) -> bool:
+        """Returns whether "not that" stands before an opportunity to turn, and takes nothing back."""
+        noun = self.word_at(place + 2)
+        return self.word_at(place) == "not" and (noun in SIDES or self.grammar.opportunities.may_begin(noun))
 
     def _does(self, place: int) -> bool:
         """Returns whether a doing stands at a place: "stopping", "lane changing"."""
@@ -286,6 +303,8 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
             return "speed"  # "the limit is thirty, stick to it"
         if match.kind == "lane" and self._visits(place, end):
             return "visit"  # "let's get over there"
+        if match.kind == "u_turn" and self.words[end - 1] == "back" and self._goes_same_way(end):
+            return "follow"  # "take us back along the roads we used"
         if match.kind == "slower" and isinstance(self.names.get(end), StreetName):
             if self.words[end - 1] == "down":
                 return "follow"  # "take us down Hubbard"
@@ -293,6 +312,12 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         if match.kind == "leave" and self.words[end - 1] == "off" and not self._has_place(end):
             return "stop"  # "that's where I get off", not "get off the highway"
         return f"lights_{match.kind}" if match.group == "lights" else match.kind
+
+    def _goes_same_way(self, place: int) -> bool:
+        """Returns whether the way of the drive so far is named, behind a preposition."""
+        found, _ = self.noun_phrase(place + (self.word_at(place) in ("along", "by", "on", "via", "over")))
+        named = None if found is None or found.reference is None else found.reference.reference
+        return named is Anaphor.WAY_WE_CAME and self.word_at(place) in ("along", "by", "on", "via", "over")
 
     def _brought_to(self, place: int, end: int) -> NounPhrase | None:
         """Returns the place to which words of changing the speed send the car: "bring her up to the lights"."""
@@ -335,88 +360,15 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
 
     def _cancels(self, place: int) -> bool:
         word, end = self.words[place], place + 2
+        if word in _TAKING_OFF:
+            behind = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
+            named = isinstance(self.names.get(behind), LandmarkName) and self.word_at(behind + 1) == "off"
+            return named and self.word_at(behind + 2) in (*self.grammar.determiners, "", ",")
         if word == "forget" and self.word_at(place + 1) in ("that", "it"):
             return self.word_at(end) in SIDES or end in self.names or self.word_at(end) in ("turn", "one", "stop")
         behind = place + 1 + (self.word_at(place + 1) in self.grammar.determiners)
         named = isinstance(self.names.get(behind), LandmarkName) and self.names[behind] is not LandmarkName.PERSON
         return named and self.word_at(behind + 1) in _BEHIND_CANCELLED
-
-    def _is_next_junction(self, found: NounPhrase, behind: int) -> bool:
-        """Returns whether a noun phrase is a junction without a number: "at the corner"."""
-        last = self.items[-1] if self.items else None
-        uncounted = found.reference is None and found.ordinal is None
-        if isinstance(last, ActionItem) and last.kind == "u_turn":
-            return False
-        return uncounted and self.word_at(behind - 1) in _JUNCTIONS and self.word_at(behind) != "of"
-
-    def _condition(self, match: Match, place: int) -> int:
-        """Reads a relation with its place: "just past the Shell", "when the Shell comes into view"."""
-        end = place + match.length
-        if match.kind == "named":
-            self.items.append(ConditionItem(ConditionRelation.AT, None))  # "that's where you go right"
-            return end
-        if self.words[end - 1] in ("over", "up", "down", "along") and self.word_at(end) in ("there", "here"):
-            return place
-        if match.kind == "after" and match.length == 1 and self.measures(end):
-            return end  # "after three hundred feet"
-        found, behind = self.noun_phrase(end)
-        if found is None and match.kind == "across" and "straight" in self.words[place:end]:
-            self.items.append(ActionItem("straight", place, end))
-            return end
-        if found is not None and match.kind == "at" and self._is_next_junction(found, behind):
-            found = NounPhrase(None, 1)
-        if found is None:
-            return self._pronoun(match, place)
-        relation, behind = self._event(match, place, found, behind)
-        if match.kind == "across" and self._goes_along(found, place):
-            self.items += [ActionItem("follow", place, end), found]  # "go around over Hubbard"
-            return behind
-        if match.kind == "across":
-            self.items.append(ActionItem("straight", place, end))
-        self.items.append(ConditionItem(relation, found))
-        if self.words[place] in _COMING and [*self.words[behind : behind + 2]] == ["coming", "up"]:
-            behind += 2  # "if you see a bridge coming up"
-        while self.word_at(behind) in _STATES and self.words[place] in _TEMPORAL:
-            behind += 1
-        return behind
-
-    def _event(self, match: Match, place: int, found: NounPhrase, behind: int) -> tuple[ConditionRelation, int]:
-        """Returns the relation to a place that comes into view or leaves, and the token behind what tells that."""
-        relation = self._relation(match)
-        rest = " ".join(self.words[behind : behind + 3])
-        for phrase in _IN_VIEW:
-            if rest.startswith(phrase):
-                relation = relation if relation is ConditionRelation.UNTIL else ConditionRelation.SEEN
-                behind += len(phrase.split())
-                break
-        if self.words[place] in _LEAVING and found.reference is not None and found.reference.object is not None:
-            left = self.grammar.leaving.longest(self.words, behind) if self.word_at(behind) else None
-            if left is not None:  # "when this lorry is gone"
-                relation, behind = ConditionRelation.AFTER, behind + left.length
-        return relation, behind
-
-    def _pronoun(self, match: Match, place: int) -> int:
-        """Reads a relation with "it" or "that": "just past it", "when it pops up"."""
-        end = place + match.length
-        if self.word_at(end) not in _PRONOUNS or self.word_at(end - 1) in ("on", "at", "in"):
-            return end if match.length > 1 else place
-        seen = next((each for each in _IN_VIEW if " ".join(self.words[end + 1 : end + 4]).startswith(each)), None)
-        relation = self._relation(match) if seen is None else ConditionRelation.SEEN
-        self.items.append(ConditionItem(relation, None))
-        return end + 1 + (0 if seen is None else len(seen.split()))
-
-    def _goes_along(self, found: NounPhrase, place: int) -> bool:
-        """Returns whether "over" and "across" mean along a street, as behind a verb of another kind."""
-        street = found.reference is not None and found.reference.street is not None
-        return street and place > 0 and self.word_at(place - 1) not in (",", "go", "straight", "head")
-
-    def _relation(self, match: Match) -> ConditionRelation:
-        """Returns the relation that a phrase stands for; behind a line one stops before it."""
-        if match.kind == "behind":
-            stops = any(isinstance(item, ActionItem) and item.kind == "stop" for item in self.items)
-            stops = stops and not any(value is ObjectClass.VEHICLES for value in self.names.values())
-            return ConditionRelation.BEFORE if stops else ConditionRelation.AFTER
-        return ConditionRelation.PAST if match.kind == "across" else ConditionRelation(match.kind)
 
     def _earlier(self, place: int) -> int:
         """Reads a place of the trip behind "to" or "at": "back to the last stop"."""
@@ -429,11 +381,11 @@ class _Reader(DirectionReader, NounReader, QuantityReader):
         found, behind = self.noun_phrase(place)
         if found is None:
             return place
-        if self.word_at(place - 1) == "for" and self._waits() and found.reference is not None:
+        if self.word_at(place - 1) in _LASTING and self._waits() and found.reference is not None:
             left = self.grammar.leaving.longest(self.words, behind)
-            if left is not None:
+            if left is not None or found.reference.object in _CHANGING:
                 self.items.append(ConditionItem(ConditionRelation.UNTIL, found))  # "wait for that truck to move"
-                return behind + left.length
+                return behind + (0 if left is None else left.length)
         self.items.append(found)
         return behind
 

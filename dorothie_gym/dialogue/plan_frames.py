@@ -19,6 +19,7 @@ from dorothie_gym.dialogue.routes import (
     StepCondition,
 )
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.slots import ObjectClass
 
 if TYPE_CHECKING:
     from dorothie_gym.ontology.slots import LandmarkName, StreetName
@@ -48,6 +49,9 @@ _COUNTED: Final = frozenset({StepAction.TURN, StepAction.U_TURN, StepAction.STOP
 """Actions with an ordinal."""
 
 _PLAIN_WAIT: Final = PlanStep(action=StepAction.WAIT)
+OVERTAKEN: Final = PlaceReference(object=ObjectClass.VEHICLES)
+"""Vehicle that is got past."""
+
 _NEXT_JUNCTION: Final = PlaceReference(ordinal=1)
 _MOVING_VERBS: Final = frozenset({"go", "head", "drive", "roll", "move", "keep", "proceed", "take"})
 _STARTING: Final = frozenset({"go", "move", "drive"})
@@ -75,6 +79,7 @@ class Frame:
         implied: whether its action is not named: "on the left, please".
         contingent: whether it depends on a condition of the world.
         joint: kind of the border before it: "then", "and" or ",", or "" without any.
+        replaces: action that the words name and forbid, where the step is another one.
     """
 
     action: StepAction | None = None
@@ -101,6 +106,7 @@ class Frame:
     implied: bool = False
     contingent: bool = False
     joint: str = ""
+    replaces: StepAction | None = None
 
     @property
     def starts(self) -> bool:
@@ -173,10 +179,12 @@ class PlanState:
 
     def _complete(self, frame: Frame) -> None:
         """Gives a step whose clause has ended the action that its parts tell."""
-        if frame.action is None and frame.verb == "go" and frame.ends:
+        moves = frame.verb == "go" or (frame.verb in _STARTING and frame.joint == "then")  # "wait, then drive"
+        if frame.action is None and moves and frame.ends:
             frame.action = StepAction.GO
         if frame.negated and frame.forbidden and (frame.action is StepAction.GO or frame.starts):
             frame.action, frame.negated = StepAction.WAIT, False  # "don't go until the lights let you"
+            frame.replaces = StepAction.GO
         if frame.action is StepAction.GO and (frame.distance is not None or frame.relation is ConditionRelation.UNTIL):
             frame.action = StepAction.STRAIGHT  # "drive on until you see the KFC"
         vague = frame.direction is None and frame.ordinal is None and frame.at is None and frame.distance is None
@@ -293,31 +301,6 @@ class PlanState:
             frame.deferred = True
         last.mood, last.deferred = errands[0].mood, False
 
-    def drop_denied_name(self) -> None:
-        """Drops a street that is only named to be corrected: "not Hayward, Hubbard"."""
-        for before, frame in itertools.pairwise(self.frames):
-            names = before.action is StepAction.FOLLOW and before.negated and not before.forbidden and not before.word
-            if names and not before.verb and frame.action is StepAction.FOLLOW and frame.bare:
-                before.action = None
-
-    def drop_repeated(self) -> None:
-        """Drops turns that are only said again, and an errand to the place of another step: "left there, go there"."""
-        turns = [frame for frame in self.frames if frame.action is not None and frame.mood is not ClauseMood.STATEMENT]
-        for before, frame in itertools.pairwise(turns):
-            same = frame.action is StepAction.TURN and before.action is StepAction.TURN and not before.negated
-            counted = same and frame.joint in ("", ",") and frame.ordinal is not None and _counts_same(before, frame)
-            if counted or (same and frame.joint == "," and _says_again(before, frame)):
-                frame.relation, frame.at = frame.relation or before.relation, frame.at or before.at
-                frame.ordinal, frame.distance = frame.ordinal or before.ordinal, frame.distance or before.distance
-                before.action = None
-        sides = {frame.direction for frame in turns if frame.action is StepAction.TURN}
-        if len(sides) > 1:
-            return
-        for frame in turns[1:]:
-            there = frame.place is not None and frame.place.reference is Anaphor.THERE
-            if frame.action is StepAction.VISIT and there:
-                frame.action = None
-
     def open_action(self, frame: Frame) -> None:
         """Sets what the words in front of an action say of it: whether it waits, and whether it is told."""
         if frame.action is StepAction.VISIT:
@@ -351,8 +334,7 @@ class PlanState:
             frame.speed = frame.bare_number if frame.speed is None and frame.change is None else frame.speed
             if frame.speed is None and frame.change is None:
                 return []
-        if frame.relation is ConditionRelation.BESIDE and frame.action in _AT_PLACES:
-            frame.relation = ConditionRelation.AT  # "by the Shell, turn left"
+        self._settle_relation(frame)
         here = frame.at is not None and (frame.at.reference is Anaphor.THERE or frame.at == _NEXT_JUNCTION)
         if frame.action is StepAction.STRAIGHT and here and frame.relation is ConditionRelation.AT:
             frame.relation = frame.at = None
@@ -360,11 +342,23 @@ class PlanState:
         if frame.action is StepAction.TURN and frame.ordinal is not None and passes:
             if frame.at == PlaceReference(ordinal=max(frame.ordinal - 1, 1)) and frame.ordinal > 1:
                 frame.relation = frame.at = None  # "past three streets, at the fourth, left"
+        if frame.action in TURNING and frame.relation is ConditionRelation.UNTIL and frame.at is not None:
+            stretch = Frame(action=StepAction.STRAIGHT, relation=frame.relation, at=frame.at)
+            frame.relation = frame.at = None  # "up to the KFC, then right"
+            return [step for step in (stretch.step(), frame.step()) if step is not None]
         other, relation = _other_errand(frame), frame.relation
         if other is not None:
             frame.relation = frame.at = None
         steps = (frame.step(), other) if relation is ConditionRelation.BEFORE else (other, frame.step())
         return [step for step in steps if step is not None]
+
+    def _settle_relation(self, frame: Frame) -> None:
+        """Puts the condition of a step into the form that its action has."""
+        if frame.relation is ConditionRelation.BESIDE and frame.action in _AT_PLACES:
+            frame.relation = ConditionRelation.AT  # "by the Shell, turn left"
+        passed = frame.relation is ConditionRelation.PAST and frame.at == OVERTAKEN
+        if frame.action is StepAction.LANE and frame.direction is not None and passed:
+            frame.relation = frame.at = None  # "pass that bus on the left"
 
     def _avoids(self, frame: Frame) -> bool:
         """Makes a place that must not be passed one to avoid: "don't go over the bridge"; returns whether it did."""
@@ -405,20 +399,6 @@ class PlanState:
         if frame.action is StepAction.LIGHTS:
             frame.change = StepChange.OFF if frame.change is StepChange.ON else StepChange.ON
         return frame.action in (StepAction.SPEED, StepAction.LIGHTS)
-
-
-def _says_again(before: Frame, frame: Frame) -> bool:
-    """Returns whether a turn behind a comma is the one before it, with the same or with more detail."""
-    if before.direction is not frame.direction or frame.direction is None or frame.verb or frame.word:
-        return False
-    pairs = ((before.ordinal, frame.ordinal), (before.at, frame.at), (before.distance, frame.distance))
-    return all(old is None or new is None or old == new for old, new in pairs) and all(old is None for old, _ in pairs)
-
-
-def _counts_same(before: Frame, frame: Frame) -> bool:
-    """Returns whether two turns are the same counted one: "second right, I think it is, yes, second right"."""
-    same = (before.direction, before.ordinal) == (frame.direction, frame.ordinal)
-    return same and (before.at is None or frame.at is None or before.at == frame.at)
 
 
 def _other_errand(frame: Frame) -> PlanStep | None:

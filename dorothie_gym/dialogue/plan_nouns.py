@@ -20,6 +20,9 @@ _NOTHING: Final = frozenset({"", ",", "?", "and", "then", "on", "please"})
 _NO_OWNERS: Final = frozenset({"let's", "what's", "how's", "here's", "where's", "who's", "when's"})
 """Words in 's that are no owners of what follows."""
 
+_SEVERAL: Final = frozenset({None, LandmarkName.HOUSE, LandmarkName.SHELL, LandmarkName.PERSON})
+"""Landmarks of which there are several, and what is none."""
+
 _UNKNOWN_WORDS: Final = 2
 """Words between an article and the noun that the grammar need not know: "that daft red wall"."""
 
@@ -52,6 +55,8 @@ class NounReader(TokenReader):
         while found is None and article and skipped < _UNKNOWN_WORDS and self._is_unknown(place + skipped):
             skipped += 1
             found, behind = self._head(place + skipped, ordinal)
+            if found is not None and found.reference is not None and found.reference.landmark not in _SEVERAL:
+                found, behind = self._head(place + skipped, None)  # "second call the Ikea"
         if found is None and ordinal is not None and skipped == 0:
             ends = (
                 ("", ",", "?", "on", "please", "then", "and")

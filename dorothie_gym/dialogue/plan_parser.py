@@ -7,7 +7,17 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood, ClauseReader
-from dorothie_gym.dialogue.plan_frames import FORBIDDING, NEEDING_PLACE, NEGATING, PASSING, Frame, Refusal, append_step
+from dorothie_gym.dialogue.numerals import read_ordinal
+from dorothie_gym.dialogue.plan_frames import (
+    FORBIDDING,
+    NEEDING_PLACE,
+    NEGATING,
+    OVERTAKEN,
+    PASSING,
+    Frame,
+    Refusal,
+    append_step,
+)
 from dorothie_gym.dialogue.plan_items import (
     ActionItem,
     BoundaryItem,
@@ -26,9 +36,9 @@ from dorothie_gym.dialogue.plan_items import (
     VerbItem,
     WordItem,
 )
-from dorothie_gym.dialogue.plan_places import PlaceReader, fetches
-from dorothie_gym.dialogue.plan_speeds import SpeedReader
-from dorothie_gym.dialogue.plan_turns import TurnReader
+from dorothie_gym.dialogue.plan_leftovers import LeftoverReader
+from dorothie_gym.dialogue.plan_places import fetches
+from dorothie_gym.dialogue.plan_repetitions import RepetitionReader
 from dorothie_gym.dialogue.plan_waits import WaitReader
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import (
@@ -117,14 +127,19 @@ _AFTERWARDS: Final = frozenset({"after", "once"})
 _IT: Final = frozenset({"it", "that", "them", "those"})
 _TURNS: Final = frozenset({"turn", "turns", "turned", "turning", "turnings", "straight"})
 _WAYS: Final = frozenset({"to", "down", "up", "on", "over", "along", "straight"})
-_PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
 _RANKING: Final = frozenset({"accept", "defer", "advance"})
 """Kinds of actions that order what has been named."""
-_NEAR: Final = frozenset({ConditionRelation.OPPOSITE, ConditionRelation.BESIDE})
-"""Relations by which a place alone tells where to stop."""
-_FEW: Final = 6
-"""Words of a sentence that names nothing but a place to pass."""
-_WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
+_GOING: Final = (["we're"], ["i'm"])
+_HEADING: Final = frozenset({"going", "heading", "off"})
+_PLACING: Final = frozenset(
+    {ConditionRelation.AT, ConditionRelation.BESIDE, ConditionRelation.OPPOSITE, ConditionRelation.BEFORE}
+)
+"""Relations that say more precisely where "there" is."""
+_ROOM: Final = frozenset({"room", "space", "berth"})
+_OVERTAKING: Final = frozenset(
+    {"round", "around", "past", "by", "pass", "passing", "overtake", "overtaking", "leapfrog"}
+)
+"""Words of an action that gets past another vehicle."""
 _PAST: Final = frozenset({"shut", "went", "got", "closed", "ran", "came", "has", "looks"})
 
 
@@ -140,7 +155,7 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
+class _Builder(LeftoverReader, WaitReader, RepetitionReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:
@@ -174,13 +189,17 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         waiting = (pending.at, pending.ordinal, pending.distance) != (None, None, None)
         last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
         if last is not None and last.mood in ORDERED:
-            stops = last.action in (StepAction.STOP, StepAction.WAIT) and last.at is None and last is self.frames[-1]
+            open_place = last.at is None or self.is_vague(last)
+            stops = last.action in (StepAction.STOP, StepAction.WAIT) and open_place and last is self.frames[-1]
+            if self.joint == "and" and pending.relation is ConditionRelation.AFTER:
+                pending.relation = ConditionRelation.AT  # "the Ikea, and after the KFC"
             if not (stops and self.joint in ("", ",")):  # not in "stop on the right, at the KFC"
                 self.stop_between()
-            if last.at is None and pending.at is not None:
+            if pending.at is not None and (last.at is None or (stops and pending.relation in _PLACING)):
+                last.negated = last.negated and last.at is None  # "don't stop here, over there by the trees"
                 self.attach(last, pending.relation or ConditionRelation.AT, pending.at)
             last.distance = last.distance or pending.distance
-        self._leftovers()
+        self.read_leftovers()
         described: list[PlanStep] = []
         ordered: list[PlanStep] = []
         contingent: list[PlanStep] = []
@@ -196,6 +215,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
                     named = bool(frame.word or frame.verb in _TAKING) and step.action is StepAction.TURN
                     named = named or frame.joint == "then"
                     append_step(contingent if frame.contingent else ordered, step, named=named)
+        replaced = {frame.replaces for frame in self.frames if frame.replaces is not None and frame.action is not None}
         return PlanParse(
             plan=DrivingPlan(tuple(ordered[:MAX_STEPS])),
             described=tuple(described),
@@ -204,7 +224,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
             cancelled=bool(self.cancelled),
             moods=tuple(self.moods),
             repaired=self.repaired,
-            denied=frozenset(self.denied),
+            denied=frozenset(self.denied | replaced),
             aside=self.aside,
             waiting=waiting,
             person=self.person,
@@ -212,60 +232,12 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
             ceasing=self.ceasing,
             turned=self.turned or not self.sided,
             bare=all(frame.bare for frame in self.frames if frame.action is not None and frame.mood in ORDERED),
-            implied=frozenset(frame.action for frame in self.frames if frame.implied and frame.action is not None),
+            implied=frozenset(
+                frame.action
+                for frame in self.frames
+                if (frame.implied or frame.replaces is not None) and frame.action is not None
+            ),
         )
-
-    def _leftovers(self) -> None:
-        """Makes a step of what waits for one: "the second", "on the right-hand side, please"."""
-        acting = [frame for frame in self.frames if frame.action is not None]
-        if self.pending.ordinal is not None and acting and acting[-1].action is StepAction.TURN and acting[-1].negated:
-            self.open_step(StepAction.TURN)  # "not the next right, the third"
-            return
-        sided = self.pending.side is not None and self.moods[:1] != [ClauseMood.STATEMENT]
-        told = sided and ClauseMood.QUESTION not in self.moods  # "left side please, he's asleep"
-        if acting or not (told or ORDERED.issuperset(self.moods)):
-            return
-        short = self.opportunity and len(self.clauses.words) <= _FEW  # "second exit at the roundabout"
-        if self.pending.ordinal is not None and self.negation is None and (len(self.moods) > 1 or short):
-            self.open_step(StepAction.TURN)
-        elif (
-            self.pending.side is not None
-            and len(self.clauses.words) == 3
-            and self.clauses.words[2] in ("left", "right")
-        ):
-            self.open_step(StepAction.TURN).direction = self.pending.side  # "on the left", of the ways
-            self.aside = False
-        elif self.pending.side is not None and (self.opportunity or self._on_street()):
-            side, self.pending.side, self.aside = self.pending.side, None, False
-            turn = self.open_step(StepAction.TURN)  # "the turning we want is there on the left"
-            turn.direction = side
-        elif self.pending.side is not None and _WARNING.isdisjoint(self.clauses.words[:1]):
-            self.open_step(StepAction.STOP).implied = True
-        elif self.pending.bare_number is not None and len(self.clauses.words) <= 4:
-            self.open_step(StepAction.SPEED)
-        elif self.pending.at and self.pending.at.landmark and self.pending.relation in _NEAR:
-            self.open_step(StepAction.STOP).implied = True  # "next to the Shell, please"
-        elif self.pending.at and self.pending.relation in _PASSED and len(self.clauses.words) <= _FEW:
-            self._go_past(self.pending.at)
-        elif self.pending.relation is ConditionRelation.AT and self.pending.at and self.pending.at.landmark:
-            place, self.pending.at = self.pending.at, None
-            self.open_step(StepAction.VISIT).place = place
-
-    def _on_street(self) -> bool:
-        """Returns whether only a street has been named: "Draper, on the right hand"."""
-        last = self.last_place
-        if last is None or last.to_json().keys() != {"street"}:
-            return False
-        self.pending.relation, self.pending.at = ConditionRelation.AT, last
-        return True
-
-    def _go_past(self, place: PlaceReference) -> None:
-        """Orders to go on past a place, or along a street: "straight past the KFC", "by Hubbard"."""
-        if place.to_json().keys() == {"street"}:
-            self.pending.at = None
-            self.open_step(StepAction.FOLLOW).place = place
-        else:
-            self.open_step(StepAction.STRAIGHT)
 
     def _boundary(self, item: BoundaryItem) -> None:
         self.fresh = True
@@ -273,10 +245,13 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         self.negation, self.preceded = None, False
         if item.kind == "then":
             self.stop_between()
+            self.end_stretch()
             self.close()
         before = self.mood
         self._clause(item.place, new=False)
-        if item.kind == "then" and before in ORDERED and self.clauses.names_next(item.place):
+        following = self.clauses.words[item.place : item.place + 3]
+        leads = following[:1] in _GOING and not _HEADING.isdisjoint(following)  # "then we're all going to the KFC"
+        if item.kind == "then" and before in ORDERED and (leads or self.clauses.names_next(item.place)):
             self.mood = self.moods[-1] = ClauseMood.COMMAND  # "pick up Tom, and after that it's the Coco"
 
     def _contingency(self, item: ContingencyItem) -> None:
@@ -383,6 +358,11 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
             frame.speed = self.last_speed
         if item.kind == "leave":
             frame.verb, frame.implied = "leave", True
+        if action is StepAction.AVOID and not _ROOM.isdisjoint(said):
+            frame.place = OVERTAKEN  # "give that bike more room"
+        passing = "#object" in said and not _OVERTAKING.isdisjoint(said)
+        if action is StepAction.LANE and frame.at is None and passing:
+            frame.relation, frame.at = ConditionRelation.PAST, OVERTAKEN
         frame.ends = self._ends(item.end)
 
     def _goes_on_to(self, action: StepAction, item: ActionItem) -> bool:
@@ -396,7 +376,8 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         if action is StepAction.VISIT and words[item.end - 1] == "to" and words[item.place] in _WAYS:
             self.reaching = frame
             return True
-        return words[item.place] in ("all", "down", "up") and action in (StepAction.STRAIGHT, StepAction.FOLLOW)
+        frame.bare = frame.bare and words[item.end - 1] != "end"  # "Fuller to the end, left"
+        return words[item.place] in ("all", "down", "up", "to") and action in (StepAction.STRAIGHT, StepAction.FOLLOW)
 
     def _ends(self, place: int) -> bool:
         """Returns whether the clause ends at a token, apart from "now" and the like, or "it's" begins a new one."""
@@ -445,6 +426,9 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         if frame is not None and speeding and item.word == "it" and frame.speed is None and frame.change is None:
             frame.speed = self.last_speed  # "the limit is thirty, stick to it"
             return
+        if frame is not None and frame.last == "behind" and frame.action is StepAction.FOLLOW and item.word in _IT:
+            frame.place = OVERTAKEN if frame.place is None else frame.place  # "stay behind it"
+            return
         if frame is not None and frame.word in ("cross", "pass") and item.word in _IT and not self.fresh:
             if self.last_place is not None and frame.at is None:
                 frame.relation, frame.at = ConditionRelation.PAST, self.last_place
@@ -452,7 +436,7 @@ class _Builder(TurnReader, PlaceReader, SpeedReader, WaitReader):
         if frame is not None and frame.action is StepAction.VISIT and frame.place is None and fetches(frame):
             if item.word in route_grammar().people and not self.fresh:
                 self.fetch(frame)
-            elif item.word not in route_grammar().modifiers:
+            elif item.word not in route_grammar().modifiers and read_ordinal(item.word) is None:
                 frame.word = ""  # things are collected, too
             return
         if frame is not None and frame.bare and not self.fresh and frame is self.frames[-1]:

@@ -1,4 +1,4 @@
-"""Places of driving plans: conditions, errands, streets to follow or avoid, and opportunities to turn."""
+"""Places of driving plans: conditions, errands, and streets to follow or avoid."""
 
 from __future__ import annotations
 
@@ -10,23 +10,16 @@ from dorothie_gym.dialogue.plan_frames import (
     FORBIDDING,
     NEEDING_PLACE,
     NEGATING,
-    PASSING,
-    REFUSING,
     Frame,
-    PlanState,
     Refusal,
     with_details,
 )
+from dorothie_gym.dialogue.plan_opportunities import OpportunityReader
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.plan_items import ConditionItem, NounPhrase
-
-_INITIAL: Final = frozenset(
-    {"take", "makes", "make", "turn", "hang", "swing", "go", "want", "need", "have", "get", "be", "do"}
-)
-"""Verbs whose object can be an opportunity to turn: "take the second"."""
 
 _FETCHING: Final = frozenset(
     [
@@ -45,15 +38,18 @@ _LATER: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.BEFORE, Co
 _PASSED: Final = frozenset({ConditionRelation.PAST, ConditionRelation.AFTER})
 """Relations to places that are driven by."""
 
+_ENDING: Final = frozenset({ConditionRelation.PAST, ConditionRelation.UNTIL})
+"""Relations to a place up to which a stretch is driven."""
+
 _ALONG: Final = frozenset({"on", "along", "up", "down"})
 """Last words of an order to go on behind which a street is the one to go along."""
 
-_OVERTAKING: Final = frozenset({"pass", "passing"})
+_OVERTAKING: Final = frozenset({"pass", "passing", "overtake", "overtaking"})
 _ROUND: Final = frozenset({"round", "around", "past", "by"})
 """Last words of an order to get past another vehicle."""
 
 
-class PlaceReader(PlanState):
+class PlaceReader(OpportunityReader):
     """Reads the places of a plan."""
 
     def __init__(self) -> None:
@@ -61,7 +57,6 @@ class PlaceReader(PlanState):
         super().__init__()
         self.last_place: PlaceReference | None = None
         self.reaching: Frame | None = None  # step that ends at the next place: "down to" of "take Fuller down to"
-        self.opportunity = False  # whether a turning, a street or a junction has been mentioned
         self.person = False  # whether somebody is to be fetched
 
     def read_condition(self, item: ConditionItem) -> None:
@@ -128,8 +123,11 @@ class PlaceReader(PlanState):
 
     def _takes(self, frame: Frame, place: PlaceReference) -> bool:
         """Returns whether a step has no place yet, or one that says less: "stop over there, where the people are"."""
-        vague = frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
-        return frame.at is None or frame.borrowed or (vague and place.reference is None)
+        return frame.at is None or frame.borrowed or (self.is_vague(frame) and place.reference is None)
+
+    def is_vague(self, frame: Frame) -> bool:
+        """Returns whether the place of a step is only "here" or "there"."""
+        return frame.at is not None and frame.at.reference in (Anaphor.HERE, Anaphor.THERE)
 
     def _passes_next(self, frame: Frame, relation: ConditionRelation) -> bool:
         """Returns whether another place is passed behind the one of a step."""
@@ -180,8 +178,8 @@ class PlaceReader(PlanState):
         if fetching:
             frame.relation, frame.at = ConditionRelation.AT, place  # "pick her up from the KFC"
         elif frame.action is StepAction.VISIT and frame.place is None and relation not in _LATER:
-            if _names_only_street(place) and relation is ConditionRelation.AT:
-                frame.action = StepAction.FOLLOW  # "get us onto the highway"
+            if _names_only_street(place) and relation in (ConditionRelation.AT, ConditionRelation.BESIDE):
+                frame.action = StepAction.FOLLOW  # "get us onto the highway", "go round by Murfin"
             frame.place = place
         elif self._orders_errands(frame, relation, place):
             pass
@@ -241,7 +239,7 @@ class PlaceReader(PlanState):
         """Reads a place or an opportunity that no relation introduces."""
         place = item.reference
         if place is None:
-            self._refuse_or_follow(item)
+            self.read_opportunity(item)
             return
         if place.reference is None:
             self.last_place = place
@@ -259,7 +257,8 @@ class PlaceReader(PlanState):
         elif frame.action is None:
             self._object_of_verb(frame, place)
         elif frame.action is StepAction.LANE and place.object is ObjectClass.VEHICLES:
-            pass  # "overtake that lorry"
+            if frame.word in _OVERTAKING and frame.at is None:
+                frame.relation, frame.at = ConditionRelation.PAST, place  # "overtake that lorry"
         elif frame.action is StepAction.LIGHTS and place.reference is not None:
             pass  # "it's dark out there"
         elif frame.at is None and frame.action is not StepAction.SPEED:
@@ -291,6 +290,7 @@ class PlaceReader(PlanState):
             return  # "straight along here"
         if crossed and place.object is ObjectClass.VEHICLES and frame.word in _OVERTAKING:
             frame.action = StepAction.LANE  # "pass that bus on the left"
+            frame.relation, frame.at = ConditionRelation.PAST, place
             return
         if crossed and place.landmark is LandmarkName.HOUSE and frame.last == "straight":
             frame.action, frame.place = StepAction.VISIT, place  # "go straight home"
@@ -298,28 +298,34 @@ class PlaceReader(PlanState):
         if crossed and _names_only_street(place) and frame.last in _ALONG:
             frame.action, frame.place = StepAction.FOLLOW, place  # "straight on Bonisteel"
             return
+        if frame.action is StepAction.GO and place.landmark is not None:
+            frame.action, frame.place = StepAction.VISIT, place  # "go on home"
+            return
         frame.relation = ConditionRelation.PAST if crossed else ConditionRelation.AT
         frame.at = place
 
     def _target(self, frame: Frame, place: PlaceReference) -> None:
         """Completes "take me to", "follow", "avoid" with a place."""
+        if frame.action is StepAction.FOLLOW and (place.landmark or place.object is ObjectClass.BUILDING):
+            self._lead_to(frame, place)
+            return
+        if frame.action is StepAction.VISIT and self._leads_along(frame, place):
+            frame.action, frame.place = StepAction.FOLLOW, place
+            return
         if frame.action is StepAction.TURN and frame.verb == "leave":
             if place.landmark is not None:
                 frame.action, frame.place = StepAction.VISIT, place
             else:
                 frame.relation, frame.at = ConditionRelation.FROM, place
-        elif frame.word in ("grab", "grabbing", "hit") and _names_only_street(place):
-            frame.action, frame.place = StepAction.FOLLOW, place
         elif fetches(frame) and place.object is ObjectClass.PEDESTRIAN:
             self.fetch(frame, place)
         elif place.object is ObjectClass.VEHICLES and frame.last in _ROUND:
             frame.action = StepAction.LANE  # "go round this bus"
+            frame.relation, frame.at = ConditionRelation.PAST, place
         elif frame.action is StepAction.VISIT and place.object is not None and frame.word in ("stop", "stopping"):
             frame.action, frame.relation, frame.at = StepAction.STOP, ConditionRelation.BESIDE, place
         elif frame.action is StepAction.VISIT and place.object is not None and place.landmark is None:
             frame.action, frame.relation, frame.at = StepAction.STRAIGHT, ConditionRelation.UNTIL, place
-        elif frame.action is StepAction.FOLLOW and place.landmark is not None:
-            frame.action = None
         else:
             frame.place = place
             if self.negation in NEGATING:
@@ -352,7 +358,7 @@ class PlaceReader(PlanState):
             if place.reference in (Anaphor.HERE, Anaphor.THERE) and self.frame is not None and self.frame.at is None:
                 self.frame.relation, self.frame.at = ConditionRelation.AT, self._resolved(place)
             elif place.reference is Anaphor.WAY_WE_CAME:
-                self.open_step(StepAction.FOLLOW).place = place
+                self._return_by(place)
             elif place.reference in (Anaphor.START, Anaphor.LAST_STOP):
                 self.open_step(StepAction.VISIT).place = place
             elif place.reference is not None:
@@ -368,6 +374,40 @@ class PlaceReader(PlanState):
         elif self.negation in NEGATING or not self.pending.at:
             frame = self.open_step(StepAction.FOLLOW)
             frame.place, frame.bare = place, not frame.negated
+
+    def _leads_along(self, frame: Frame, place: PlaceReference) -> bool:
+        """Returns whether words of an errand name a way: "hit Fuller", "return by the same way"."""
+        named = frame.word in ("grab", "grabbing", "hit") or frame.last in ("by", "via", "along")
+        return place.reference is Anaphor.WAY_WE_CAME or (named and _names_only_street(place))
+
+    def _lead_to(self, frame: Frame, place: PlaceReference) -> None:
+        """Reads a place that no way is, behind words of following one."""
+        frame.action = None  # "they tore down the old school"
+        if place.landmark is not None and frame.word in ("via", "by", "go", "going"):
+            self._visit_on_way(frame, place)  # "home by way of the KFC"
+
+    def _visit_on_way(self, frame: Frame, place: PlaceReference) -> None:
+        """Makes a place that the way leads by an errand in front of the one that it leads to."""
+        before = self.frames.index(frame) - 1
+        aimed = before >= 0 and self.frames[before].action is StepAction.VISIT and frame.joint in ("", ",")
+        frame.action, frame.place = StepAction.VISIT, place
+        if aimed and self.frames[before].place is not None:
+            self.frames[before : before + 2] = [frame, self.frames[before]]
+
+    def end_stretch(self) -> None:
+        """Ends the stretch named last at a place behind it: "go down Hayward, past the KFC, and then left"."""
+        last = self.frames[-1] if self.frames else None
+        if last is None or self.pending.at is None or self.pending.relation not in _ENDING or last.at is not None:
+            return
+        if last.action in (StepAction.FOLLOW, StepAction.STRAIGHT) and last.distance is None and not last.negated:
+            last.relation, last.at, self.pending.at = self.pending.relation, self.pending.at, None
+
+    def _return_by(self, place: PlaceReference) -> None:
+        """Orders to follow the way so far, also to the place named before it: "go home the way we came"."""
+        visit = self.frame if self.frame is not None and not self.fresh else None
+        self.open_step(StepAction.FOLLOW).place = place
+        if visit is not None and visit.action is StepAction.VISIT and visit.place is not None:
+            self.frames[-2:] = [self.frames[-1], visit]
 
     def _passes_on(self, place: PlaceReference) -> bool:
         """Goes on past a second place: "past the Burger King and the Shell"."""
@@ -417,8 +457,9 @@ class PlaceReader(PlanState):
             for name in ("place", "at"):
                 old = getattr(frame, name)
                 if old is not None and old == place:
-                    self.repairing = self.mood is ClauseMood.STATEMENT  # "no, Fuller is jammed, take Beal"
-                    return self.repairing
+                    self.repairing = self.mood is ClauseMood.STATEMENT or self.negation == "not"
+                    self.negation = None if self.negation == "not" else self.negation
+                    return self.repairing  # "no, Fuller is jammed, take Beal", "no, not Fuller, Beal"
                 if old is not None and old.street is not None and _names_only_street(place):
                     place = with_details(old, street=place.street)  # "the house on Beal, no, Fuller"
                 if old is not None and (old.landmark is None) is (place.landmark is None):
@@ -426,66 +467,6 @@ class PlaceReader(PlanState):
                     self.repaired, self.frame, self.fresh = True, frame, False
                     return True
         return False
-
-    def _refuse_or_follow(self, item: NounPhrase) -> None:
-        """Reads an opportunity, which may be refused, or counted from one that has been."""
-        passing = self.frame is not None and not self.fresh and self.frame.word in PASSING
-        if item.follows and self.refused is not None:
-            self.negation = None
-        if item.follows and self.follow_refused():
-            self.counting = self.opportunity = True
-            return
-        if item.ordinal is not None and self._counts_last(item):
-            return
-        if self.negation == "not" and self.pending.ordinal is not None and item.ordinal is not None:
-            self.negation = None  # "the second, not the first"
-            return
-        if self.negation in REFUSING or passing:
-            self.refused = Refusal(None, item.ordinal)
-        self._opportunity(item.ordinal, blocks=item.blocks)
-
-    def _counts_last(self, item: NounPhrase) -> bool:
-        """Returns whether a number behind a comma counts the turn before it: "the right turn, the first one"."""
-        last = next((frame for frame in reversed(self.frames) if frame.action is not None), None)
-        if last is None or not self.fresh or self.joint != "," or item.blocks or self.negation is not None:
-            return False
-        apart = last.action is StepAction.TURN and last.direction is not None and last.ordinal is None
-        somewhere = last.at is not None and last.at.reference not in (Anaphor.HERE, Anaphor.THERE)
-        if not apart or somewhere or last.distance is not None or last.negated or self.repairing:
-            return False
-        last.ordinal, last.at = item.ordinal, None
-        return True
-
-    def _opportunity(self, ordinal: int | None, *, blocks: bool) -> None:
-        self.counting = True
-        self.opportunity = self.opportunity or not blocks
-        if self.negation == "cancel" and ordinal is not None:
-            self.open_step(StepAction.TURN)  # "skip the next turn"
-            self.negation = None
-            return
-        if ordinal is None:
-            frame = self.frame
-            if frame is not None and not self.fresh and frame.action is StepAction.FOLLOW and frame.place is None:
-                frame.action = StepAction.STRAIGHT  # "stay on this road"
-            return
-        frame = self.replaced(StepAction.TURN)
-        if frame is None:
-            frame = self.frame if self.frame is not None and not self.fresh else None
-        turned = frame is not None and frame.action is StepAction.TURN and frame.direction is not None
-        if blocks and turned and self.mood in ORDERED:
-            self.open_step(StepAction.STRAIGHT).ordinal = ordinal  # "right at the KFC, two blocks, then left"
-        elif frame is not None and frame.action in (StepAction.TURN, StepAction.STOP):
-            frame.ordinal = ordinal if self.repaired or frame.ordinal is None else frame.ordinal
-        elif frame is not None and frame.action is None and frame.verb in _INITIAL and not blocks:
-            frame.action, frame.ordinal = StepAction.TURN, ordinal
-        elif frame is not None and frame.action is StepAction.STRAIGHT and frame.at is None:
-            frame.ordinal = ordinal  # "straight over two junctions"
-        elif blocks and frame is not None and frame.action is None:
-            frame.action, frame.ordinal = StepAction.STRAIGHT, ordinal
-        elif blocks and self.mood in ORDERED and self.pending.at is None:
-            self.open_step(StepAction.STRAIGHT).ordinal = ordinal  # "two blocks, then left"
-        else:
-            self.pending.ordinal = None if blocks else ordinal
 
 
 def _names_only_street(place: PlaceReference) -> bool:

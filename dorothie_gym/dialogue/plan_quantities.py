@@ -110,6 +110,8 @@ class QuantityReader(TokenReader):
         self.items.append(SpeedItem(max(1, round(speed)), unit))
 
     def _per_hour(self, place: int) -> tuple[float | None, int]:
+        if self.word_at(place) == "in" and self.word_at(place + 1) in ("one", "an"):
+            place += 2  # "fifty kilometres in one hour"
         place += self.word_at(place) in ("per", "an", "a", "the")
         hours = self.grammar.hours.get(self.word_at(place))
         return hours, place + 1

@@ -12,7 +12,7 @@ from dorothie_gym.dialogue.clause_moods import ClauseReader
 from dorothie_gym.dialogue.directions import WordLists, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import find_names, known_words
 from dorothie_gym.dialogue.lexicon import split_words
-from dorothie_gym.dialogue.numerals import read_ordinal
+from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_ordinal
 from dorothie_gym.dialogue.phrases import read_talk_files
 from dorothie_gym.dialogue.plan_chunker import read_items
 from dorothie_gym.dialogue.plan_parser import PlanParse, Sentence, parse_plan
@@ -52,6 +52,8 @@ _REACHING = (["you"], ["we"], ["i"], ["you'll"], ["we'll"], ["to"])
 """Words behind which one hits the lights of a junction, rather than a switch."""
 _LIGHTS = frozenset({"light", "lights"})
 _NONE: frozenset[str] = frozenset()
+_AGREEING = frozenset({"yes", "yeah", "yep", "yup", "aye", "i", "said", "okay", "ok"})
+"""Words with which a direction is only said again: "left at the sign ... yeah, left"."""
 _COMPOUNDS = frozenset({"traffic", "stop", "street", "red", "green", "yellow"})
 """First parts of names of lights that the lexicon knows."""
 
@@ -61,11 +63,14 @@ def with_plain_lights(words: Sequence[str]) -> list[str]:
     found = list(words)
     if _LIGHTS.isdisjoint(found):
         return found
+    if found == ["lights"]:
+        return ["headlights", "on"]
     grammar = route_grammar()
     for place in range(len(found)):
         match = grammar.lights.longest(found, place)
         reached = found[place] == "hit" and found[place - 1 : place] in _REACHING
-        if match is not None and not reached and not _is_at_junction(found, place, _NONE):
+        signal = place > 0 and found[place - 1] in _COMPOUNDS
+        if match is not None and not reached and not signal and not _is_at_junction(found, place, _NONE):
             for number in range(place, place + match.length):
                 if found[number] in _LIGHTS:
                     found[number] = "headlights"
@@ -108,7 +113,11 @@ def read_plan(text: str) -> PlanParse:
 
 def _says_again(before: Sentence, sentence: Sentence) -> bool:
     """Returns whether a sentence only repeats the direction of the one before: "Left! Left, left!"."""
-    return len({*before.clauses.words, *sentence.clauses.words}) == 1
+    if len({*before.clauses.words, *sentence.clauses.words}) == 1:
+        return True
+    said = [word for word in sentence.clauses.words if word != ","]
+    rest = [word for word in said if word not in _AGREEING]
+    return len(rest) == 1 < len(said) and rest[0] in ("left", "right") and rest[0] in before.clauses.words
 
 
 def _plain(words: Sequence[str], lists: WordLists) -> list[str]:
@@ -135,9 +144,11 @@ def _asks_for_name(before: Sequence[str], behind: Sequence[str]) -> bool:
 
 
 def _counts_again(before: Sequence[str], behind: Sequence[str]) -> bool:
-    """Returns whether a turn is counted differently behind a hesitation: "second right, er, third right"."""
+    """Returns whether a turn or a speed is counted anew behind a hesitation: "second right, er, third right"."""
     before = before[:-1] if before[-1:] == [","] else before
     behind = [word for word in behind[:4] if word != ","]
+    if before and behind and before[-1] in NUMBER_WORDS and behind[0] in NUMBER_WORDS:
+        return True  # "do forty, er, thirty five"
     counted = len(before) > 1 and read_ordinal(before[-2]) is not None and before[-1] in ("left", "right")
     return counted and bool(behind) and read_ordinal(behind[0]) is not None and before[-1] in behind
 

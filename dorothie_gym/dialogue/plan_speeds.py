@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _OPPOSITE: Final = {StepChange.FASTER: StepChange.SLOWER, StepChange.SLOWER: StepChange.FASTER}
 _AMOUNTS: Final = frozenset({"bit", "little", "touch", "tad", "hair"})
+_DRIVEN: Final = frozenset({"do", "go", "drive", "make", "keep", "take"})
 _DEGREES: Final = frozenset({"too", "less"})
 _UNITS: Final = frozenset({"hour", "mph", "kph", "kmh", "kmph", "k", "clicks"})
 _BY: Final = frozenset({"knock", "shave", "take"})
@@ -85,8 +86,9 @@ class SpeedReader(PlanState):
                 changed = frame.change is not None and "off" in said and not _BY.isdisjoint(said)
                 frame.speed = None if changed else item.speed
                 frame.bare_number = None if item.unit or changed else item.speed
-        elif item.unit or (frame is not None and frame.verb in ("do", "go", "drive", "make", "keep", "take")):
-            opened = frame if frame is not None and frame.action is None else self.open_step(StepAction.SPEED)
+        elif item.unit or (frame is not None and (frame.verb in _DRIVEN or frame.word == "do")):
+            fits = frame is not None and (frame.action is None or (frame.word == "do" and frame.place is None))
+            opened = frame if frame is not None and fits else self.open_step(StepAction.SPEED)
             opened.action, opened.speed = StepAction.SPEED, item.speed
         else:
             self.pending.bare_number = item.speed

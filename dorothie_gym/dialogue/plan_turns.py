@@ -147,8 +147,8 @@ class TurnReader(PlanState):
     def _bare_street(self) -> PlaceReference | None:
         """Returns a street that has been named without a verb, and takes its step back: "Plymouth, and left"."""
         last = self.frames[-1] if self.frames else None
-        if last is None or not last.bare or last.action is not StepAction.FOLLOW or last.place is None:
-            return None
+        if last is None or not last.bare or last.action is not StepAction.FOLLOW or last.place is None or last.at:
+            return None  # no "Hubbard up to Hayward, right"
         self.frames.pop()
         self.frame = None
         return last.place
@@ -221,12 +221,12 @@ class TurnReader(PlanState):
             self.pending.side = item.direction
         elif frame.action in (StepAction.TURN, StepAction.LANE) and frame.direction is None:
             frame.direction = item.direction
+        elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
+            frame.action, frame.direction = StepAction.TURN, item.direction  # "take the road on the right"
         elif counting and frame.action is not StepAction.STRAIGHT:
             self.open_step(StepAction.TURN).direction = item.direction
         elif frame.action in (StepAction.STOP, StepAction.WAIT) or self._wants_side(frame):
             frame.side = item.direction
-        elif frame.action is None and frame.verb in ("take", "turn", "make") and not self.fresh:
-            frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.STRAIGHT and frame.word in _DOWN and counting and frame.at is None:
             frame.action, frame.direction = StepAction.TURN, item.direction
         elif frame.action is StepAction.VISIT and frame.place is not None:

@@ -22,7 +22,7 @@ from dorothie_gym.dialogue.routes import (
 )
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, StreetName
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies.co_wizard.counted_steps import STOP_APART, counted_together, counts_junctions
 from dorothie_gym.policies.co_wizard.destinations import aim, known_landmark, seek_street, set_goal
 from dorothie_gym.policies.co_wizard.instructed_actions import limit_remark
@@ -92,6 +92,8 @@ _STEERED: Final = {StepAction.TURN: ActionValue.J_TURN, StepAction.U_TURN: Actio
 """Actions by steps that may lead away from the route of the car."""
 
 _ONLY_HERE: Final = frozenset({Anaphor.HERE, Anaphor.THERE})
+_PASSED: Final = StepCondition(relation=ConditionRelation.PAST, place=PlaceReference(object=ObjectClass.VEHICLES))
+"""Condition of a change of lanes that only names what to overtake."""
 
 
 def planned_acts(state: CoWizardState, heard: HeardUtterance) -> frozenset[int]:
@@ -225,7 +227,8 @@ def _has_to_wait(step: PlanStep) -> bool:
     next_one = (
         counts_junctions(step) and at is not None and at.place.ordinal == 1 and at.relation is ConditionRelation.AT
     )
-    if at is not None and at.place.reference not in _ONLY_HERE and not next_one:
+    overtakes = step.action is StepAction.LANE and at == _PASSED
+    if at is not None and at.place.reference not in _ONLY_HERE and not (next_one or overtakes):
         return True
     if step.action is StepAction.TURN and step.distance is not None:
         return True
@@ -393,7 +396,7 @@ def _without_lane(
 ) -> tuple[tuple[PlanStep, ...], Remark | None]:
     """Returns the steps without a change to a lane that is not there, and the remark about it."""
     first = steps[0]
-    if first.action is not StepAction.LANE or first.condition is not None or first.distance is not None:
+    if first.action is not StepAction.LANE or first.condition not in (None, _PASSED) or first.distance is not None:
         return steps, None
     sides = {Direction.LEFT: LinkType.LANE_CHANGE_LEFT, Direction.RIGHT: LinkType.LANE_CHANGE_RIGHT}
     inwards = state.town.traffic.to_middle  # "change lanes"
