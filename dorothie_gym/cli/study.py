@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -65,6 +66,8 @@ def check(file: StudyFile, as_json: AsJson = False) -> None:
     screen.print(f"The first block has {facts['block_size']} groups:")
     for number, slot in enumerate(facts["first_block"], start=1):
         screen.print(f"  {number}  {'; '.join(slot)}", soft_wrap=True)
+    for note in facts["notes"]:
+        screen.print(f"Note: {note}", soft_wrap=True)
 
 
 def _facts(found: studies.Study) -> Facts:
@@ -82,7 +85,17 @@ def _facts(found: studies.Study) -> Facts:
             ]
             for slot in slots
         ],
+        "notes": list(_notes(found)),
     }
+
+
+def _notes(found: studies.Study) -> Iterator[str]:
+    """Yields what a researcher may have forgotten."""
+    ways = found.recruitment
+    if ways.completion.code is None:
+        yield "recruitment.completion has no code: people see none at the end."
+    if ways.no_partner.code is None and len(found.people) > 1:
+        yield "recruitment.no_partner has no code: people for whom nobody comes see none at the end."
 
 
 @study.command()
@@ -113,7 +126,11 @@ def run(
             logging.getLogger("dorothie_gym.lab.studies").setLevel(logging.INFO)
             _print_links(found, link, out)
             stdout().print(f"Experimenter (works once): {experimenter}", soft_wrap=True)
-        serve(server.app(), listener, host)
+        try:
+            serve(server.app(), listener, host)
+        finally:
+            if not as_json:
+                stdout().print("The server has stopped. The same command goes on with the study.", soft_wrap=True)
 
 
 def _print_links(found: studies.Study, link: str, out: Path) -> None:

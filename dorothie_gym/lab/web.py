@@ -144,8 +144,14 @@ def web_server(app: Starlette, *, host_names: Collection[str] = (), **options: A
         "timeout_graceful_shutdown": 2,
     }
     config = Config(Outermost(app), **(usual | options))
+    logging.getLogger("uvicorn.error").addFilter(_is_not_about_waiting)
     quieten(LOGGERS)  # after the configuration has set up logging
     return WebServer(config, visitors)
+
+
+def _is_not_about_waiting(record: logging.LogRecord) -> bool:
+    """Returns False for uvicorn's message that requests are interrupted by a stop: `Outermost` answers them."""
+    return "timeout graceful shutdown exceeded" not in str(record.msg)
 
 
 class Outermost:

@@ -62,7 +62,16 @@ def test_the_example_is_written_once_and_checked(tmp_path: Path) -> None:
     assert code == 0 and "People play: participant, co_wizard." in text
     assert "1 exact in brookside (lunch_break)" in text
     code, text = command("check", file, "--json")
-    assert json.loads(text)["block_size"] == 2
+    assert json.loads(text)["block_size"] == 2 and json.loads(text)["notes"] == []
+
+
+def test_endings_without_a_code_are_noted(tmp_path: Path) -> None:
+    pair = write_study(tmp_path, {**STUDY, "recruitment": {"completion": {"code": "FINISHED"}}})
+    code, text = command("check", pair)
+    assert code == 0 and "Note: recruitment.no_partner has no code" in text and "completion" not in text
+    alone = write_study(tmp_path, {**SOLO, "recruitment": {}})
+    code, text = command("check", alone)
+    assert code == 0 and "Note: recruitment.completion has no code" in text and "no_partner" not in text
 
 
 def test_mistakes_are_named(tmp_path: Path) -> None:

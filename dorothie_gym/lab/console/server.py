@@ -217,8 +217,7 @@ async def _first_text(console: Console, socket: WebSocket) -> str | None:
             console.joining[time] = None
             text = await _text(socket)
     except TimeoutError:
-        gives_way = time not in console.joining
-        await socket.close(CloseCode.TOO_SLOW if gives_way else CloseCode.REFUSED)
+        await socket.close(CloseCode.TOO_SLOW)  # a slow browser tries again
     finally:
         console.joining.pop(time, None)
     return text

@@ -114,9 +114,8 @@ def _compose(path: Path, text: str) -> yaml.Node:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"line {mark.line + 1}" if mark else ""
-        raise InputFileError(
-            path, f"is not YAML ({one_line(error.problem)}); check colons and indents", place
-        ) from None
+        remedy = "check colons and indents, and put text with signs such as : ? , [ in quotes"
+        raise InputFileError(path, f"is not YAML ({one_line(error.problem)}); {remedy}", place) from None
     except yaml.YAMLError as error:
         raise InputFileError(path, f"is not YAML ({one_line(error)})") from None
     if root is None:

@@ -72,6 +72,15 @@ def test_websockets_that_do_not_join_give_way_and_may_try_again(served: Served) 
         assert closed.value.rcvd is not None and closed.value.rcvd.code == CloseCode.TOO_SLOW
 
 
+def test_a_slow_browser_that_has_not_joined_in_time_may_try_again(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dorothie_gym.lab.console.server.JOIN_SECONDS", 0.2)
+    with served.connect() as waiting, pytest.raises(ConnectionClosed) as closed:
+        waiting.recv(timeout=10)
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == CloseCode.TOO_SLOW
+
+
 @pytest.mark.parametrize("part", [100, 2**20])
 def test_a_websocket_that_sends_much_before_it_joins_learns_why_it_is_ended(served: Served, part: int) -> None:
     with served.connect() as seat:

@@ -79,6 +79,7 @@ def test_a_latin_square_needs_the_same_people_in_all_conditions(tmp_path: Path) 
         ("a: !!python/object:os.system 1", "line 1: the tag"),
         ("a: !!int word", "line 1: 'word' is no int"),
         ("a: [1, 2", "is not YAML"),
+        ("- {text: Age?, min: 1}", "put text with signs such as .* in quotes"),
         ("", "is empty"),
         ("- 1", "expected `object`, got `array`"),
         ("[" * 60, "is nested more than 20 deep"),

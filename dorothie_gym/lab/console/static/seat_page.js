@@ -15,22 +15,25 @@ const REASONS = {
 };
 const FINAL = {
   failed: 'The program failed. What was recorded ends at the last decision.',
-  refused: 'The server refused the connection. Load the page again.', unknown: 'This link leads to no seat. It may be of an earlier server: ask for a new one.', 'too fast': 'This page sent too many messages. Load it again.',
+  refused: 'The server refused the connection.', unknown: 'This link leads to no seat. It may be of an earlier server: ask for a new one.', 'too fast': 'This page sent too many messages.',
 };
 
 const main = document.getElementById('main'), bar = document.getElementById('bar');
 const time = h('time', { class: 'clock', text: '0:00' }), state = h('p', { class: 'state', role: 'status' }), net = h('span', { class: 'net' });
-let page = null, keys = null, seat = null, extras = [], next = {};
+let page = null, keys = null, seat = null, extras = [], next = {}, names = {};
 
 /**
  * Opens the seat of a token in this page.
  * @param then button of the page that is shown at the end, and what it does; null for "Next session".
  * @param tools further elements of the bar.
  * @param away what happens next while somebody else is away, or this browser (`lost`, `others`); sentences.
+ * @param title name of the browser's tab; null for that of the seat.
+ * @param over heading of the end.
  * @param onFinal called with the reason if the connection has ended for good; shows it if it returns nothing.
  */
-export function openSeat(token, { then = null, tools = [], away = {}, onFinal = null } = {}) {
+export function openSeat(token, { then = null, tools = [], away = {}, title = null, over = 'The session is over', onFinal = null } = {}) {
   extras = tools;
+  names = { title, over };
   next = away;
   const link = new Link(token);
   window.consoleLink = link;  // for measurements
@@ -62,7 +65,7 @@ async function greet(link, hello) {
 
 function build(link, hello) {
   seat = hello.seat;
-  document.title = `${TITLES[seat]} – dorothie_gym`;
+  document.title = names.title ?? `${TITLES[seat]} – dorothie_gym`;
   keys = new Keys();
   page = { participant: () => new ParticipantPage(link, keys), co_wizard: () => new CoWizardPage(link, keys), ad_wizard: () => new AdWizardPage(link, keys),
     experimenter: () => new ExperimenterPage(link, keys, { controls: true }), spectator: () => new ExperimenterPage(link, keys, { controls: false }) }[seat]();
@@ -93,7 +96,7 @@ function showState({ state: now, why }) {
 function showOutcome(link, outcome, then) {
   document.querySelector('.over')?.remove();
   const { subgoals } = outcome;
-  const box = h('section', { class: 'over card', 'aria-labelledby': 'over-title' }, h('h2', { id: 'over-title', tabindex: '-1', text: outcome.success ? 'All errands are done' : 'The session is over' }),
+  const box = h('section', { class: 'over card', 'aria-labelledby': 'over-title' }, h('h2', { id: 'over-title', tabindex: '-1', text: outcome.success ? 'All errands are done' : names.over }),
     h('p', { text: REASONS[outcome.reason] ?? outcome.reason }),
     h('p', { text: `${subgoals.reached} of ${subgoals.live} errands in ${clock(outcome.seconds)}.` }),
     then ? button(then.label, { glyph: 'go', class: 'primary', run: then.run })
@@ -106,7 +109,8 @@ function finish(link, why) {
   document.body.classList.remove('lost');
   const card = why === 'replaced'
     ? h('div', { class: 'card' }, h('h2', { text: 'This seat was opened in another window' }), h('p', { text: 'What you see there goes on. You can also take the seat back.' }), button('Use it here', { class: 'primary', run: () => { card.remove(); link.connect(); } }))
-    : h('div', { class: 'card' }, h('h2', { text: 'No connection' }), h('p', { text: FINAL[why] }));
+    : h('div', { class: 'card' }, h('h2', { text: 'No connection' }), h('p', { text: FINAL[why] }),
+      ['refused', 'too fast'].includes(why) ? button('Load again', { class: 'primary', run: () => location.reload() }) : null);
   card.classList.add('over');
   main.append(card);
   card.querySelector('button')?.focus();

@@ -136,7 +136,7 @@ function show({ view, newTag }) {
 /** Shows a page of text with a heading, which gets the focus. */
 function page(view, heading, ...children) {
   bar.className = 'study';
-  bar.replaceChildren(h('h1', { text: view.title }), h('span', { class: 'state', role: 'status' }), h('span', { class: 'number', title: 'Your number in this study', text: view.id }), ...(view.stage === 'consent' ? [] : [withdrawal()]));
+  bar.replaceChildren(h('h1', { text: view.title }), h('span', { class: 'state', role: 'status' }), h('span', { class: 'number', title: 'Your number in this study', text: view.id }), ...(view.stage === 'consent' ? [] : [withdrawal(view.code)]));
   const title = h('h2', { tabindex: '-1', text: heading });
   main.replaceChildren(h('div', { class: 'sheet' }, h('article', { class: 'text' }, title, ...children.flat())));
   title.focus();
@@ -170,7 +170,7 @@ const STAGES = {
       prose(view.text), next('Continue', proceed('instructions', { role: view.part })));
   },
   tutorial(view) {
-    const go = button('Start the practice drive', { class: 'primary', run: () => seat(view, [button('End practice', { class: 'soft', run: proceed('tutorial') })]) });
+    const go = button('Start the practice drive', { class: 'primary', run: () => seat(view, view.title, 'The practice drive is over', [button('End practice', { class: 'soft', run: proceed('tutorial') })]) });
     page(view, 'Practice drive', prose(view.text ?? 'In a short practice drive with an automatic partner you can try everything out. It is not recorded.'),
       view.token ? h('p', { class: 'row' }, go, button('Skip it', { run: proceed('tutorial') })) : h('p', { class: 'busy', role: 'status', text: 'The practice drive is being prepared …' }));
   },
@@ -180,7 +180,7 @@ const STAGES = {
   },
   session(view) {
     if (view.over) return page(view, 'The session is over', h('p', { text: 'It ended, or it was broken off because somebody left. Either way you go on to the last questions, and get your code.' }), next('Continue', proceed('session')));
-    if (view.token) { document.title = `Now: ${view.title}`; return seat(view, []); }
+    if (view.token) { document.title = `Now: ${view.title}`; return seat(view, document.title, 'The session is over'); }
     page(view, 'Your session is about to begin', h('p', { class: 'busy', role: 'status', text: 'The session is being prepared …' }));
   },
   debriefing: view => page(view, 'Thank you', prose(view.text), h('p', { class: 'hint', text: `Contact: ${view.contact}` }), next('Continue', proceed('debriefing'))),
@@ -198,21 +198,21 @@ function questions(view, heading) {
   page(view, heading, form.element);
 }
 
-/** Takes the seat of a tutorial or session. */
-function seat(view, tools) {
+/** Takes the seat of a tutorial or session, with the title of the tab and the heading of the end. */
+function seat(view, title, heading, tools = []) {
   seated = view.token;
   openSeat(view.token, {
-    then: { label: 'Continue', run: proceed(view.stage) }, away: view.away, tools: [...tools, withdrawal()],
+    then: { label: 'Continue', run: proceed(view.stage) }, away: view.away, tools: [...tools, withdrawal()], title, over: heading,
     onFinal: why => {
-      if (why === 'unknown') { again(); return true; }
+      if (why === 'unknown' || why === 'refused') { again(); return true; }
       if (why !== 'failed') return false;
-      page(view, 'The session is over', h('p', { text: 'The program failed. This is not your fault.' }), next('Continue', proceed(view.stage)));
+      page(view, heading, h('p', { text: 'The program failed. This is not your fault.' }), next('Continue', proceed(view.stage)));
       return true;
     },
   });
 }
 
-/** Loads the page again after the seat is gone: the server has restarted, or the room was closed. */
+/** Loads the page again after the seat is gone: the server has restarted, the room was closed, or the connection was refused. */
 async function again() {
   await pause(1000);
   await acting;
@@ -221,10 +221,12 @@ async function again() {
 
 // --- end -------------------------------------------------------------------------------------------------------------
 
-function withdrawal() {
+/** @param code completion code on this page, which is gone after the withdrawal. */
+function withdrawal(code = '') {
   return button('Withdraw', { class: 'soft', run: () => {
     const dialog = h('dialog', { 'aria-labelledby': 'withdraw-title' }, h('h2', { id: 'withdraw-title', text: 'Withdraw from the study?' }),
       h('p', { text: 'The study ends for you, and everything that was recorded about you is deleted: answers, what you wrote and said, and your number. This cannot be undone.' }),
+      code ? h('p', { text: `Note your completion code, ${code}, first: this page will be gone.` }) : null,
       h('p', { class: 'row' }, button('Go on with the study', { class: 'primary', autofocus: true, run: () => dialog.close() }), button('Withdraw and delete', { run: () => { dialog.close(); act('withdraw', { sure: true }); } })));
     dialog.addEventListener('close', () => dialog.remove());
     document.body.append(dialog);
