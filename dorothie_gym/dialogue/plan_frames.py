@@ -7,7 +7,7 @@ import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from dorothie_gym.dialogue.clause_moods import ClauseMood, is_participle
+from dorothie_gym.dialogue.clause_moods import ClauseMood, ClauseReader, is_participle
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import (
     Anaphor,
@@ -150,6 +150,7 @@ class PlanState:
 
     def __init__(self) -> None:
         """Begins without steps."""
+        self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())  # of the sentence
         self.frames: list[Frame] = []
         self.frame: Frame | None = None
         self.pending = Frame()  # parts that wait for their step
@@ -170,6 +171,9 @@ class PlanState:
         self.counting = False  # whether the last item is an opportunity to turn
         self.refused: Refusal | None = None  # opportunity that is not meant: "not this left, the one after"
         self.preceded = False  # whether other errands come before the next one: "before we go to the KFC"
+        self.opportunity = False  # whether a turning, a street or a junction has been mentioned
+        self.last_place: PlaceReference | None = None
+        self.aside = False  # whether left or right is a side of the street
 
     def close(self) -> None:
         """Finishes the step under construction."""

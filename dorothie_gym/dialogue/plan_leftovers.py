@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from dorothie_gym.dialogue.clause_moods import ORDERED, ClauseMood
-from dorothie_gym.dialogue.plan_places import PlaceReader
-from dorothie_gym.dialogue.plan_speeds import SpeedReader
-from dorothie_gym.dialogue.plan_turns import TurnReader
+from dorothie_gym.dialogue.plan_frames import PlanState
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, StepAction
 from dorothie_gym.ontology.slots import ObjectClass
 
@@ -25,7 +23,7 @@ _FEW: Final = 6
 _WARNING: Final = frozenset({"mind", "watch", "look", "careful", "beware", "see"})
 
 
-class LeftoverReader(TurnReader, PlaceReader, SpeedReader):
+class LeftoverReader(PlanState):
     """Makes steps of what waits for one when everything has been read."""
 
     def read_leftovers(self) -> None:

@@ -20,11 +20,6 @@ _INITIAL: Final = frozenset(
 class OpportunityReader(PlanState):
     """Reads the opportunities to turn of a plan."""
 
-    def __init__(self) -> None:
-        """Begins without opportunities."""
-        super().__init__()
-        self.opportunity = False  # whether a turning, a street or a junction has been mentioned
-
     def read_opportunity(self, item: NounPhrase) -> None:
         """Reads an opportunity, which may be refused, or counted from one that has been."""
         passing = self.frame is not None and not self.fresh and self.frame.word in PASSING

@@ -37,8 +37,11 @@ from dorothie_gym.dialogue.plan_items import (
     WordItem,
 )
 from dorothie_gym.dialogue.plan_leftovers import LeftoverReader
-from dorothie_gym.dialogue.plan_places import fetches
+from dorothie_gym.dialogue.plan_opportunities import OpportunityReader
+from dorothie_gym.dialogue.plan_places import PlaceReader, fetches
 from dorothie_gym.dialogue.plan_repetitions import RepetitionReader
+from dorothie_gym.dialogue.plan_speeds import SpeedReader
+from dorothie_gym.dialogue.plan_turns import TurnReader
 from dorothie_gym.dialogue.plan_waits import WaitReader
 from dorothie_gym.dialogue.route_grammar import route_grammar
 from dorothie_gym.dialogue.routes import (
@@ -155,7 +158,7 @@ def parse_plan(sentences: Sequence[Sentence]) -> PlanParse:
     return builder.finish()
 
 
-class _Builder(LeftoverReader, WaitReader, RepetitionReader):
+class _Builder(TurnReader, PlaceReader, OpportunityReader, SpeedReader, LeftoverReader, WaitReader, RepetitionReader):
     """Assembles steps from items."""
 
     def __init__(self) -> None:
@@ -177,6 +180,13 @@ class _Builder(LeftoverReader, WaitReader, RepetitionReader):
             self.sided = self.sided or isinstance(item, SideItem | LaneItem)
             _RULES[type(item)](self, item)
             self.counting = self.counting and not counted
+
+    def read_noun(self, item: NounPhrase) -> None:
+        """Reads a place, or an opportunity to turn."""
+        if item.reference is None:
+            self.read_opportunity(item)
+        else:
+            self.read_place(item.reference)
 
     def _clause(self, place: int, *, new: bool) -> None:
         self.mood = self.clauses.mood(place, self.mood, new=new)
@@ -452,7 +462,7 @@ _RULES: Final[Mapping[type, Callable[[_Builder, Any], None]]] = {
     SideItem: _Builder.read_side,
     ConditionItem: _Builder.read_condition,
     ContingencyItem: _Builder._contingency,
-    NounPhrase: _Builder.read_place,
+    NounPhrase: _Builder.read_noun,
     DistanceItem: _Builder.read_distance,
     SpeedItem: _Builder.read_speed,
     BoundaryItem: _Builder._boundary,

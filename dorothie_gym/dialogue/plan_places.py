@@ -11,10 +11,10 @@ from dorothie_gym.dialogue.plan_frames import (
     NEEDING_PLACE,
     NEGATING,
     Frame,
+    PlanState,
     Refusal,
     with_details,
 )
-from dorothie_gym.dialogue.plan_opportunities import OpportunityReader
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 
@@ -49,13 +49,12 @@ _ROUND: Final = frozenset({"round", "around", "past", "by"})
 """Last words of an order to get past another vehicle."""
 
 
-class PlaceReader(OpportunityReader):
+class PlaceReader(PlanState):
     """Reads the places of a plan."""
 
     def __init__(self) -> None:
         """Begins without places."""
         super().__init__()
-        self.last_place: PlaceReference | None = None
         self.reaching: Frame | None = None  # step that ends at the next place: "down to" of "take Fuller down to"
         self.person = False  # whether somebody is to be fetched
 
@@ -235,12 +234,8 @@ class PlaceReader(OpportunityReader):
         else:
             current.ordinal = ordinal
 
-    def read_place(self, item: NounPhrase) -> None:
-        """Reads a place or an opportunity that no relation introduces."""
-        place = item.reference
-        if place is None:
-            self.read_opportunity(item)
-            return
+    def read_place(self, place: PlaceReference) -> None:
+        """Reads a place that no relation introduces."""
         if place.reference is None:
             self.last_place = place
         if self._ends_stretch(place) or self._cancels(place) or (self.repairing and self._corrected(place)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.clause_moods import ClauseReader
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS
 from dorothie_gym.dialogue.plan_frames import NEEDING_PLACE, PlanState
 from dorothie_gym.dialogue.routes import StepAction, StepChange
@@ -27,7 +26,6 @@ class SpeedReader(PlanState):
     def __init__(self) -> None:
         """Begins without steps."""
         super().__init__()
-        self.clauses = ClauseReader(words=(), question=False, contracted=frozenset())
         self.last_speed: int | None = None  # speed named last [km/h]
 
     def read_change(self, change: StepChange, item: ActionItem) -> None:

@@ -36,8 +36,6 @@ class TurnReader(PlanState):
         """Begins without steps."""
         super().__init__()
         self.correcting = False  # whether the sentence holds a correction so far
-        self.last_place: PlaceReference | None = None
-        self.aside = False  # whether left or right is a side of the street
 
     def read_turn(self, item: TurnItem) -> None:
         """Reads a direction to turn."""

@@ -28,6 +28,7 @@ from dorothie_gym.policies.co_wizard.proposition_truth import (
     sees_far,
     street_here,
 )
+from dorothie_gym.policies.co_wizard.small_remarks import switch_lights_on
 from dorothie_gym.policies.notable_conditions import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
@@ -128,20 +129,6 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
     """Answers a question about the headlights, which is also a request to switch them on."""
     state.say(judged(state.knowledge, view, Proposition.of(Predicate.LIGHTS_ON)))
     switch_lights_on(state, announced=not view.lights, joined=True)
-
-
-def switch_lights_on(state: CoWizardState, *, announced: bool = True, joined: bool = False) -> None:
-    """Switches the head lights on, and says so.
-
-    Args:
-        state: working copy of the state.
-        announced: whether it is said.
-        joined: whether the remark continues the one before.
-    """
-    state.intentions = state.intentions.with_lights(True)
-    if announced:
-        on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
-        state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=joined))
 
 
 def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:

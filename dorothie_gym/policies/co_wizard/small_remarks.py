@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.reactions import is_in_passing, is_praise, says_missed
-from dorothie_gym.ontology.slots import GoalStatus, ObjectClass, Slot
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
-from dorothie_gym.policies.co_wizard.answers import switch_lights_on
 from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
 from dorothie_gym.policies.mood import Happening
+from dorothie_gym.policies.speech import intend
 from dorothie_gym.policies.view_range import camera_fault
 
 if TYPE_CHECKING:
@@ -98,3 +100,17 @@ def is_called_dark(words: ParsedText) -> bool:
     if told is None or told.get("parameter") is not WeatherParameter.SUN_ALTITUDE_ANGLE:
         return False
     return told.get("high") is True
+
+
+def switch_lights_on(state: CoWizardState, *, announced: bool = True, joined: bool = False) -> None:
+    """Switches the head lights on, and says so.
+
+    Args:
+        state: working copy of the state.
+        announced: whether it is said.
+        joined: whether the remark continues the one before.
+    """
+    state.intentions = state.intentions.with_lights(True)
+    if announced:
+        on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
+        state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=joined))
