@@ -204,7 +204,10 @@ class PlanJudge:
             late = len([number for number in between if number < turned]) > (step.ordinal or 1) - 1
             return "turned later than at the first opportunity" if late else None
         if relation is ConditionRelation.BEFORE:
-            return "the place was passed" if behind and away[turned] > 30.0 else None
+            begun = max(
+                (one.time for one in self.log.since(self.at) if one.lane == passages[turned].before), default=0.0
+            )
+            return "the place was passed" if by is not None and by <= begun and away[turned] > 30.0 else None
         nearer = [number for number in could if away[number] < away[turned] - 20.0]
         if nearer or away[turned] > 90.0:
             return f"turned {away[turned]:.0f} m from the {name.label}"

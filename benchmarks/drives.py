@@ -212,7 +212,7 @@ def _drive(env: DuoWizardEnv, start: Start, says: Sequence[tuple[str, str]]) -> 
             log.told, watched, asked = moment.time, 0.0, False
             due = _next_time(waiting, moment.time)
         silent = float(observations["co_wizard"]["speaking"][0]) <= 0.0
-        answered = silent and any(said.time > log.told for said in log.said)
+        answered = silent and any(said.time >= log.told for said in log.said)
         speech = None
         if waiting and not asked and (moment.time >= due or (waiting[0][0] == "after_reply" and answered)):
             speech = Speech(act=DialogueAct.of(DialogueMove.INSTRUCT), text=waiting.pop(0)[1])

@@ -333,6 +333,9 @@ def _retagged(
         return spans  # nothing was said that could be answered or corrected
     if any(_joins_sentences(part, spans) for part, _ in tags):
         return spans
+    answers = {move for _, move in tags} <= {DialogueMove.REPLY_W, DialogueMove.EXPLAIN}
+    if answers and len(spans) == 1 and spans[0].act.move in _QUESTIONS and understand(text).asked is not None:
+        return spans  # "much traffic about?" answers no question
     found = list(tags)
     changes = move_cues().answers.get(after) if after is not None else None
     if changes is not None and found[0][1] is not DialogueMove.IRRELEVANT:

@@ -206,6 +206,11 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
     return _unordered(parsed, parse, move, after)
 
 
+_UNASKED = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
+_OPEN_QUESTIONS = ("whereabouts ", "how long ", "how far ", "how fast ", "what are ", "what am ")
+"""First words of open questions that recognisers write without a mark."""
+
+
 def _refuses(parsed: ParsedText, move: DialogueMove) -> bool:
     """Returns whether words with a "not" refuse something that nobody has offered in words."""
     unnamed = move is DialogueMove.CLARIFY and not (parsed.landmarks or parsed.streets)
@@ -215,6 +220,10 @@ def _refuses(parsed: ParsedText, move: DialogueMove) -> bool:
 
 def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
     """Returns the move of words that order no step."""
+    opened = parsed.masked.startswith(_OPEN_QUESTIONS)
+    if parsed.asked is not None and move in _UNASKED and (parsed.question or opened):
+        asks = opened or bool(parsed.asked.asks)  # "much traffic about?"
+        return DialogueMove.QUERY_W if asks else DialogueMove.QUERY_YN
     if move is DialogueMove.EXPLAIN and parse.cancelled and not _RULED_OUT.search(parsed.masked):
         return DialogueMove.INSTRUCT
     if move is DialogueMove.INSTRUCT and set(parse.moods) == {ClauseMood.QUESTION}:

@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.reactions import is_greeting
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import (
     STEERING_AWAY,
@@ -28,7 +28,6 @@ from dorothie_gym.policies.co_wizard.answers import (
     answer_open,
     answer_yes_no,
     asks_to_act,
-    switch_lights_on,
 )
 from dorothie_gym.policies.co_wizard.clarification_requests import ask_back, explain_differently
 from dorothie_gym.policies.co_wizard.described_looks import looks_heard, take_up_look, without_looks
@@ -50,13 +49,12 @@ from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, 
 from dorothie_gym.policies.co_wizard.intentions import Directive
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.places_ahead import distance_ahead
-from dorothie_gym.policies.co_wizard.plan_acceptance import planned_acts, settle_with_order, take_plan
+from dorothie_gym.policies.co_wizard.plan_acceptance import is_incomplete, planned_acts, settle_with_order, take_plan
 from dorothie_gym.policies.co_wizard.refusals import answer_in_any_case, refuse_unmet
 from dorothie_gym.policies.co_wizard.repairs import (
     ask_for_known_place,
     check_goal,
     expects_stop,
-    hear_wrong_way,
     is_garbled,
     is_here,
     is_lost_order,
@@ -64,20 +62,18 @@ from dorothie_gym.policies.co_wizard.repairs import (
     is_settled,
     is_unclear,
     is_unclear_reply,
-    lacks_what_to_do,
     names_unknown_place,
     note_contradiction,
     repeat_last,
 )
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.small_remarks import is_called_dark, passes_over, sign_of_statement
+from dorothie_gym.policies.co_wizard.small_remarks import take_statement
 from dorothie_gym.policies.heard_utterance import HeardUtterance, heard_utterance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import COMMON
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.policies.view_range import camera_fault
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.nlu import ParsedText
@@ -116,7 +112,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     if is_murmur(state, view, heard):
         state.say(*before, *behind)
         return
-    unclear = is_unclear(state, view, heard) or lacks_what_to_do(state, view, heard)
+    unclear = is_unclear(state, view, heard) or is_incomplete(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
     looks = looks_heard(state, heard)
@@ -328,7 +324,7 @@ def _explanation(
     elif act.values(Slot.STREET):
         hear_description(state, view, act_builders.named_streets(act), landmarks, rng)
     elif act.slots or not _senseless(state, view, act, words, asks=is_lost_order(state, view, words)):
-        _statement(state, view, act, words, rng)
+        take_statement(state, view, act, words, rng)
 
 
 def _mentioned_place(
@@ -344,26 +340,6 @@ def _mentioned_place(
         ask_back(state, view, words)
     else:
         set_goal(state, view, name, act_builders.named_streets(act), rng, sure=False)
-
-
-def _statement(
-    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
-) -> None:
-    """Reacts to a statement that changes no destination."""
-    landmarks, statuses = act_builders.named_landmarks(act), act.values(Slot.STATUS)
-    name = landmarks[0] if landmarks else None
-    if "wrong" in words.text.lower():
-        state.feel(Happening.WRONG_WAY, view.time)
-        hear_wrong_way(state, view)
-    elif is_called_dark(words) and not view.lights:
-        switch_lights_on(state)
-    elif GoalStatus.PENDING in statuses and name is not None:
-        state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
-        state.say(sign_of_hearing("told"))
-    elif passes_over(state, words, rng):
-        return
-    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
-        state.say(sign_of_statement(words, sees=camera_fault(view.raw) is None))
 
 
 def _reply(

@@ -23,13 +23,14 @@ from dorothie_gym.dialogue.routes import (
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
+from dorothie_gym.policies.co_wizard.counted_steps import STOP_APART, counted_together, counts_junctions
 from dorothie_gym.policies.co_wizard.destinations import aim, known_landmark, seek_street, set_goal
 from dorothie_gym.policies.co_wizard.instructed_actions import limit_remark
 from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING
 from dorothie_gym.policies.co_wizard.plan_objections import object_to
 from dorothie_gym.policies.co_wizard.plan_points import first_objection
-from dorothie_gym.policies.co_wizard.repairs import check_goal, note_contradiction
+from dorothie_gym.policies.co_wizard.repairs import check_goal, lacks_what_to_do, note_contradiction
 from dorothie_gym.policies.plan_propositions import content_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
@@ -76,9 +77,6 @@ _ORDERING_MOVES: Final = frozenset(
 _ALWAYS: Final = frozenset({StepAction.AVOID, StepAction.WAIT, StepAction.FOLLOW})
 """Steps that no single order expresses."""
 
-_NOT_AT: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.PAST, ConditionRelation.BEFORE})
-"""Relations to a landmark of a stop that is no visit of it."""
-
 _PLAIN: Final = frozenset(
     {StepAction.SPEED, StepAction.LIGHTS, StepAction.STOP, StepAction.GO, StepAction.U_TURN, StepAction.TURN}
 )
@@ -109,11 +107,18 @@ def planned_acts(state: CoWizardState, heard: HeardUtterance) -> frozenset[int]:
     if not steps or asks or state.dialogue.detour_asked_at is not None or _changes_tasks(heard.acts):
         return none
     ordering = frozenset(number for number, act in enumerate(heard.acts) if _orders(state, heard, number))
+    referring = frozenset(number for number in range(len(heard.acts)) if not ordering and _refers(heard, number))
+    ordering = ordering or referring
     acts = [heard.acts[number] for number in sorted(ordering)]
-    repairs = _is_restated(heard) or corrected_step(state, heard) is not None
+    repairs = _is_restated(heard) or corrected_step(state, heard) is not None or bool(referring)
     if not acts or not (repairs or _is_kept(state, heard, acts) or _is_indirect(heard, acts)):
         return none
     return ordering
+
+
+def is_incomplete(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
+    """Returns whether an order was heard without what it asks for, and does not correct the last one: "the second"."""
+    return lacks_what_to_do(state, view, heard) and corrected_step(state, heard) is None
 
 
 def _orders(state: CoWizardState, heard: HeardUtterance, number: int) -> bool:
@@ -124,6 +129,12 @@ def _orders(state: CoWizardState, heard: HeardUtterance, number: int) -> bool:
         return False
     describes = act.move in _DESCRIBING and not act.values(Slot.ACTION)
     return not (describes and _is_guided(state))
+
+
+def _refers(heard: HeardUtterance, number: int) -> bool:
+    """Returns whether an act orders only what another one has named: "where's the KFC? I need to be there"."""
+    act = heard.acts[number]
+    return bool(heard.parts) and act.move is DialogueMove.INSTRUCT and not act.slots
 
 
 def _is_guided(state: CoWizardState) -> bool:
@@ -213,7 +224,9 @@ def _guides(step: PlanStep) -> bool:
 def _has_to_wait(step: PlanStep) -> bool:
     """Returns whether a step is due only at some point of the road."""
     at = step.condition
-    next_one = _is_junction(step) and at is not None and at.place.ordinal == 1 and at.relation is ConditionRelation.AT
+    next_one = (
+        counts_junctions(step) and at is not None and at.place.ordinal == 1 and at.relation is ConditionRelation.AT
+    )
     overtakes = step.action is StepAction.LANE and at == _PASSED
     if at is not None and at.place.reference not in _ONLY_HERE and not (next_one or overtakes):
         return True
@@ -282,7 +295,7 @@ def _take_over(
         state.say(refused)
     if not possible:
         return
-    possible = _visiting(state, view, _counted_together(possible))
+    possible = _visiting(state, view, counted_together(possible))
     found = first_objection(state, view, possible)
     if found is not None and _seeks_street(state, view, possible[found[0]]):
         found = None
@@ -366,47 +379,11 @@ def _streets(step: PlanStep) -> tuple[StreetName, ...]:
     return () if step.place is None or step.place.street is None else (step.place.street,)
 
 
-def _counted_together(steps: tuple[PlanStep, ...]) -> tuple[PlanStep, ...]:
-    """Returns the steps without a stretch that the number of the next turn counts again: "over two, third right"."""
-    kept: list[PlanStep] = []
-    steps = tuple(map(_way_along, steps))
-    for step, following in zip(steps, (*steps, None)[1:], strict=True):
-        turns = following is not None and following.action is StepAction.TURN and following.condition is None
-        crossed = None if step.action is not StepAction.STRAIGHT else _crossed(step)
-        if not (turns and crossed is not None and following is not None and following.ordinal == crossed + 1):
-            kept.append(step)
-    return tuple(kept)
-
-
-def _way_along(step: PlanStep) -> PlanStep:
-    """Returns a step along a street in place of a visit to one, and on to a place where the car is to wait for it."""
-    place, until = step.place, step.condition
-    if step.action is StepAction.WAIT and until is not None and until.relation is ConditionRelation.UNTIL:
-        return replace(step, action=StepAction.STRAIGHT)
-    if step.action is not StepAction.VISIT or place is None or place.street is None or place.landmark is not None:
-        return step
-    return PlanStep(action=StepAction.FOLLOW, place=PlaceReference(street=place.street))
-
-
-def _crossed(step: PlanStep) -> int | None:
-    """Returns the number of junctions that a stretch straight on crosses; None where it ends at something else."""
-    if step.condition is None:
-        return step.ordinal
-    return step.condition.place.ordinal if step.condition.relation in _NOT_AT and _is_junction(step) else None
-
-
-def _is_junction(step: PlanStep) -> bool:
-    place = None if step.condition is None else step.condition.place
-    if place is None or place.ordinal is None:
-        return False
-    return place.landmark is None and place.street is None and place.object is None
-
-
 def _visiting(state: CoWizardState, view: CoWizardView, steps: tuple[PlanStep, ...]) -> tuple[PlanStep, ...]:
     """Returns the steps with a visit in place of a first stop at a landmark that this road does not pass."""
     first = steps[0] if steps else None
     place = None if first is None or first.action is not StepAction.STOP or first.condition is None else first.condition
-    if place is None or place.place.landmark is None or place.relation in _NOT_AT:
+    if place is None or place.place.landmark is None or place.relation in STOP_APART:
         return steps
     found = first_objection(state, view, steps[:1])
     if found is None or found[1].landmark is None:

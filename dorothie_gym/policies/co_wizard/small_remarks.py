@@ -6,14 +6,22 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.reactions import is_in_passing, is_praise, says_missed
+from dorothie_gym.ontology.slots import GoalStatus, ObjectClass, Slot
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
+from dorothie_gym.policies.co_wizard.answers import switch_lights_on
+from dorothie_gym.policies.co_wizard.repairs import hear_wrong_way
+from dorothie_gym.policies.mood import Happening
+from dorothie_gym.policies.view_range import camera_fault
 
 if TYPE_CHECKING:
     import numpy as np
 
     from dorothie_gym.dialogue.nlu import ParsedText
+    from dorothie_gym.ontology.dialogue_acts import DialogueAct
     from dorothie_gym.policies.co_wizard.state import CoWizardState
+    from dorothie_gym.policies.co_wizard.view import CoWizardView
     from dorothie_gym.policies.speech import Remark
 
 IN_SIGHT: Final = frozenset(
@@ -22,6 +30,34 @@ IN_SIGHT: Final = frozenset(
 """Remarks on something that the car sees as well."""
 
 _ANSWERED: Final = 0.5  # probability that praise is answered
+
+
+def take_statement(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Reacts to a statement that changes no destination.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        act: the statement.
+        words: its words.
+        rng: random generator of the decision.
+    """
+    landmarks, statuses = act_builders.named_landmarks(act), act.values(Slot.STATUS)
+    name = landmarks[0] if landmarks else None
+    if "wrong" in words.text.lower():
+        state.feel(Happening.WRONG_WAY, view.time)
+        hear_wrong_way(state, view)
+    elif is_called_dark(words) and not view.lights:
+        switch_lights_on(state)
+    elif GoalStatus.PENDING in statuses and name is not None:
+        state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
+        state.say(sign_of_hearing("told"))
+    elif passes_over(state, words, rng):
+        return
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.55:
+        state.say(sign_of_statement(words, sees=camera_fault(view.raw) is None))
 
 
 def passes_over(state: CoWizardState, words: ParsedText, rng: np.random.Generator) -> bool:
