@@ -13,16 +13,31 @@ if TYPE_CHECKING:
 _SCENARIOS: Final = 4
 """Number of towns of the example; sessions take turns in them."""
 
+_DEBRIEFING: Final = """\
+    Thank you for taking part!
+
+    In this study your passenger was a computer program, and some of the words between passenger and car may have been
+    changed at random, as a speech recogniser would mishear them. We compare how people and programs drive and talk
+    under the same conditions. Events such as fog, roadblocks and new errands were caused by a computer program.
+
+    Please do not tell other people about this before they take part.
+
+"""
+"""Debriefing: in a tier, the participant is always a program."""
+
 
 def tier_study(example: str, tier: Tier) -> str:
     """Returns the example of a study in which people play the Co-Wizard of a tier.
 
     Args:
-        example: text of the usual example, whose consent, questions and texts are kept.
+        example: text of the usual example, whose consent, questions and other texts are kept.
         tier: the tier.
     """
+    text, count = re.subn(r"(?m)^  debriefing: \|\n(?:(?:    .*)?\n)+", f"  debriefing: |\n{_DEBRIEFING}", example)
+    if count != 1:
+        raise ValueError(f"the example has {count} debriefings; it must have one")
     return _replaced(
-        example,
+        text,
         {
             "conditions": "".join(
                 f"  - name: partner{number}\n    participant: {participant}\n    co_wizard: human\n"

@@ -23,6 +23,7 @@ DRIVER = {
     "conditions": [{"name": "driver", "participant": "scripted", "co_wizard": "human"}],
     "texts": {"instructions": {"co_wizard": "Drive the car."}, "debriefing": "Thank you."},
     "session": {"max_seconds": 60.0, "pictures": True},
+    "absence": {"seconds": 60.0},
 }
 """One person drives alone."""
 

@@ -28,7 +28,11 @@ def test_example_of_a_tier_is_a_study_in_it(tmp_path: Path, tier: Tier) -> None:
         condition.co_wizard == "human" and condition.ad_wizard == tier.ad_wizard for condition in study.conditions
     )
     assert {scenario.town for scenario in study.scenarios} <= set(tier.towns)
-    assert yaml.safe_load(EXAMPLE)["consent"] == yaml.safe_load(file.read_text(encoding="utf-8"))["consent"]
+    usual, of_tier = yaml.safe_load(EXAMPLE), yaml.safe_load(file.read_text(encoding="utf-8"))
+    assert usual["consent"] == of_tier["consent"] and usual["questionnaires"] == of_tier["questionnaires"]
+    assert usual["texts"].keys() == of_tier["texts"].keys()
+    assert "half of the pairs" in usual["texts"]["debriefing"], "it names the conditions of the usual example"
+    assert "half" not in study.texts.debriefing and "your passenger was a computer program" in study.texts.debriefing
 
 
 def test_an_unknown_tier_is_refused_with_its_field(tmp_path: Path) -> None:
