@@ -13,7 +13,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from dorothie_gym.agents.page_changes import page_changes
-from dorothie_gym.agents.score import TaskProgress, score_of
+from dorothie_gym.agents.score import TaskProgress, score_of, score_of_talk
+from dorothie_gym.agents.talk_tasks import TalkReferee
 from dorothie_gym.agents.tools import LOOK, TOOLS, WAIT, ToolSpec, waiting_label
 from dorothie_gym.agents.turn import Outcome, Turn
 from dorothie_gym.errors import AgentSessionError, short_repr
@@ -25,6 +26,8 @@ from dorothie_gym.policies.decision_random import policy_seed
 from dorothie_gym.policies.language_model.answer_schema import MAX_ANSWER, AnswerSchema, ChoiceField
 from dorothie_gym.policies.language_model.config import QUIET_TIME
 from dorothie_gym.policies.language_model.faults import CallError, Fault
+from dorothie_gym.policies.language_model.picture import picture_address
+from dorothie_gym.policies.language_model.role_interface import KEEP
 from dorothie_gym.policies.language_model.turns import RoleTurns
 from dorothie_gym.policies.policy import Players, replace
 from dorothie_gym.session.scenario import Scenario
@@ -145,6 +148,7 @@ class TextSession:
         engine.session.dialogue.give_voices(pitches_of(personas_of(self._partners, self._states)))
         self._state = self._turns.begin(engine.town)
         self._progress = TaskProgress(engine.session)
+        self._referee = None if engine.config.talk is None else TalkReferee(engine)
         self._draft: dict[str, Any] = {}
         self._page, self._truncated = "", False
         self._reward, self._gained, self._count, self._faults = 0.0, 0.0, 0, 0
@@ -208,16 +212,22 @@ class TextSession:
         """Returns the answer that the tools have filled, with the time to wait."""
         again = next(field for field in self._schema.fields if field.name == _AGAIN)
         labels = again.labels if isinstance(again, ChoiceField) else ()
-        kept = {_NOTE: self._state.memory.note}
-        return self._schema.read(json.dumps({**kept, **self._draft, _AGAIN: waiting_label(seconds, labels)}))
+        return self._schema.read(json.dumps({_NOTE: KEEP, **self._draft, _AGAIN: waiting_label(seconds, labels)}))
 
     # --- The end ------------------------------------------------------------------------------------------------------
 
     @property
     def score(self) -> float:
         """Score so far, in [0, 1]; raises `AgentSessionError` before the first reset."""
-        progress = self._begun()
-        return score_of(self.engine.session, progress, self.role)
+        return self._judged()[0]
+
+    def _judged(self) -> tuple[float, bool, str]:
+        """Returns the score, the success, and what has decided a talk task."""
+        progress, session = self._begun(), self.engine.session
+        verdict = None if self._referee is None else self._referee.verdict()
+        if verdict is None:
+            return score_of(session, progress, self.role), session.success, ""
+        return score_of_talk(session, self.role, passed=verdict.passed), verdict.passed, verdict.cause
 
     def finish(self) -> Outcome:
         """Ends the session, over or not, and returns its outcome; later answers have no effect.
@@ -228,9 +238,11 @@ class TextSession:
         self._begun()
         self._truncated = self._truncated or not self.engine.over
         summary, usage = self.engine.summary(), usage_of(self._partners, self._states)
+        score, success, cause = self._judged()
         return Outcome(
-            score=self.score,
-            success=summary["success"],
+            score=score,
+            success=success,
+            cause=cause,
             reached=summary["subgoals"]["reached"],
             live=summary["subgoals"]["live"],
             seconds=summary["seconds"],
@@ -289,6 +301,8 @@ class TextSession:
         outcome = engine.step({**self._players.decide(engine, self._states), str(self.role): action})
         self._gained += sum(outcome.reward_terms[self.role].values())
         self._begun().note()
+        if self._referee is not None:
+            self._referee.note()
 
     def _fault(self, reason: str) -> Turn:
         self._faults += 1
@@ -315,7 +329,8 @@ class TextSession:
         )
         if turn.done:
             return turn
-        return replace(turn, choices=_choices(self._schema), schema=self._schema.json_schema())
+        picture = picture_address(self._observation)
+        return replace(turn, choices=_choices(self._schema), schema=self._schema.json_schema(), picture=picture)
 
 
 _OVER: Final = "the session is over; nothing happens any more"

@@ -77,7 +77,7 @@ def _field_tool(name: str, field: str, description: str, meaning: str) -> ToolSp
 
 
 _SAY = _field_tool("say", "say", "Says a sentence when time passes.", "the sentence")
-_NOTE = _field_tool("note", "note", "Replaces your note, which later pages show.", "the note")
+_NOTE = _field_tool("note", "note", "Sets your note, which later pages show.", "the note, or add: WORDS to add to it")
 _DRIVE = _field_tool("drive", "drive", "Chooses what the car does.", 'one of the choices under "You can drive"')
 _GOAL = _field_tool("set_goal", "goal", "Sets the place that you drive to.", "a place of the page, or none")
 _MARK = _field_tool(
@@ -87,6 +87,9 @@ _MARK = _field_tool(
     '"here", "20 m ahead", "beside PLACE" or "on STREET"',
 )
 _STATUS = _field_tool("set_status", "status", "Sets the status of the goal.", "such as Complete or Abandoned")
+_PLAN = _field_tool(
+    "set_plan", "plan", "Sets the steps that you still mean to take, which later pages show.", "steps in words, or none"
+)
 _GUIDE = _field_tool("guide", "guide", "Sets the place that you guide the car to.", "a place of the page, or none")
 _CHANGE = _field_tool("change", "change", "Makes a change.", 'one of the choices under "You can change"')
 _MESSAGE = _field_tool("message", "message", "Sets the message that goes with a change.", "the message")
@@ -101,7 +104,7 @@ _WAIT = ToolSpec(
 TOOLS: Final[Mapping[Role, tuple[ToolSpec, ...]]] = MappingProxyType(
     {
         Role.PARTICIPANT: (_SAY, _GUIDE, _NOTE, _LOOK, _WAIT),
-        Role.CO_WIZARD: (_SAY, _DRIVE, _GOAL, _MARK, _STATUS, _NOTE, _LOOK, _WAIT),
+        Role.CO_WIZARD: (_SAY, _DRIVE, _GOAL, _MARK, _STATUS, _PLAN, _NOTE, _LOOK, _WAIT),
         Role.AD_WIZARD: (_CHANGE, _MESSAGE, _NOTE, _LOOK, _WAIT),
     }
 )

@@ -20,6 +20,8 @@ class Turn:
         done: whether the session is over; further answers have no effect.
         truncated: whether it is over because a limit of turns or faults was reached.
         error: fault of the last answer in words; empty if there was none.
+        picture: picture of the car's camera as an address with its PNG (`data:image/png;base64,...`); empty without a
+            camera in the settings of the session or for the role, and when the session is over.
     """
 
     page: str
@@ -31,6 +33,7 @@ class Turn:
     done: bool = False
     truncated: bool = False
     error: str = ""
+    picture: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +42,8 @@ class Outcome:
 
     Attributes:
         score: in [0, 1], see `dorothie_gym.agents.score`.
-        success: whether every live subgoal was reached without a collision caused by the car.
+        success: whether every live subgoal was reached without a collision caused by the car; in a talk task, whether
+            the Co-Wizard has reacted rightly.
         reached: number of subgoals reached.
         live: number of live subgoals.
         seconds: simulated time [s].
@@ -51,6 +55,7 @@ class Outcome:
         faults: number of those that were refused.
         expired: number of chosen actions that were no longer possible when they were due.
         characters: number of characters of the pages that were handed out, the system text once included.
+        cause: what has decided a talk task, in a few words; empty in other sessions.
         usage: cost of policies of the other roles, by role; empty without language models.
     """
 
@@ -67,6 +72,7 @@ class Outcome:
     faults: int
     expired: int
     characters: int
+    cause: str = ""
     usage: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:

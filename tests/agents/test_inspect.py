@@ -49,7 +49,7 @@ def rules() -> type[Any]:
 
 
 def run(task: str, tmp_path: Path, spoilt: float = 0.0, **arguments: object) -> Any:
-    role = task.partition("/")[2]
+    role = "participant" if task.endswith("participant") else "co_wizard"
     model = models.get_model(f"rules/{role}", spoilt=spoilt)
     (log,) = inspect_ai.eval(task, model=model, task_args=arguments, log_dir=str(tmp_path), display="none")
     assert log.status == "success", log.error
@@ -80,6 +80,28 @@ def test_spoilt_answers_and_limits_lower_the_score_and_raise_nothing(tmp_path: P
     assert score.metadata["turns"] == 3 and 0.0 <= score.value["score"] < 1.0
 
 
+@pytest.mark.parametrize("task", ["ask_first", "admit_it"])
+def test_tasks_of_talk_are_judged(task: str, tmp_path: Path) -> None:
+    log = run(f"dorothie_gym/{task}", tmp_path, samples=3, epochs=1, first_seed=1000)
+    values = [next(iter(sample.scores.values())).value for sample in log.samples]
+    session = TextSession(tier=task.replace("_", "-"))
+    assert values == [
+        {"success": float(outcome.success), "score": outcome.score}
+        for outcome in (play(session, reader_of("co_wizard"), seed) for seed in range(1000, 1003))
+    ]
+    assert [sample.id for sample in log.samples] == [f"{task.replace('_', '-')}-{seed}" for seed in range(1000, 1003)]
+
+
+def test_tier_and_pictures_are_parameters(tmp_path: Path) -> None:
+    log = run("dorothie_gym/co_wizard", tmp_path, samples=1, epochs=1, tier="rough", pictures=True, max_turns=2)
+    (sample,) = log.samples
+    pages = [message for message in sample.messages if message.role == "user"][1:]
+    assert len(pages) == 2 and all(page.content[1].type == "image" for page in pages)
+    begun = TextSession(tier="rough")
+    begun.reset(7000)
+    assert pages[0].text == begun.tool("look").page
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -89,6 +111,7 @@ def test_spoilt_answers_and_limits_lower_the_score_and_raise_nothing(tmp_path: P
         ({"max_turns": 0}, "max_turns is 0"),
         ({"first_seed": -1}, "seed is -1"),
         ({"town": "atlantis"}, "there is no such town"),
+        ({"tier": "soft"}, "tier is 'soft'"),
     ],
 )
 def test_wrong_parameters_are_errors_of_the_task(arguments: dict[str, Any], words: str) -> None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import base64
 import gc
+import io
 import json
 import math
 import random
 import re
 import weakref
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from dorothie_gym.agents import TextSession, merged_page
 from dorothie_gym.errors import AgentSessionError
 from dorothie_gym.evaluation.tiers import ROUGH
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.config import CameraConfig, EnvConfig
 from tests.agents.players import Idler, play, reader_of
 from tests.policies.language_model.sessions import NOWHERE, PromptModel
 from tests.policies.language_model.sessions import play as play_by_policy
@@ -83,10 +87,11 @@ def _without_far_distances(page: str) -> set[str]:
     return {re.sub(r"\d+ m away(, (ahead|behind|to the \w+))?", "", line) for line in page.splitlines()}
 
 
-def test_page_after_changes_is_the_whole_page_but_for_distances_of_places_and_things() -> None:
-    whole, changes = (TextSession(config=MINUTE, pages=pages) for pages in ("full", "changes"))
+@pytest.mark.parametrize("role", AGENT_ROLES)
+def test_page_after_changes_is_the_whole_page_but_for_distances_of_places_and_things(role: Role) -> None:
+    whole, changes = (TextSession(role, config=SHORT, pages=pages) for pages in ("full", "changes"))
     one, other, page = whole.reset(5), changes.reset(5), ""
-    reader = reader_of("co_wizard")
+    reader = reader_of(role)
     while not one.done:
         page = merged_page(page, other.page) if page else other.page
         assert _without_far_distances(one.page) <= _without_far_distances(page)
@@ -123,6 +128,18 @@ def test_thoughts_and_their_absence_change_nothing(role: Role) -> None:
     plain = play(session, reader, 6)
     reader = reader_of(role)
     assert play(session, lambda page: {"thought": "The passenger hears nothing of this.", **reader(page)}, 6) == plain
+
+
+def test_turn_has_the_picture_of_the_camera_if_the_session_has_one() -> None:
+    session = TextSession(config=EnvConfig(max_seconds=5.0, camera=CameraConfig(width=96, height=64)))
+    turn = session.reset(3)
+    while not turn.done:
+        address = turn.picture
+        assert address.startswith("data:image/png;base64,")
+        pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))))
+        assert np.array_equal(pixels, session.engine.observations["co_wizard"]["camera"])
+        turn = session.answer({"again": "1"})
+    assert not turn.picture and not TextSession(config=MINUTE).reset(3).picture
 
 
 # --- Tools ------------------------------------------------------------------------------------------------------------

@@ -16,11 +16,9 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot
 from dorothie_gym.policies.co_wizard.acknowledgement import sign_of_hearing
 from dorothie_gym.policies.co_wizard.destinations import aim
-from dorothie_gym.policies.observation_parser import IN_VIEW, SeenLandmark, landmarks_in_view, scalar
 from dorothie_gym.policies.place_looks import look_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
-from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.co_wizard.state import CoWizardState
@@ -85,7 +83,7 @@ def compare_looks(state: CoWizardState, view: CoWizardView) -> None:
         return
     seen = [
         (mark, look)
-        for mark in _in_view(view)
+        for mark in view.landmarks_in_view
         if mark.name is beliefs.goal and mark.place not in beliefs.ruled_out and (look := look_of(state.town, mark))
     ]
     wrong = tuple(mark.place for mark, look in seen if described.contradicts(look))
@@ -100,16 +98,6 @@ def compare_looks(state: CoWizardState, view: CoWizardView) -> None:
     fitting = [mark for mark, look in seen if described.fits(look)]
     if len(fitting) == 1 and not beliefs.exact:
         aim(state, view, fitting[0])
-
-
-def _in_view(view: CoWizardView) -> list[SeenLandmark]:
-    """Returns the landmarks of the map that are in the picture, or else those that are near enough to be seen."""
-    shown = landmarks_in_view(view.raw, view.landmarks)
-    if shown is not None:
-        return list(shown)
-    x, y = view.position
-    reach = min(IN_VIEW, scalar(view.raw, "sight"))
-    return [mark for mark in view.landmarks if pm.hypot(mark.x - x, mark.y - y) < reach]
 
 
 def _kind_of(look: Appearance) -> LandmarkName:

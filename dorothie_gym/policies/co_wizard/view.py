@@ -11,13 +11,22 @@ import numpy as np
 
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
+from dorothie_gym.policies.observation_parser import (
+    IN_VIEW,
+    SeenLandmark,
+    SeenObject,
+    landmarks_in_view,
+    read_landmarks,
+    read_objects,
+    scalar,
+)
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, next_choice
 from dorothie_gym.policies.route_tables import is_choice
 from dorothie_gym.policies.scripted_agent_limits import STANDING_SPEED
 from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.support import portable_math as pm
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Place
@@ -89,6 +98,16 @@ class CoWizardView:
     def objects(self) -> tuple[SeenObject, ...]:
         """Objects in sight."""
         return read_objects(self.raw)
+
+    @property
+    def landmarks_in_view(self) -> tuple[SeenLandmark, ...]:
+        """Landmarks of the map that are in the picture, or else those that are near enough to be seen."""
+        shown = landmarks_in_view(self.raw, self.landmarks)
+        if shown is not None:
+            return tuple(shown)
+        x, y = self.position
+        reach = min(IN_VIEW, scalar(self.raw, "sight"))
+        return tuple(mark for mark in self.landmarks if pm.hypot(mark.x - x, mark.y - y) < reach)
 
     @cached_property
     def waypoints(self) -> np.ndarray:

@@ -11,11 +11,12 @@ from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sens
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
 from dorothie_gym.policies.language_model.role_interface import (
     NONE,
-    NOTE_LENGTH,
     Memory,
     RoleInterface,
     clock,
+    edited_note,
     named_places,
+    note_field,
     section,
     street_here,
     street_name,
@@ -139,7 +140,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
     ) -> tuple[AdWizardMemory, int]:
         """Processes the change, with its message."""
         now = scalar(observation, "time")
-        memory = replace(memory, note=answer["note"], again_at=now + float(answer["again"]))
+        memory = replace(memory, note=edited_note(memory.note, answer["note"]), again_at=now + float(answer["again"]))
         order = exception_options(observation, memory.town).get(answer["change"])
         if order is None:
             return memory, int(answer["change"] != NONE)
@@ -229,7 +230,7 @@ def _schema(options: tuple[str, ...]) -> AnswerSchema:
                 length=MESSAGE_LENGTH,
                 meaning="message to the participant, with a message or a change of the task; empty for the usual one",
             ),
-            WordsField(name="note", length=NOTE_LENGTH, meaning="note to yourself, shown next time"),
+            note_field(),
             ChoiceField(name="again", labels=AGAIN, meaning="ask me again after so many seconds if nothing happens"),
         ),
     )

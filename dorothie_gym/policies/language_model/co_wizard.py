@@ -13,6 +13,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import (
+    PLAN_EXAMPLE,
     answer_schema,
     drive_options,
     goal_options,
@@ -20,6 +21,7 @@ from dorothie_gym.policies.language_model.co_wizard_prompt import (
     prompt_text,
     step_words,
 )
+from dorothie_gym.policies.language_model.driving_plan import PlanPad, planned_junctions
 from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
 from dorothie_gym.policies.language_model.role_interface import (
     KEEP,
@@ -31,6 +33,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     with_talk,
 )
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.town_tables import kept_with_town
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, LanePosition, Mental, Physical
 from dorothie_gym.sim.state.codes import Motion
 
@@ -73,6 +76,9 @@ class CoWizardMemory(Memory):
         told_step: step that was pointed out last, and when [s].
         told_junction: junction that was pointed out last.
         visited: goals at which the car has stopped.
+        plan: steps that are still to be taken, and those that the passenger has asked for.
+        unread: plan of the last answer that has no steps, in words; empty if there is none.
+        sent_plan: junctions of the last `PlanUpdate`, as indices in `Town.junctions`.
     """
 
     goal: LandmarkName | None = None
@@ -88,6 +94,9 @@ class CoWizardMemory(Memory):
     told_step: tuple[tuple[int, int, int], float] = ((0, 0, 0), -math.inf)
     told_junction: int = -1
     visited: frozenset[Place] = frozenset()
+    plan: PlanPad = PlanPad()
+    unread: str = ""
+    sent_plan: tuple[int, ...] = ()
 
 
 class CoWizardInterface(RoleInterface[CoWizardMemory]):
@@ -109,9 +118,11 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         navigator = memory.navigator.followed(memory.town, view)
         step = navigator.step(memory.town, view, memory.clock.interval, delay)
         found_block = navigator.blocked_at > memory.navigator.blocked_at
-        memory = replace(memory, navigator=navigator, step=step)
+        memory = replace(memory, navigator=navigator, step=step, plan=memory.plan.followed(memory.town, view))
         memory, said = with_heard(memory, observation, Role.PARTICIPANT, "passenger")
         events = [f'The passenger said: "{said}"'] if said else []
+        memory, noticed = _notice_plan(memory, said)
+        events += noticed
         memory, noticed = _notice_motion(memory, view)
         events += noticed
         goal = navigator.goal
@@ -120,7 +131,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         if found_block:
             events.append("The road ahead is blocked; the navigator has planned around it.")
         memory, noticed = _notice_way(memory, view)
-        return replace(memory, motion=view.motion), (*events, *noticed)
+        return _with_route_sent(replace(memory, motion=view.motion)), (*events, *noticed)
 
     def prompt(
         self, observation: ObservationMapping, memory: CoWizardMemory, events: Sequence[str]
@@ -129,7 +140,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         view = CoWizardView.read(observation, memory.town)
         text = prompt_text(
             view, memory.town, memory.navigator, memory.step, events, goal=memory.goal_name, talk=memory.talk,
-            note=memory.note, mark=_mark(memory) is not None, visited=memory.visited,
+            note=memory.note, mark=_mark(memory) is not None, visited=memory.visited, plan=memory.plan,
         )  # fmt: skip
         return text, answer_schema(view, memory.town)
 
@@ -142,6 +153,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         memory = _with_goal(memory, view, answer["goal"])
         memory = _with_mark(memory, view, answer["mark"])
         memory = _with_status(memory, answer["status"])
+        memory = _with_plan(memory, view, answer["plan"])
         chosen = drive_options(view, memory.town).get(answer["drive"])
         expired = answer["drive"] != NONE and chosen is None
         if chosen is not None:
@@ -204,6 +216,20 @@ def _notice_way(memory: CoWizardMemory, view: CoWizardView) -> tuple[CoWizardMem
     return memory, []
 
 
+def _notice_plan(memory: CoWizardMemory, said: str) -> tuple[CoWizardMemory, list[str]]:
+    """Notices directions of several steps, and a plan of the model that has none."""
+    events = []
+    if memory.unread:
+        events.append(f'Your plan "{memory.unread}" has no steps; write them like "{PLAN_EXAMPLE}".')
+        memory = replace(memory, unread="")
+    if said:
+        plan = memory.plan.heard(said)
+        if plan is not memory.plan and plan.asked:
+            events.append(f"In steps: {plan.asked_words()}")
+        memory = replace(memory, plan=plan)
+    return memory, events
+
+
 def _lost(memory: CoWizardMemory) -> bool:
     return memory.step is None
 
@@ -255,6 +281,49 @@ def _with_status(memory: CoWizardMemory, label: str) -> CoWizardMemory:
     status = next(status for status in GoalStatus if status.label == label)
     update = Mental(action=MentalAction.STATUS_UPDATE, landmark=memory.goal, status=status)
     return replace(memory, updates=(*memory.updates, update))
+
+
+def _with_plan(memory: CoWizardMemory, view: CoWizardView, words: str) -> CoWizardMemory:
+    """Sets or drops the plan; no words, or "keep", leave it as it is."""
+    if words in ("", KEEP):
+        return memory
+    if words == NONE:
+        return replace(memory, plan=replace(memory.plan, steps=()))
+    plan = memory.plan.written(words)
+    if plan is None:
+        return replace(memory, unread=words)
+    memory = replace(memory, plan=plan)
+    return _with_junctions_sent(memory, planned_junctions(memory.town, view.here, plan.steps))
+
+
+def _with_route_sent(memory: CoWizardMemory) -> CoWizardMemory:
+    """Sends the junctions of the route if it has changed and there is no plan of the model."""
+    progress = memory.navigator.route.progress
+    if progress is None or progress.route is None or memory.plan.steps:
+        return memory
+    return _with_junctions_sent(memory, progress.route.junctions(memory.town))
+
+
+def _with_junctions_sent(memory: CoWizardMemory, junctions: Sequence[int]) -> CoWizardMemory:
+    """Sends a `PlanUpdate` unless it was sent already; an earlier one that waits is dropped.
+
+    Args:
+        memory: the memory.
+        junctions: ids of the junctions in order.
+    """
+    numbers = _junction_numbers(memory.town)
+    plan = tuple(numbers[junction] for junction in junctions if junction in numbers)
+    if not plan or plan == memory.sent_plan:
+        return memory
+    update = Mental(action=MentalAction.PLAN_UPDATE, plan=plan)
+    waiting = tuple(each for each in memory.updates if each.action is not MentalAction.PLAN_UPDATE)
+    return replace(memory, updates=(*waiting, update), sent_plan=plan)
+
+
+@kept_with_town
+def _junction_numbers(town: Town) -> Mapping[int, int]:
+    """Returns the index of each junction by its id."""
+    return {junction.id: number for number, junction in enumerate(town.junctions)}
 
 
 def _goal_update(goals: tuple[LandmarkName, ...]) -> Mental:

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
+from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField, distinct
+from dorothie_gym.policies.language_model.driving_plan import AS_ASKED, PLAN_LENGTH
 from dorothie_gym.policies.language_model.role_interface import (
     ALL_NAMES,
     KEEP,
     NONE,
     Line,
     clock,
+    look_lines,
     named_places,
     section,
     street_here,
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from dorothie_gym.maps.routing import Place
     from dorothie_gym.maps.town import Town
     from dorothie_gym.policies.co_wizard.view import CoWizardView
+    from dorothie_gym.policies.language_model.driving_plan import PlanPad
     from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
 
 AHEAD = (5, 10, 20, 30, 50, 80)
@@ -50,6 +53,9 @@ MEASURED = 0.18
 
 UNCERTAINTIES = (2, 5, 10, 20, 50)
 """Uncertainties of the position that prompts show [m]."""
+
+PLAN_EXAMPLE = "left, then straight on at the next junction, then stop at the KFC"
+"""Plan in words, as prompts show it."""
 
 SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
 """Names of several places, some of which may be missing from the map."""
@@ -213,6 +219,12 @@ def answer_schema(view: CoWizardView, town: Town) -> AnswerSchema:
                 listed=_LISTED_MARKS,
             ),
             ChoiceField(name="status", labels=(KEEP, *statuses), meaning="status of the goal, for your records"),
+            WordsField(
+                name="plan",
+                length=PLAN_LENGTH,
+                meaning=f"the steps that you still mean to take, in order, such as: {PLAN_EXAMPLE}; {AS_ASKED}: those "
+                f"that the passenger asked for last; {NONE}: no plan; empty: as before",
+            ),
             say,
             note,
             again,
@@ -235,6 +247,7 @@ def prompt_text(
     note: str,
     mark: bool,
     visited: Collection[Place],
+    plan: PlanPad,
 ) -> str:
     """Returns the user's part of the prompt.
 
@@ -249,6 +262,7 @@ def prompt_text(
         note: note of the model to itself.
         mark: whether the place of the goal is a mark.
         visited: places of the map at which the car has stopped.
+        plan: steps that are still to be taken.
     """
     lines = [
         f"Time: {clock(view.time)}",
@@ -266,9 +280,11 @@ def prompt_text(
     lines += sight_lines(view.raw)
     lines += section("In sight", object_lines(view.raw))
     lines += section("Places on your map", _place_lines(view, town, visited))
+    lines += section("Looks of what is in view", look_lines(view.raw, town, view.landmarks_in_view))
     lines.append(_goal_line(view, navigator, goal, mark))
     if step is not None:
         lines.append(f"Route: {'now' if step.due else 'next'}: {step_words(step, view, town)}")
+    lines += section("Your plan", plan.lines())
     if note:
         lines.append(f"Your note: {note}")
     lines += section("Conversation, the latest last", talk_lines(talk))

@@ -15,6 +15,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     Memory,
     RoleInterface,
     clock,
+    look_lines,
     named_places,
     next_speech,
     section,
@@ -130,6 +131,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
             *sight_lines(observation),
             *section("In sight", object_lines(observation)),
             *section("Places", _place_lines(observation, view, town)),
+            *section("Looks", look_lines(observation, town, view.landmarks)),
             f"You guide to: {memory.guide or 'no place'}",
         ]
         if memory.progress is not None:

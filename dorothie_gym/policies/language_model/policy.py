@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
-
-import numpy as np
 
 from dorothie_gym.errors import EndpointError
 from dorothie_gym.policies.language_model.chat_endpoint import KEY_VARIABLE
 from dorothie_gym.policies.language_model.config import LanguageModelConfig, SimulatedTime
 from dorothie_gym.policies.language_model.faults import REJECTIONS
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
+from dorothie_gym.policies.language_model.picture import picture_address
 from dorothie_gym.policies.language_model.turns import RoleTurns, TurnState
 from dorothie_gym.policies.language_model.usage import ModelUsage
 from dorothie_gym.policies.observation_parser import scalar
@@ -114,7 +111,7 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
             system=self._turns.system,
             text=text,
             schema=schema,
-            picture=_picture(observation) if self._config.pictures else "",
+            picture=picture_address(observation) if self._config.pictures else "",
             seed=(state.seed + state.usage.calls) % _LARGEST_SEED,
         )
         reply = self._model.ask(prompt)
@@ -135,15 +132,3 @@ def _check_beginning(usage: ModelUsage, reply: Reply) -> None:
             f"llm:{usage.model}: the first {usage.calls} calls of a session were rejected ({reply.fault}: "
             f"{reply.reason}); check --llm-url, the name of the model, the key in {KEY_VARIABLE}, and --llm-parameters"
         )
-
-
-def _picture(observation: ObservationMapping) -> str:
-    """Returns the picture of the camera as an address with its PNG; empty for a role without a camera."""
-    pixels = observation.get("camera")
-    if pixels is None:
-        return ""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(np.asarray(pixels, dtype=np.uint8)).save(buffer, format="PNG")
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -23,6 +23,7 @@ from dorothie_gym.policies.observation_parser import (
     scalar,
     street_of,
 )
+from dorothie_gym.policies.place_looks import look_of
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.session.spaces.actions import ActionDict, Speech
 
@@ -37,14 +38,17 @@ KEEP: Final = "keep"
 NONE: Final = "none"
 """Label of doing nothing in a field."""
 
-SHOWN_TALK: Final = 14
+SHOWN_TALK: Final = 30
 """Number of utterances that a prompt shows."""
 
 SAY_LENGTH: Final = 160
 """Longest utterance of a model [characters]."""
 
-NOTE_LENGTH: Final = 160
+NOTE_LENGTH: Final = 600
 """Longest note of a model to itself [characters]."""
+
+ADDS: Final = "add: "
+"""Beginning of a note that is added to the one before."""
 
 THOUGHT_LENGTH: Final = 240
 """Longest thought of a model before its choices [characters]."""
@@ -175,9 +179,34 @@ def words_fields() -> tuple[WordsField, WordsField, ChoiceField]:
     """Returns the fields of talk, note, and time of the next call, which all speaking roles have."""
     return (
         WordsField(name="say", length=SAY_LENGTH, meaning="what you say now; empty to say nothing"),
-        WordsField(name="note", length=NOTE_LENGTH, meaning="note to yourself, shown next time; replaces the last one"),
+        note_field(),
         again_field(),
     )
+
+
+def note_field() -> WordsField:
+    """Returns the field of the note that the model keeps for itself."""
+    meaning = f"note to yourself, shown next time; replaces the last one; {KEEP}: as before; {ADDS}WORDS: adds words"
+    return WordsField(name="note", length=NOTE_LENGTH, meaning=meaning)
+
+
+def edited_note(note: str, words: str) -> str:
+    """Returns a note after an answer: kept, extended or replaced.
+
+    A note that becomes too long loses its beginning, up to the end of an addition if there is one.
+
+    Args:
+        note: note before.
+        words: field of the answer.
+    """
+    if words == KEEP:
+        return note
+    if not words.startswith(ADDS):
+        return words
+    edited = f"{note}; {words.removeprefix(ADDS)}" if note else words.removeprefix(ADDS)
+    while len(edited) > NOTE_LENGTH:
+        edited = edited.partition("; ")[2] or edited[-NOTE_LENGTH:]
+    return edited
 
 
 def again_field() -> ChoiceField:
@@ -187,7 +216,7 @@ def again_field() -> ChoiceField:
 
 def with_talk(memory: M, answer: Mapping[str, str], now: float) -> M:
     """Takes words, note and time of the next call from an answer."""
-    memory = replace(memory, note=answer["note"], again_at=now + float(answer["again"]))
+    memory = replace(memory, note=edited_note(memory.note, answer["note"]), again_at=now + float(answer["again"]))
     words = answer["say"].strip()
     if not words:
         return memory
@@ -264,6 +293,19 @@ def named_places(observation: ObservationMapping, town: Town) -> dict[str, SeenL
         name = mark.name.label if alone else f"{mark.name.label} on {street_name(mark.street)}"
         found[name if name not in found else f"{name} ({mark.row})"] = mark
     return found
+
+
+def look_lines(observation: ObservationMapping, town: Town, seen: Collection[SeenLandmark]) -> list[str]:
+    """Returns the looks of houses and people among landmarks, a line each.
+
+    Args:
+        observation: observation of the role, which names the landmarks.
+        town: the map.
+        seen: landmarks whose looks the role knows.
+    """
+    rows = {mark.row for mark in seen}
+    looks = {label: look_of(town, mark) for label, mark in named_places(observation, town).items() if mark.row in rows}
+    return [f"- {label}: {look.listed}" for label, look in looks.items() if look is not None]
 
 
 ALL_NAMES: Final = tuple(name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED))

@@ -29,7 +29,8 @@ class Drive:
 
     def seen(self) -> ObservationMapping:
         observation = self.engine.observations.of([self.role])[str(self.role)]
-        return {**observation, "action_mask": self.engine.mask(self.role)}
+        info = self.engine.info(self.role)
+        return {**observation, **{name: info[name] for name in ("action_mask", "refusal_reason")}}
 
     def page(self) -> str:
         self.state = self.turns.attend(self.seen(), self.state)
