@@ -2,10 +2,10 @@
 
 A page has lines `Title: words`, and lists: a line `Title:` with lines `- item` below. A page of changes has the lines
 and lists that differ. Of the conversation it has the new lines, and of the places those whose words differ. Distances
-of places, and distances and directions of what is in sight, change all the time: alone, they are shown with the whole
-page only. Where the exits of the next junction differ in their distance only, one line has it. Choices that end as
-before, and the car whose settings are as before, are shown up to there. What was said just now is not repeated in the
-conversation. A line `No longer:` names what has gone.
+of places and of the goal, and distances and directions of what is in sight, change all the time: alone, they are shown
+with the whole page only. Where the exits of the next junction differ in their distance only, one line has it. Choices
+that end as before, and the car whose settings are as before, are shown up to there. What was said just now is not
+repeated in the conversation. A line `No longer:` names what has gone.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ _EXITS: Final = "Exits of the next junction"
 _IN_SIGHT: Final = "In sight"
 _EVENTS: Final = "Just now"
 _NO_EVENTS: Final = ["Just now:", "- Nothing new."]
+_GOAL: Final = "Goal"
 _CAR: Final = "Car"
 _SETTINGS: Final = ", cruise speed "
 _DRIVE: Final = "You can drive"
@@ -68,6 +69,8 @@ def _changed(title: str, old: Sequence[str], new: Sequence[str]) -> list[str]:
         items = list(new[1:]) if list(new) != _NO_EVENTS else []
     elif title == _EXITS and len(new) > 1 and _without_distance(new) == _without_distance(old):
         return [f"{title}:{_AS_BEFORE}{_distance(new[1])}"] if list(new) != list(old) else []
+    elif title == _GOAL:
+        return list(new) if _NUMBER.sub("", new[0]) != _NUMBER.sub("", old[0]) else []
     elif title == _DRIVE:
         return [_without_tail(old[0], new[0])] if new != old else []
     elif title == _CAR:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import json
+import os
+import platform
+import subprocess
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from statistics import mean
 
 import pytest
 
 from dorothie_gym.agents import Outcome, TextSession
+from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.session.config import EnvConfig
 from tests.agents.players import Gambler, Idler, Keywords, Talker, play, reader_of, score
+from tests.portability.processors import SETTINGS, TOGETHER
 
 SHORT = EnvConfig(max_seconds=120.0)
 MINUTE = EnvConfig(max_seconds=60.0)
@@ -92,3 +100,29 @@ def test_adversary_scores_only_with_a_change_in_a_finished_session() -> None:
     while not turn.done:
         turn = session.answer({"again": "120"})
     assert 0.0 < session.finish().score <= 1.0
+
+
+PLAYED = """
+import json
+from tests.agents.test_score import outcomes_by_role
+print(json.dumps(outcomes_by_role()))
+"""
+
+
+def outcomes_by_role() -> dict[str, dict[str, object]]:
+    """Outcome of a session of a minute by role, with every digit."""
+    sessions = {role: TextSession(role, "brookside", config=MINUTE, pages="changes") for role in AGENT_ROLES}
+    return {str(role): play(session, reader_of(role), 21).to_json() for role, session in sessions.items()}
+
+
+@pytest.mark.long
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings name abilities of x86-64")
+def test_outcomes_are_equal_on_other_processors() -> None:
+    expected = json.loads(json.dumps(outcomes_by_role()))
+    assert expected["co_wizard"]["score"] > 0.0
+    root = str(Path(__file__).parents[2])
+    for name in TOGETHER:
+        environment = {**os.environ, **SETTINGS[name], "PYTHONPATH": root}
+        done = subprocess.run([sys.executable, "-c", PLAYED], env=environment, cwd=root, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[-2000:]
+        assert json.loads(done.stdout) == expected, name

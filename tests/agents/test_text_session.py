@@ -84,7 +84,7 @@ def test_pages_of_changes_are_short_and_sufficient() -> None:
 
 def _without_far_distances(page: str) -> set[str]:
     """Lines of a page; those of places without their distances, those of things in sight with their names only."""
-    return {re.sub(r"\d+ m away(, (ahead|behind|to the \w+))?", "", line) for line in page.splitlines()}
+    return {re.sub(r"\d+ m (away|by the route)(, (ahead|behind|to the \w+))?", "", line) for line in page.splitlines()}
 
 
 @pytest.mark.parametrize("role", AGENT_ROLES)

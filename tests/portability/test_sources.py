@@ -13,8 +13,8 @@ import dorothie_gym
 PACKAGE = Path(dorothie_gym.__file__).parent
 
 PORTABLE = (
-    "archive", "dialogue", "envs", "evaluation/closed_loop", "evaluation/rollout", "maps", "ontology", "pictures",
-    "policies", "session", "sim", "tasks",
+    "agents", "archive", "dialogue", "envs", "evaluation/closed_loop", "evaluation/rollout", "maps", "ontology",
+    "pictures", "policies", "session", "sim", "tasks",
 )  # fmt: skip
 """Packages that decide about sessions, or about what a camera sees of them."""
 

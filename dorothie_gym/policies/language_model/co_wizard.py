@@ -19,7 +19,6 @@ from dorothie_gym.policies.language_model.co_wizard_prompt import (
     goal_options,
     mark_options,
     prompt_text,
-    step_words,
 )
 from dorothie_gym.policies.language_model.driving_plan import PlanPad, planned_junctions
 from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
@@ -203,8 +202,7 @@ def _notice_way(memory: CoWizardMemory, view: CoWizardView) -> tuple[CoWizardMem
     if step is not None and step.due and _order_of(step) in options.values():
         key, told_at = memory.told_step
         if key != step.key or view.time - told_at >= REPEAT_AFTER:
-            words = step_words(step, view, memory.town)
-            return replace(memory, told_step=(step.key, view.time)), [f"Due now on the route: {words}"]
+            return replace(memory, told_step=(step.key, view.time)), ["The step of the route is due now."]
     choice = view.choice
     near = choice is not None and choice.distance <= JUNCTION_DISTANCE
     prepared = view.manoeuvre is PhysicalAction.J_TURN or (memory.navigator.arrives and not _lost(memory))
