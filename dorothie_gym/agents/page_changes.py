@@ -153,7 +153,8 @@ def _repeat_said(sections: Sections, new: Sections) -> None:
     """Adds what was said just now to the conversation."""
     title = next((title for title in sections if title.startswith(_GROWING)), "")
     said = _said_now(new)[-1:]
-    if title and said and said[0] not in new.get(title, ()):
+    shown = {line.split(" ", 2)[-1] for line in new.get(title, ())}
+    if title and said and said[0].split(" ", 2)[-1] not in shown:
         new[title] = [*new.get(title, sections[title][:1]), *said]
 
 

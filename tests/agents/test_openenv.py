@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import signal
 import socket
@@ -68,6 +69,7 @@ async def rolled_out(url: str, seed: int, times: list[float] | None = None, step
             steps -= 1
             begun = time.perf_counter()
             result = await env.step(TextAction(value=json.dumps(reader(result.observation.page))))
+            assert result.reward is not None and math.isfinite(result.reward)
             if times is not None:
                 times.append(time.perf_counter() - begun)
             gained += result.reward or 0.0
@@ -142,6 +144,28 @@ def test_faults_from_outside_are_words_and_disturb_nobody(url: str) -> None:
         return await other
 
     assert asyncio.run(everything())["score"] > 0.5
+
+
+def test_timeout_of_a_client_amid_a_step_ends_its_session_in_words_and_no_other(url: str) -> None:
+    from dorothie_gym.agents.openenv.client import DorothieClient
+    from dorothie_gym.agents.openenv.models import TextAction
+
+    async def impatient() -> None:
+        async with DorothieClient(base_url=url) as other:
+            before = await other.reset(seed=2)
+            async with DorothieClient(base_url=url) as env:
+                await env.reset(seed=1)
+                env._message_timeout = 0.001
+                with pytest.raises(Exception, match="(?i)time"):
+                    await env.step(TextAction(value='{"again": "30"}'))
+                env._message_timeout = 60.0
+                with pytest.raises(Exception, match=r"call reset\(\) first, also after a lost connection"):
+                    await env.step(TextAction(value="{}"))
+                assert not (await env.reset(seed=1)).done  # the connection is a new one, and goes on
+            after = await other.step(TextAction(tool="look"))
+            assert after.observation.page == before.observation.page
+
+    asyncio.run(impatient())
 
 
 @pytest.mark.parametrize(
