@@ -17,6 +17,7 @@ from dorothie_gym.session.recording import Session
 from dorothie_gym.session.session_engine import SessionEngine
 from tests.policies.language_model.prompt_reader import CoWizardReader
 from tests.policies.language_model.sessions import NOWHERE, PromptModel, play
+from tests.policies.language_model.simple_readers import listed
 
 TOWNS = (*DEVELOPMENT_TOWNS, *SEEN_TOWNS)
 
@@ -60,9 +61,11 @@ def test_prompt_has_nothing_that_the_co_wizard_must_not_know() -> None:
         own = "\n".join(line for line in prompt.text.split("\n") if line not in heard)
         assert storyboard.story[:40] not in own
         assert not any(goal.description in own for goal in storyboard.subgoals)
-        places = own.partition("Places on your map:")[2].partition("\nGoal:")[0]
         known = sum(not mark.hidden for mark in storyboard.landmarks)
-        assert places.count("\n- ") == known
+        places = listed(own, "Places on your map:")
+        assert len(places) == known
+        names = {place.partition(", on ")[0] for place in places}
+        assert {look.partition(":")[0] for look in listed(own, "Looks of what is in view:")} <= names
         assert prompt.system == model.asked[0][0].system
 
 

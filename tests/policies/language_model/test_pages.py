@@ -10,10 +10,12 @@ import pytest
 
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, ObjectClass, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.language_model.turns import RoleTurns, TurnState
+from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces import noop
 from dorothie_gym.session.spaces.actions import AdWizardAction
 from dorothie_gym.session.spaces.observations import ObservationMapping
+from tests.policies.language_model.simple_readers import listed
 
 SPEAKERS = (Role.CO_WIZARD, Role.PARTICIPANT)
 
@@ -89,6 +91,17 @@ def test_page_lists_what_is_in_sight_with_its_direction(role: Role) -> None:
     drive = Drive(role)
     lines = [line for page in drive.run(20.0) for line in re.findall(r"^- .* away, (.*)$", page, re.MULTILINE)]
     assert {"ahead", "behind"} <= set(lines) <= {"ahead", "behind", "to the left", "to the right"}
+
+
+def test_driver_is_shown_the_looks_of_what_is_in_view_and_the_passenger_of_all() -> None:
+    for role, title in ((Role.PARTICIPANT, "Looks:"), (Role.CO_WIZARD, "Looks of what is in view:")):
+        page = Drive(role).page()
+        places = dict(re.findall(r"^- (.*), on .* (\d+) m away as the crow", page, re.MULTILINE))
+        kinds = {label for label in places if label.startswith(("House", "Person"))}
+        near = {label for label in kinds if role is Role.PARTICIPANT or int(places[label]) < IN_VIEW}
+        looks = dict(line.partition(": ")[::2] for line in listed(page, title))
+        assert set(looks) == near and all(looks.values())
+        assert kinds
 
 
 def with_barrier(drive: Drive, ahead: float) -> ObservationMapping:
