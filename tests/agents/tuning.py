@@ -1,9 +1,9 @@
 """Supervised tuning of a small network on recorded answers: `python -m tests.agents.tuning`.
 
-It proves that scores of text sessions rise with training, and nothing about language models: a network of some hundred
-thousand parameters, written here, learns the choices of the rule program from its recorded pages and answers in towns
-for training. It then plays the same sessions in towns for tests as the rule program and the untrained network. It
-chooses among the labels of a turn (`drive`, `goal`, `mark`, `again`), and says nothing.
+It measures whether scores of text sessions rise with training, and says nothing about language models: a network of
+some hundred thousand parameters, written here, learns the choices of the rule program from its recorded pages and
+answers in towns for training. It then plays the same sessions in towns for tests as the rule program and the untrained
+network. It chooses among the labels of a turn (`drive`, `goal`, `mark`, `again`), and says nothing.
 """
 
 from __future__ import annotations
