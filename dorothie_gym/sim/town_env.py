@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, TypedDict
@@ -151,6 +152,9 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
       not distinguish them from vehicles, so that passers-by would fill its rows.
     - `duration` [s], `reward_speed` [m/s], `collision_reward`: see above.
 
+    Of highway-env's own settings, `simulation_frequency` [Hz], 15 by default, must be a whole multiple of
+    `policy_frequency` [Hz]: highway-env leaves out the rest of every decision, but not on its clock.
+
     ## Version History
     - v0: first version.
     """
@@ -218,7 +222,12 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
         return np.array((*vehicle.position, vehicle.heading, vehicle.speed))
 
     def define_spaces(self) -> None:
-        """Sets the spaces, with the finite bounds `LARGEST_COORDINATE`, which all values in a town keep."""
+        """Sets the spaces, with the finite bounds `LARGEST_COORDINATE`, which all values in a town keep.
+
+        Raises:
+            ValueError: the substeps of a decision do not last as long as the decision.
+        """
+        check_frequencies(self.config["simulation_frequency"], self.config["policy_frequency"])
         super().define_spaces()
         use_faster_observations(self.observation_type)
         self.observation_space = finite(self.observation_space)
@@ -322,6 +331,33 @@ _CONSTANT = frozenset({
     "_network_of", "spec", "_spec",
 })  # fmt: skip
 """Attributes of `TownEnv` that do not change between resets, or belong to pictures."""
+
+
+def check_frequencies(simulation: float, policy: float) -> None:
+    """Checks that the substeps of a decision last as long as the decision.
+
+    highway-env (1.12.1, `AbstractEnv`) simulates `simulation // policy` substeps in each decision, and adds
+    `1 / policy` to its clock: with 15 and 4 Hz the world is a fifth slower than the clock, with 15 and 20 Hz it stands.
+
+    Args:
+        simulation: substeps a second [Hz].
+        policy: decisions a second [Hz].
+
+    Raises:
+        ValueError: a frequency is not positive and finite, or `simulation` is no whole multiple of `policy` in floating
+            point.
+    """
+    given = f"simulation_frequency is {simulation} and policy_frequency {policy}"
+    if not (0.0 < policy < math.inf and 0.0 < simulation < math.inf):
+        raise ValueError(f"{given}; both must be positive and finite")
+    substeps = int(simulation // policy)
+    if substeps * policy != simulation:
+        doublings = max(0, math.ceil(math.log2(simulation / policy)))
+        raise ValueError(
+            f"{given}: highway-env would simulate only {substeps} substeps, {substeps / simulation:.3g} s, in a "
+            f"decision of {1.0 / policy:.3g} s; choose a simulation_frequency that is a whole multiple, such as "
+            f"{policy * 2**doublings:g}"
+        )
 
 
 def check_action(name: str, action: object, space: spaces.Space[object]) -> None:

@@ -267,6 +267,27 @@ def test_a_town_that_is_too_small_for_all_takes_as_many_as_fit() -> None:
     env.step(1)
 
 
+@pytest.mark.parametrize(("simulation", "policy"), [(15, 1), (15, 5), (5, 5), (12.5, 2.5), (4, 0.5)])
+def test_ego_drives_as_long_as_the_clock_says(simulation: float, policy: float) -> None:
+    settings = {"vehicles": 0, "action": {"type": "ContinuousAction"}, "duration": 20.0}
+    env = TownEnv({**settings, "simulation_frequency": simulation, "policy_frequency": policy}, town="brookside")
+    env.reset(seed=0)
+    env.vehicle.speed, (x, y) = 2.0, env.vehicle.position
+    while env.time < 4.0:
+        env.step(np.zeros(2, dtype=np.float32))
+    assert math.hypot(env.vehicle.position[0] - x, env.vehicle.position[1] - y) == pytest.approx(2.0 * env.time)
+
+
+@pytest.mark.parametrize(("simulation", "policy"), [(15, 4), (15, 20), (15, 0.1), (15, 0), (0, 1), (15, -5)])
+def test_frequencies_that_would_lose_time_are_refused(simulation: float, policy: float) -> None:
+    env = TownEnv({"vehicles": 0}, town="brookside")
+    settings = {"simulation_frequency": simulation, "policy_frequency": policy}
+    with pytest.raises(ValueError, match=f"simulation_frequency is {simulation} and policy_frequency {policy}"):
+        TownEnv({"vehicles": 0, **settings}, town="brookside")
+    with pytest.raises(ValueError, match=f"policy_frequency {policy}"):
+        env.reset(options={"config": settings})
+
+
 def test_touching_a_pedestrian_is_an_observed_crash() -> None:
     env = TownEnv(
         {"vehicles": 1, "pedestrians": 1, "action": {"type": "ContinuousAction"}, "policy_frequency": 5},
