@@ -349,7 +349,10 @@ class PlanState:
         if frame.action in TURNING and frame.relation is ConditionRelation.UNTIL and frame.at is not None:
             stretch = Frame(action=StepAction.STRAIGHT, relation=frame.relation, at=frame.at)
             frame.relation = frame.at = None  # "up to the KFC, then right"
-            return [step for step in (stretch.step(), frame.step()) if step is not None]
+            steps = (stretch.step(), frame.step())
+            if frame.action is StepAction.LANE:
+                steps = steps[::-1]  # "keep to the right until the lights"
+            return [step for step in steps if step is not None]
         other, relation = _other_errand(frame), frame.relation
         if other is not None:
             frame.relation = frame.at = None

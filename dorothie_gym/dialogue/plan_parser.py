@@ -139,10 +139,8 @@ _PLACING: Final = frozenset(
 )
 """Relations that say more precisely where "there" is."""
 _ROOM: Final = frozenset({"room", "space", "berth"})
-_OVERTAKING: Final = frozenset(
-    {"round", "around", "past", "by", "pass", "passing", "overtake", "overtaking", "leapfrog"}
-)
-"""Words of an action that gets past another vehicle."""
+_OVERTAKING: Final = frozenset({"past", "pass", "passing", "overtake", "overtaking", "leapfrog"})
+"""Words of an action that gets past another vehicle; one gets round other things as well."""
 _PAST: Final = frozenset({"shut", "went", "got", "closed", "ran", "came", "has", "looks"})
 
 

@@ -19,7 +19,6 @@ LEFT, RIGHT = step("turn", direction="left"), step("turn", direction="right")
         ("edge over to the left a touch", "left"),
         ("drift to the right", "right"),
         ("keep left", "left"),
-        ("stay on the right until the lights", "right"),
         ("keep a bit more to the left", "left"),
         ("a little to the right, please", "right"),
         ("go a little to the left", "left"),
@@ -30,6 +29,12 @@ def test_move_to_a_side_is_a_change_of_lane(text: str, side: str) -> None:
     first = planned(text).to_json()[0]
     assert (first["action"], first["direction"]) == ("lane", side)
     assert guess_spans(text)[0].act.slots & set(ActionValue) == {ActionValue.LANE_SWITCH}
+
+
+def test_stretch_on_a_side_ends_where_it_is_said_to() -> None:
+    lane, ahead = planned("stay on the right until the lights").to_json()
+    assert lane == {"action": "lane", "direction": "right"}
+    assert ahead == {"action": "straight", "condition": {"relation": "until", "place": {"object": "TrafficLight"}}}
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,6 @@ def test_errands_are_given_up(text):
     [
         ("overtake that tractor", [step("lane", "past", VEHICLE)]),
         ("can we get past this lorry", [step("lane", "past", VEHICLE)]),
-        ("nip round that bin lorry", [step("lane", "past", VEHICLE)]),
         ("overtake that tractor on the left", [step("lane", direction="left")]),
         ("stay behind it", [step("follow", place=VEHICLE)]),
         ("give that bike more room", [step("avoid", place=VEHICLE)]),
