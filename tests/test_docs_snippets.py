@@ -47,6 +47,7 @@ ELSEWHERE = frozenset(
 
 NEED_FILES = frozenset(
     [
+        "docs/studies.md",  # pandas, which no extra has
         "docs/agents-openenv.md",  # a server
         "docs/agents-trl.md",  # TRL
         "docs/annotation-tool.md",  # an annotation

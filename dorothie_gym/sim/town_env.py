@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -352,7 +353,7 @@ def check_frequencies(simulation: float, policy: float) -> None:
         raise ValueError(f"{given}; both must be positive and finite")
     substeps = int(simulation // policy)
     if substeps * policy != simulation:
-        doublings = max(0, math.ceil(math.log2(simulation / policy)))
+        doublings = next(number for number in itertools.count() if policy * 2**number >= simulation)
         raise ValueError(
             f"{given}: highway-env would simulate only {substeps} substeps, {substeps / simulation:.3g} s, in a "
             f"decision of {1.0 / policy:.3g} s; choose a simulation_frequency that is a whole multiple, such as "
