@@ -1,10 +1,10 @@
-"""Steps of a plan that count junctions: each junction is counted once, and a visit to a street is the way along it."""
+"""Steps of a plan as the car drives them: junctions count once, streets are ways, and the way back starts behind."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, PlanStep, StepAction
+from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, PlanStep, StepAction
 from dorothie_gym.policies.policy import replace
 
 STOP_APART: Final = frozenset({ConditionRelation.AFTER, ConditionRelation.PAST, ConditionRelation.BEFORE})
@@ -21,6 +21,18 @@ def counted_together(steps: tuple[PlanStep, ...]) -> tuple[PlanStep, ...]:
         if not (turns and crossed is not None and following is not None and following.ordinal == crossed + 1):
             kept.append(step)
     return tuple(kept)
+
+
+def turned_back(steps: tuple[PlanStep, ...]) -> tuple[PlanStep, ...]:
+    """Returns the steps with a turn in place of "the way we came", which adds nothing to a destination."""
+    visits = any(step.action is StepAction.VISIT for step in steps)
+    back = PlanStep(action=StepAction.U_TURN)
+    return tuple(back if _is_way_back(step) else step for step in steps if not (visits and _is_way_back(step)))
+
+
+def _is_way_back(step: PlanStep) -> bool:
+    place = step.place
+    return step.action is StepAction.FOLLOW and place is not None and place.reference is Anaphor.WAY_WE_CAME
 
 
 def _way_along(step: PlanStep) -> PlanStep:

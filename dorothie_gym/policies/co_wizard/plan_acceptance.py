@@ -23,7 +23,7 @@ from dorothie_gym.dialogue.routes import (
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
-from dorothie_gym.policies.co_wizard.counted_steps import STOP_APART, counted_together, counts_junctions
+from dorothie_gym.policies.co_wizard.counted_steps import STOP_APART, counted_together, counts_junctions, turned_back
 from dorothie_gym.policies.co_wizard.destinations import aim, known_landmark, seek_street, set_goal
 from dorothie_gym.policies.co_wizard.instructed_actions import limit_remark
 from dorothie_gym.policies.co_wizard.plan_contents import told_plan
@@ -244,7 +244,7 @@ def take_plan(state: CoWizardState, view: CoWizardView, heard: HeardUtterance, r
         heard: the utterance that states the plan.
         rng: random generator of the decision.
     """
-    steps = _without_opening(heard)
+    steps = turned_back(_without_opening(heard))
     action = _STEERED.get(steps[0].action)
     leads_away = action is not None and note_contradiction(state, view, action, steps[0].direction, steps[0].ordinal)
     _take_over(state, view, heard, steps, rng)

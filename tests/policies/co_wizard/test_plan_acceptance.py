@@ -202,6 +202,15 @@ def test_car_drives_back_to_the_start() -> None:
     assert ((ride.position[0] - begin[0]) ** 2 + (ride.position[1] - begin[1]) ** 2) ** 0.5 < 15.0
 
 
+def test_way_back_begins_with_a_turn_and_adds_nothing_to_a_destination() -> None:
+    back: Step = {"action": "follow", "place": {"reference": "way_we_came"}}
+    turned = heard(back)
+    assert any(speech.act.values(Slot.ACTION) == (ActionValue.U_TURN,) for speech in turned.said), turned.words
+    driven = heard({"action": "visit", "place": {"landmark": "House"}}, back)
+    assert all(ActionValue.U_TURN not in speech.act.values(Slot.ACTION) for speech in driven.said), driven.words
+    assert driven.said
+
+
 def test_greeting_with_a_question_is_answered() -> None:
     ride = Ride(RING)
     ride.run(5.0)
