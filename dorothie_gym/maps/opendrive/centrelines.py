@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,14 +21,10 @@ from dorothie_gym.support import portable_arrays as pn
 
 # Sampling distance in the file [m]: chords of a 5 m radius deviate by 1.6 mm.
 _DENSE_STEP = 0.25
-# Largest distance between chord and arc at that step [m], that at steps that are shorter instead, and the change of
-# direction from one sample to the next beyond which it is no bend [rad]. Most shorter steps in the place of one.
-_LARGEST_CHORD_ERROR, _FINE_CHORD_ERROR, _NO_BEND = 0.005, 0.002, 1.0
-_MOST_PARTS = 8
 # Sampling distance of curvature [m], and distance between points of the result: largest on straights, largest
-# on curves, smallest, and smallest of lanes in bends [m].
+# on curves, and smallest [m].
 _GRID_STEP = 0.5
-_LONGEST_STEP, _LONGEST_CURVE_STEP, _SHORTEST_STEP, _SHORTEST_CURVE_STEP = 20.0, 2.0, 0.25, 0.1
+_LONGEST_STEP, _LONGEST_CURVE_STEP, _SHORTEST_STEP = 20.0, 2.0, 0.25
 # Target for the distance between chord and arc [m]; together with the sampling error it stays below 1 cm.
 _CHORD_ERROR = 0.005
 # Curvature below which a lane counts as straight [1/m]: 20 m of it bend by 5 mm.
@@ -127,7 +123,7 @@ def sample_centrelines(
         if not faults:
             break
         topology = topology.without(faults)  # ends that have lost their links may now be wedges
-    lines = [thin(_cut(records, topology, k, line), _SHORTEST_CURVE_STEP) for k, line in enumerate(lines)]
+    lines = [thin(_cut(records, topology, k, line)) for k, line in enumerate(lines)]
     topology, lines = _leading_on(records, *repair_connectors(records, topology, lines))
     topology = _without_breaks(records, topology, lines)
     _stitch(lines, topology.links)
@@ -210,27 +206,19 @@ def _leading_on(records: OpenDriveRecords, topology: Topology, lines: list[Array
 
 
 def sample_road(road: RoadRecord) -> RoadSamples:
-    """Samples a road every 0.25 m, section by section, and closer in bends that are tight for it."""
-    grids = []
+    """Samples a road every 0.25 m, section by section."""
+    pieces, picks, spans = [], [], []
+    total = 0
     for section in road.sections:
         length = section.end - section.start
         count = int(np.ceil(length / _DENSE_STEP)) + 1 if length > 0.0 else 1
-        grids.append(np.linspace(section.start, section.end, count))
-    samples = _sampled(road, grids)
-    finer = [_closer(grid, samples, k) for k, grid in enumerate(grids)]
-    return samples if all(new is grid for new, grid in zip(finer, grids, strict=True)) else _sampled(road, finer)
-
-
-def _sampled(road: RoadRecord, grids: Sequence[Array]) -> RoadSamples:
-    """Samples a road at the distances (n,) along it that are given for each of its sections [m]."""
-    picks, spans = [], []
-    total = 0
-    for section, grid in zip(road.sections, grids, strict=True):
+        s = np.linspace(section.start, section.end, count)
+        pieces.append(s)
         # the end of a section belongs to its own profiles, not to those of the next one
-        picks.append(np.minimum(grid, section.end - min(1e-7, 0.5 * (section.end - section.start))))
-        spans.append(slice(total, total + len(grid)))
-        total += len(grid)
-    s, pick = np.concatenate(grids), np.concatenate(picks)
+        picks.append(np.minimum(s, section.end - min(1e-7, 0.5 * length)))
+        spans.append(slice(total, total + count))
+        total += count
+    s, pick = np.concatenate(pieces), np.concatenate(picks)
     with np.errstate(over="ignore", invalid="ignore"):  # lanes at such places are dropped
         x, y, heading = road.line.place(s, pick)
         offset = road.offset.at(s, pick)
@@ -241,25 +229,6 @@ def _sampled(road: RoadRecord, grids: Sequence[Array]) -> RoadSamples:
             for section, span in zip(road.sections, spans, strict=True)
         )
     return RoadSamples(x=x, y=y, z=elevation, heading=heading, tilt=tilt, spans=tuple(spans), centres=centres)
-
-
-def _closer(grid: Array, samples: RoadSamples, section: int) -> Array:
-    """Returns the distances (n,) of the samples of a section, with more of them where chords leave the lanes."""
-    if len(grid) < 2 or not samples.centres[section]:
-        return grid
-    with np.errstate(over="ignore", invalid="ignore"):  # lanes at such places are dropped
-        jump = np.diff(samples.heading[samples.spans[section]])
-        turn = np.abs(jump - 2.0 * np.pi * np.round(jump / (2.0 * np.pi)))
-        aside = np.max([np.abs(place.centre) for place in samples.centres[section].values()], axis=0)
-        chord = np.diff(grid) + np.maximum(aside[1:], aside[:-1]) * turn  # of the outermost lane
-        error = 0.125 * chord * turn
-        tight = (error > _LARGEST_CHORD_ERROR) & (turn < _NO_BEND)
-    if not np.any(tight):
-        return grid
-    parts = np.ones(len(turn))
-    parts[tight] = np.minimum(np.ceil(np.sqrt(error[tight] / _FINE_CHORD_ERROR)), _MOST_PARTS)
-    edges = np.concatenate(([0.0], np.cumsum(parts)))
-    return np.interp(np.arange(edges[-1] + 1.0), edges, grid)
 
 
 def _lateral_places(section: SectionRecord, ds: Array, pick: Array, offset: Array, tilts: bool) -> dict[int, LanePlace]:
@@ -285,13 +254,8 @@ def _lateral_places(section: SectionRecord, ds: Array, pick: Array, offset: Arra
     return places
 
 
-def thin(line: Array, shortest: float = _SHORTEST_STEP) -> Array:
-    """Thins a line (n, 4) to as few points as its curvature, width and height allow.
-
-    Args:
-        line: rows of x, y, z and width [m].
-        shortest: smallest distance between points in bends [m].
-    """
+def thin(line: Array) -> Array:
+    """Thins a line (n, 4) to as few points as its curvature, width and height allow."""
     step = pn.hypot(*np.diff(line[:, :2], axis=0).T)
     line = line[np.concatenate(([True], step > 1e-6))]
     station = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line[:, :2], axis=0).T))))
@@ -300,21 +264,13 @@ def thin(line: Array, shortest: float = _SHORTEST_STEP) -> Array:
     h = grid[1]
     bend = np.diff(_at(grid, station, line), n=2, axis=0) / h**2  # (count - 1, 4) second derivatives
     curvature = pn.hypot(bend[:, 0], bend[:, 1])
+    sharpest = np.max(np.column_stack((curvature, np.abs(bend[:, 2:]))), axis=1)
     longest = np.where(curvature > _STRAIGHT_CURVATURE, _LONGEST_CURVE_STEP, _LONGEST_STEP)
-    spacing = np.minimum(
-        np.clip(_spacing(np.max(np.abs(bend[:, 2:]), axis=1)), _SHORTEST_STEP, longest),
-        np.clip(_spacing(curvature), shortest, longest),
-    )
+    spacing = np.clip(np.sqrt(8.0 * _CHORD_ERROR / np.maximum(sharpest, 1e-9)), _SHORTEST_STEP, longest)
     spacing = np.concatenate((spacing[:1], np.minimum(spacing[:-1], spacing[1:]), spacing[-1:]))  # (count,) intervals
     points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # number of points so far
     total = max(1, int(np.ceil(points[-1] - 1e-9)))
     return _at(np.interp(np.linspace(0.0, points[-1], total + 1), points, grid), station, line)
-
-
-def _spacing(bend: Array) -> Array:
-    """Returns the largest distances between points (n,) [m] at second derivatives (n,) [1/m]."""
-    spacing: Array = np.sqrt(8.0 * _CHORD_ERROR / np.maximum(bend, 1e-9))
-    return spacing
 
 
 def _at(where: Array, station: Array, line: Array) -> Array:
