@@ -92,7 +92,7 @@ def test_turns_are_counted_once_and_right_may_mean_directly(text, steps):
     ("text", "value"),
     [
         ("there's a willow by the road", ObjectClass.VEGETATION),
-        ("we just passed the library", ObjectClass.BUILDING),
+        ("we just passed the theater", ObjectClass.BUILDING),
         ("is that a post box ahead?", ObjectClass.STATIC),
         ("a tow truck is in front of us", ObjectClass.VEHICLES),
         ("what a big old oak", ObjectClass.VEGETATION),

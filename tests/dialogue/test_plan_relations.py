@@ -88,7 +88,7 @@ def test_places_of_the_drive_so_far(text, steps):
         ("stop here, no, not here, down there", [step("stop", AT, THERE)]),
         ("next to the fence, please", [step("stop", "beside", {"object": "Fence"})]),
         ("hold the car there", [step("wait", AT, THERE)]),
-        ("turn right by the library", [step("turn", AT, BUILDING, direction="right")]),
+        ("turn right by the theater", [step("turn", AT, BUILDING, direction="right")]),
     ],
 )
 def test_a_stop_is_beside_the_place_that_says_most(text, steps):
