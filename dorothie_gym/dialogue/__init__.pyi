@@ -15,6 +15,7 @@ from .conversation import speech_seconds as speech_seconds
 from .dialogue_act_classifier import act_of as act_of
 from .dialogue_act_classifier import guess_act as guess_act
 from .dialogue_act_classifier import guess_spans as guess_spans
+from .direction import Direction as Direction
 from .directions import RouteTurn as RouteTurn
 from .disfluency import fluent as fluent
 from .exchanges import ANSWER_TIMEOUT as ANSWER_TIMEOUT
@@ -41,7 +42,6 @@ from .propositions import Proposition as Proposition
 from .propositions import encode_meaning as encode_meaning
 from .propositions import find_meaning as find_meaning
 from .propositions import read_meaning as read_meaning
-from .realization_context import Direction as Direction
 from .realization_context import Wording as Wording
 from .realization_context import WordingContext as WordingContext
 from .recognition_errors import ErrorProfile as ErrorProfile

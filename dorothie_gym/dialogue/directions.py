@@ -8,9 +8,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.lexicon import read_data, strings
 from dorothie_gym.dialogue.numerals import read_ordinal
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import PhraseFileError
 
 _BACK = re.compile(
@@ -47,6 +47,18 @@ _SIDED = frozenset({"lane", "hand", "turning", "side", "kerb", "curb"})
 
 _LISTED = frozenset({"left", "right", "lefts", "rights"})
 """Words of which "right, then ..." needs one to begin a list of turns."""
+
+_KEEPING = frozenset(
+    {"keep", "keeping", "stay", "staying", "move", "moving", "stick", "sit", "hold", "wait", "park", "stop"}
+)
+_PLACED = frozenset(
+    ["on", "along", "behind", "where", "here", "there", "up", "past", "by", "beside", "next", "outside", "opposite"]
+)
+"""Words behind a "right" that only stresses them."""
+
+_HEADING = frozenset({"go", "going", "drive", "driving", "head", "heading", "come", "get"})
+_ONWARDS = frozenset({"to", "home", "back", "through"})
+"""Words behind a "right" that means "directly": "go right home"."""
 
 _TURNING_WORDS = frozenset({"left", "right", "straight", "turn", "turning", "back", "around", "way", "round"})
 
@@ -97,20 +109,6 @@ def word_lists() -> WordLists:
             f"cues.yaml: needs the word lists {sorted(WordLists.__dataclass_fields__)}, has {sorted(lists)}"
         )
     return WordLists(**{name: frozenset(strings(f"cues.yaml: {name}", words)) for name, words in lists.items()})
-
-
-_KEEPING = frozenset(
-    {"keep", "keeping", "stay", "staying", "move", "moving", "stick", "sit", "hold", "wait", "park", "stop"}
-)
-_PLACED = frozenset(
-    ["on", "along", "behind", "where", "here", "there", "up", "past", "by", "beside", "next", "outside", "opposite"]
-)
-"""Words behind a "right" that only stresses them."""
-
-
-_HEADING = frozenset({"go", "going", "drive", "driving", "head", "heading", "come", "get"})
-_ONWARDS = frozenset({"to", "home", "back", "through"})
-"""Words behind a "right" that means "directly": "go right home"."""
 
 
 def mask_directions(words: Sequence[str], lists: WordLists) -> list[str]:

@@ -140,6 +140,9 @@ _ASKING: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueM
 _SIGHS: Final = frozenset({"aw", "aww", "oh", "ah", "well"})
 _NO_ORDERS: Final = frozenset({DialogueMove.REPLY_N, DialogueMove.REPLY_Y, DialogueMove.QUERY_YN})
 _SUPPOSING: Final = ("isn't ", "wasn't ", "aren't ", "weren't ", "didn't ", "haven't ", "hasn't ")
+_OPEN_QUESTIONS: Final = ("whereabouts ", "how long ", "how far ", "how fast ", "what are ", "what am ")
+"""First words of open questions that recognisers write without a mark."""
+
 _CHOICE: Final = re.compile(
     r"\w or (?!not\b|what\b|something|anything|so\b|did|do\b|are\b|is\b|have|should|shall|was|can\b|will\b|two\b"
     r"|three\b)"
@@ -206,11 +209,6 @@ def decide(parsed: ParsedText, move: DialogueMove, after: DialogueMove | None) -
     return _unordered(parsed, parse, move, after)
 
 
-_UNASKED = frozenset({DialogueMove.EXPLAIN, DialogueMove.IRRELEVANT})
-_OPEN_QUESTIONS = ("whereabouts ", "how long ", "how far ", "how fast ", "what are ", "what am ")
-"""First words of open questions that recognisers write without a mark."""
-
-
 def _refuses(parsed: ParsedText, move: DialogueMove) -> bool:
     """Returns whether words with a "not" refuse something that nobody has offered in words."""
     unnamed = move is DialogueMove.CLARIFY and not (parsed.landmarks or parsed.streets)
@@ -221,7 +219,7 @@ def _refuses(parsed: ParsedText, move: DialogueMove) -> bool:
 def _unordered(parsed: ParsedText, parse: PlanParse, move: DialogueMove, after: DialogueMove | None) -> DialogueMove:
     """Returns the move of words that order no step."""
     opened = parsed.masked.startswith(_OPEN_QUESTIONS)
-    if parsed.asked is not None and move in _UNASKED and (parsed.question or opened):
+    if parsed.asked is not None and move in _UNSURE and (parsed.question or opened):
         asks = opened or bool(parsed.asked.asks)  # "much traffic about?"
         return DialogueMove.QUERY_W if asks else DialogueMove.QUERY_YN
     if move is DialogueMove.EXPLAIN and parse.cancelled and not _RULED_OUT.search(parsed.masked):

@@ -40,9 +40,9 @@ _INSIDE: Final = re.compile(
 _CAR_PEOPLE: Final = re.compile(r"\b(let|drop|set|put|get) (?:the |my |our )?\w+ (?:out|off|down)\b")
 _OTHER_VEHICLES: Final = re.compile(
     r"\b(cars?|vehicles?|trucks?|lorry|lorries|vans?|bus|buses|cabs?|taxis?|bikes?|bicycles?|cyclists?|motorcycles?"
-    r"|motorbikes?|motorcyclists?|bikers?|mopeds?|scooter|suv|pickup|ambulance|bicyclist|wagon|artic|tanker|minibus|tram"
-    r"|tractor|trailer|caravan|jeep|hatchback|sedan|engine|rickshaw|tractors|scooters|pickups|ambulances|trams|coaches|streetcar|trolley"
-    r"|minivans?|hearse|digger|bulldozer|slowpoke|slowcoach|hgv|semi|wheeler|ute|camper|rv"
+    r"|motorbikes?|motorcyclists?|bikers?|mopeds?|scooter|suv|pickup|ambulance|bicyclist|wagon|artic|tanker|minibus"
+    r"|tram|tractor|trailer|caravan|jeep|hatchback|sedan|engine|rickshaw"
+    r"|tractors|scooters|pickups|ambulances|trams|coaches|streetcar|trolley|minivans?|hearse|digger|bulldozer|slowpoke|slowcoach|hgv|semi|wheeler|ute|camper|rv"
     r"|convertible|limo|sunday driver|(?:much|heavy|any|oncoming|bunch of|lots of|lot of) traffic"
     r"|traffic (?:jam|ahead|like)|the traffic (?:ahead|in front)|how's the traffic)\b"
 )

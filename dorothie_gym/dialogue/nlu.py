@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dorothie_gym.dialogue.answered_sides import answering, asked_about, plain_answer
 from dorothie_gym.dialogue.clause_breaks import with_breaks
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal, find_turns, mask_directions, word_lists
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
@@ -20,7 +21,6 @@ from dorothie_gym.dialogue.plan_fields import named_actions, planned_change, pla
 from dorothie_gym.dialogue.plan_parser import PlanParse
 from dorothie_gym.dialogue.plan_reading import read_plan, with_plain_lights
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import DrivingPlan
 from dorothie_gym.dialogue.turn_phrases import plain_orders
 from dorothie_gym.dialogue.vocatives import without_asides, without_vocative
@@ -37,7 +37,7 @@ from dorothie_gym.ontology.slots import (
 from dorothie_gym.ontology.spellings import parse_slot
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.realization_context import Direction
+    from dorothie_gym.dialogue.direction import Direction
 
 _Value = TypeVar("_Value")
 

@@ -58,6 +58,7 @@ _CHANGING: Final = frozenset(
     {ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.DYNAMIC}
 )
 """Objects that move on or change, so that one waits for them."""
+_BY_WAY: Final = frozenset({"along", "by", "on", "via", "over"})
 _WAITING: Final = frozenset({"who's", "who", "he's", "she's", "they're"})
 _INFINITIVES: Final = frozenset(
     {"take", "make", "get", "go", "drive", "do", "have", "keep", "be", "swing", "pull", "head", "move"}
@@ -315,9 +316,8 @@ class _Reader(DirectionReader, RelationReader):
 
     def _goes_same_way(self, place: int) -> bool:
         """Returns whether the way of the drive so far is named, behind a preposition."""
-        found, _ = self.noun_phrase(place + (self.word_at(place) in ("along", "by", "on", "via", "over")))
-        named = None if found is None or found.reference is None else found.reference.reference
-        return named is Anaphor.WAY_WE_CAME and self.word_at(place) in ("along", "by", "on", "via", "over")
+        found = self.noun_phrase(place + 1)[0] if self.word_at(place) in _BY_WAY else None
+        return found is not None and found.reference is not None and found.reference.reference is Anaphor.WAY_WE_CAME
 
     def _brought_to(self, place: int, end: int) -> NounPhrase | None:
         """Returns the place to which words of changing the speed send the car: "bring her up to the lights"."""

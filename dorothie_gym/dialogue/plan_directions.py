@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.plan_items import (
     PLURAL_SIDES,
     SIDES,
@@ -14,7 +15,6 @@ from dorothie_gym.dialogue.plan_items import (
     TokenReader,
     TurnItem,
 )
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ObjectClass
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal
 
 from dorothie_gym.dialogue.clause_moods import ORDERED
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.directions import RouteTurn
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology.slots import ActionValue
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from dorothie_gym.dialogue.clause_moods import ClauseMood, ClauseReader, is_participle
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.routes import (
     Anaphor,
     ConditionRelation,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals, read_ordinal
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference
 
 if TYPE_CHECKING:

@@ -44,8 +44,7 @@ class RelationReader(NounReader, QuantityReader):
 
     def _is_next_junction(self, found: NounPhrase, behind: int) -> bool:
         """Returns whether a noun phrase is a junction without a number: "at the corner"."""
-        last = self.items[-1] if self.items else None
-        uncounted = found.reference is None and found.ordinal is None
+        last, uncounted = self._last(), found.reference is None and found.ordinal is None
         if isinstance(last, ActionItem) and last.kind == "u_turn":
             return False
         return uncounted and self.word_at(behind - 1) in _JUNCTIONS and self.word_at(behind) != "of"

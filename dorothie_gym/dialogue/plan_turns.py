@@ -18,8 +18,8 @@ from dorothie_gym.dialogue.plan_frames import (
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, StepAction
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.direction import Direction
     from dorothie_gym.dialogue.plan_items import LaneItem, SideItem, TurnItem
-    from dorothie_gym.dialogue.realization_context import Direction
 
 
 _DOWN: Final = frozenset({"down", "up", "along", "go", "pop", "nip", "duck", "head"})

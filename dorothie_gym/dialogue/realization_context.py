@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import enum
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import LandmarkName, SlotValue, StreetName
 
@@ -19,15 +19,6 @@ def enumeration(phrases: Sequence[str]) -> str:
     """Returns different phrases as one: "a, b and c"; empty for none."""
     unique = list(dict.fromkeys(phrases))
     return "".join(unique) if len(unique) < 2 else f"{', '.join(unique[:-1])} and {unique[-1]}"
-
-
-class Direction(enum.StrEnum):
-    """Direction relative to the heading of the car."""
-
-    LEFT = "left"
-    RIGHT = "right"
-    STRAIGHT = "straight"
-    BACK = "back"
 
 
 @dataclass(frozen=True, kw_only=True)

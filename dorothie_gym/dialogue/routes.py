@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final, Self, TypeAlias
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import ordinal as ordinal_word
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import OntologyError, did_you_mean, short_repr
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, SlotEnum, SlotValue, StreetName
 from dorothie_gym.support.copying import shared

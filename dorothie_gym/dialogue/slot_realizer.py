@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, load_grammar
 from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import CAR_LENGTH, cardinal, duration, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext, enumeration
+from dorothie_gym.dialogue.realization_context import Wording, WordingContext, enumeration
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, in_label_order
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, GoalStatus, LandmarkName, Slot, SlotValue

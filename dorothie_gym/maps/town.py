@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -232,6 +232,11 @@ class Town:
             return 0.0
         low, high = (np.array(side) for side in zip(*ends, strict=True))
         return float((high.max(axis=0) - low.min(axis=0)).max())
+
+    @cached_property
+    def junction_indices(self) -> Mapping[int, int]:
+        """Index in `junctions` by the id of the junction."""
+        return {junction.id: index for index, junction in enumerate(self.junctions)}
 
     @cached_property
     def _links_from(self) -> tuple[tuple[LaneLink, ...], ...]:

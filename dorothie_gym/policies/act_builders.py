@@ -10,8 +10,8 @@ from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, SlotValue, StreetName
 
 if TYPE_CHECKING:
+    from dorothie_gym.dialogue.direction import Direction
     from dorothie_gym.dialogue.nlu import ParsedText
-    from dorothie_gym.dialogue.realization_context import Direction
 
 QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
 """Moves that require an answer about the drive."""

@@ -55,6 +55,5 @@ def heard_utterance(
     if acts is None:
         acts = tuple(span.act for span in spans)
     divided = len(spans) == len(acts) > 1
-    parts = tuple(understand(span.text, "" if number else question) for number, span in enumerate(spans))
-    words = understand(text, question)
-    return HeardUtterance(acts=acts, words=words, classified=classified, parts=parts if divided else ())
+    parts = [understand(span.text, "" if number else question) for number, span in enumerate(spans) if divided]
+    return HeardUtterance(acts=acts, words=understand(text, question), classified=classified, parts=tuple(parts))

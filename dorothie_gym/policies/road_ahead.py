@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps.model import Exit
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.lane_bounds import may_be_near

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.errors import PolicyStateError
 from dorothie_gym.maps.model import Exit, IntArray, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, place_records

@@ -265,7 +265,7 @@ class TurnOptions(NamedTuple):
 @lru_cache(maxsize=16)
 def turn_options(town: Town) -> TurnOptions:
     """Returns the turn options of a town."""
-    numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
+    numbers = town.junction_indices
     exits = [town.exits(lane.id) for lane in town.lanes]
     rows = [
         (1.0, way.angle, 0.0, way.lane, town.lanes[way.lane].street, numbers.get(way.junction_id, -1))

@@ -14,10 +14,11 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.grammar import load_grammar
 from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.nlg import word_act
-from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.errors import SpeechError
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove

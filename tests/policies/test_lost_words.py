@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import understand
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge

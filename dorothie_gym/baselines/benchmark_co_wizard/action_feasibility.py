@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start

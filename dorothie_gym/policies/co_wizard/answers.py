@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import act_builders

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.dialogue.conversation import resembles_request_to_repeat
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.intentions import Directive

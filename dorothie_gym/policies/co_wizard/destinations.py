@@ -72,7 +72,7 @@ def note_plan(state: CoWizardState) -> None:
     progress = state.route.progress
     route = progress.route if progress is not None else None
     junctions = route.junctions(state.town) if route is not None else ()
-    indices = {junction.id: index for index, junction in enumerate(state.town.junctions)}
+    indices = state.town.junction_indices
     state.beliefs = state.beliefs.with_plan(tuple(indices[junction] for junction in junctions if junction in indices))
 
 

@@ -8,10 +8,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.actions import SPEED_STEP
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, StreetName

@@ -6,7 +6,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps.driving_side import DrivingSide
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import StreetName

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.plan_frames import OVERTAKEN
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import (
     Anaphor,
     ConditionRelation,
@@ -22,9 +24,9 @@ from dorothie_gym.dialogue.routes import (
 )
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
-from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
-from dorothie_gym.policies.co_wizard.counted_steps import STOP_APART, counted_together, counts_junctions, turned_back
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, StreetName
 from dorothie_gym.policies.co_wizard.destinations import aim, known_landmark, seek_street, set_goal
+from dorothie_gym.policies.co_wizard.drivable_steps import STOP_APART, counted_together, counts_junctions, turned_back
 from dorothie_gym.policies.co_wizard.instructed_actions import limit_remark
 from dorothie_gym.policies.co_wizard.plan_contents import told_plan
 from dorothie_gym.policies.co_wizard.plan_memory import STEERING
@@ -92,7 +94,7 @@ _STEERED: Final = {StepAction.TURN: ActionValue.J_TURN, StepAction.U_TURN: Actio
 """Actions by steps that may lead away from the route of the car."""
 
 _ONLY_HERE: Final = frozenset({Anaphor.HERE, Anaphor.THERE})
-_PASSED: Final = StepCondition(relation=ConditionRelation.PAST, place=PlaceReference(object=ObjectClass.VEHICLES))
+_PASSED: Final = StepCondition(relation=ConditionRelation.PAST, place=OVERTAKEN)
 """Condition of a change of lanes that only names what to overtake."""
 
 

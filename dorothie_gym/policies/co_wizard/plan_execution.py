@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import MAX_STEPS, Anaphor, ConditionRelation, PlanStep, StepAction, StepChange
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName

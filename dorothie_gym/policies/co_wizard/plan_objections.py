@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import PlanStep
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName
 from dorothie_gym.policies import act_builders

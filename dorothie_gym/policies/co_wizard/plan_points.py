@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import Anaphor, ConditionRelation, PlaceReference, PlanStep, StepAction
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.routing import Place

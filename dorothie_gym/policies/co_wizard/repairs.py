@@ -6,10 +6,11 @@ import re
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.reactions import is_in_passing, is_praise
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import act_builders

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove

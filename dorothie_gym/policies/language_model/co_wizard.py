@@ -32,7 +32,6 @@ from dorothie_gym.policies.language_model.role_interface import (
     with_talk,
 )
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.town_tables import kept_with_town
 from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, LanePosition, Mental, Physical
 from dorothie_gym.sim.state.codes import Motion
 
@@ -309,19 +308,13 @@ def _with_junctions_sent(memory: CoWizardMemory, junctions: Sequence[int]) -> Co
         memory: the memory.
         junctions: ids of the junctions in order.
     """
-    numbers = _junction_numbers(memory.town)
+    numbers = memory.town.junction_indices
     plan = tuple(numbers[junction] for junction in junctions if junction in numbers)
     if not plan or plan == memory.sent_plan:
         return memory
     update = Mental(action=MentalAction.PLAN_UPDATE, plan=plan)
     waiting = tuple(each for each in memory.updates if each.action is not MentalAction.PLAN_UPDATE)
     return replace(memory, updates=(*waiting, update), sent_plan=plan)
-
-
-@kept_with_town
-def _junction_numbers(town: Town) -> Mapping[int, int]:
-    """Returns the index of each junction by its id."""
-    return {junction.id: number for number, junction in enumerate(town.junctions)}
 
 
 def _goal_update(goals: tuple[LandmarkName, ...]) -> Mental:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.nlu import understand
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.dialogue.routes import DrivingPlan, PlanStep, StepAction
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.policies.policy import replace

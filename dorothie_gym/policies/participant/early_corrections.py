@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.direction import Direction
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.feasibility import slowing_distance

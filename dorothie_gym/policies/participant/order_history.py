@@ -8,8 +8,8 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.policy import replace

@@ -6,8 +6,8 @@ import math
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.final_approach import about_to_arrive

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.direction import Direction
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.dialogue.routes import ConditionRelation, PlaceReference, PlanStep, StepAction, StepCondition
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.routing import LaneEntry

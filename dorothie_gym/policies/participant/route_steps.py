@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.standstill import is_blocked_ahead

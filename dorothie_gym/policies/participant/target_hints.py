@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.dialogue.conversation import speech_seconds
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.nlg import word_act
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology.dialogue_acts import DialogueMove

@@ -254,7 +254,7 @@ def _relate(town: Town, lanes: RecordArray[LaneRecord], rules: RightOfWay) -> ND
     """Numbers the junctions and connectors, and computes the relation of each pair of connectors of a junction."""
     rows: list[NDArray[np.uint8]] = []
     begin = 0
-    numbers = {junction.id: k for k, junction in enumerate(town.junctions)}
+    numbers = dict(town.junction_indices)
     members: dict[int, list[int]] = {}
     for lane in town.lanes:
         lanes[lane.id].control = _CONTROLS[rules.control(lane.id)]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from tests.chromium import WAIT
-from tests.lab.studies.content import STUDY
+from tests.lab.studies.content import STUDY, write_study
 from tests.lab.studies.serving import ServedStudy
 
 RICH = {
@@ -50,6 +52,17 @@ class Laboratory:
     def read(self, line: Any) -> None:
         if line.type == "error":
             self.errors.append(f"{line.text} {line.location}")
+
+
+@contextlib.contextmanager
+def served_laboratory(browser: Any, folder: Path, study: Mapping[str, Any]) -> Iterator[Laboratory]:
+    """Serves a study from a folder, with browsers for its people; at the end none may have reported an error."""
+    with ServedStudy(write_study(folder, study), folder / "data") as served:
+        made = Laboratory(browser, served)
+        yield made
+        for page in made.pages:
+            page.context.close()
+    assert made.errors == []
 
 
 def at(page: Any, stage: str) -> None:

@@ -13,9 +13,8 @@ pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.session.recording import Session
 from tests.chromium import IN_CHROMIUM, chromium, press, tab_to
-from tests.lab.studies.content import STUDY, write_study
-from tests.lab.studies.laboratory import RICH, Laboratory, at, to_code, to_waiting_room
-from tests.lab.studies.serving import ServedStudy
+from tests.lab.studies.content import STUDY
+from tests.lab.studies.laboratory import RICH, Laboratory, at, served_laboratory, to_code, to_waiting_room
 
 pytestmark = IN_CHROMIUM
 
@@ -28,12 +27,8 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def laboratory(browser: Any, tmp_path: Path) -> Iterator[Laboratory]:
-    with ServedStudy(write_study(tmp_path, RICH), tmp_path / "data") as served:
-        made = Laboratory(browser, served)
+    with served_laboratory(browser, tmp_path, RICH) as made:
         yield made
-        for page in made.pages:
-            page.context.close()
-    assert made.errors == []
 
 
 def test_two_people_play_a_study_one_of_them_by_keyboard_on_a_phone(laboratory: Laboratory) -> None:

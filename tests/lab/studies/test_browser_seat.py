@@ -12,9 +12,8 @@ pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from tests.chromium import IN_CHROMIUM, chromium
-from tests.lab.studies.content import SOLO, write_study
-from tests.lab.studies.laboratory import Laboratory, at, until
-from tests.lab.studies.serving import ServedStudy
+from tests.lab.studies.content import SOLO
+from tests.lab.studies.laboratory import Laboratory, at, served_laboratory, until
 
 pytestmark = IN_CHROMIUM
 
@@ -36,12 +35,8 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def laboratory(browser: Any, tmp_path: Path) -> Iterator[Laboratory]:
-    with ServedStudy(write_study(tmp_path, DRIVER), tmp_path / "data") as served:
-        made = Laboratory(browser, served)
+    with served_laboratory(browser, tmp_path, DRIVER) as made:
         yield made
-        for page in made.pages:
-            page.context.close()
-    assert made.errors == []
 
 
 def to_practice(page: Any) -> None:

@@ -1,6 +1,6 @@
 """Sides of the road in left-hand traffic: lanes to change to, and words for them."""
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps import DrivingSide
 from dorothie_gym.policies.co_wizard.intentions import Wish
 

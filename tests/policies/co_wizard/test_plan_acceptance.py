@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from dorothie_gym.dialogue import Predicate
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.nlu import understand
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,

@@ -4,7 +4,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies import ScriptedParticipant

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import DrivingPlan, understand, word_acts
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.routes import StepAction
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import LinkType, Town, load_town

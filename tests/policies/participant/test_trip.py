@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import DrivingPlan, Predicate, understand, word_acts
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.looks import read_look
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.whereabouts import is_on_right
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
 from dorothie_gym.policies.participant.approach_end import ending

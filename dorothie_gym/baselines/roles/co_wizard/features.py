@@ -29,7 +29,7 @@ from dorothie_gym.baselines.roles.learned_role.input_layout import (
     Layout,
     choice,
 )
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.slots import GoalStatus, ObjectClass
 from dorothie_gym.policies.co_wizard.proposition_truth import believes, distance_to_goal, is_red_ahead

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.learned_role.encoding import AWAY
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
@@ -276,7 +276,7 @@ class WorkingMemory:
         route = None if progress is None else progress.route
         if route is None:
             return memory
-        indices = {junction.id: index for index, junction in enumerate(self.town.junctions)}
+        indices = self.town.junction_indices
         plan = tuple(indices[junction] for junction in route.junctions(self.town) if junction in indices)
         if plan == memory.plan or not plan:
             return memory

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.baselines.roles.co_wizard.answers import answer_to, is_answer, said_again
 from dorothie_gym.baselines.roles.learned_role import remark_forms
-from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.proposition_truth import seconds_to_goal

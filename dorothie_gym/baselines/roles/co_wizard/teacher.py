@@ -21,8 +21,8 @@ from dorothie_gym.baselines.roles.co_wizard.memory import (
     speed_index,
 )
 from dorothie_gym.baselines.roles.learned_role.dagger_sessions import new_remarks
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest

@@ -13,8 +13,9 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter

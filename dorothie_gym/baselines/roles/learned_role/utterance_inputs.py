@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX, LABELS, DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot, SlotValue, StreetName
 from dorothie_gym.policies import act_builders

@@ -17,8 +17,8 @@ from dorothie_gym.baselines.roles.learned_role.encoding import (
 )
 from dorothie_gym.baselines.roles.participant.memory import NotedEvent, SessionMemory
 from dorothie_gym.baselines.roles.participant.records import next_step
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import router
 from dorothie_gym.maps.town import LightColour
 from dorothie_gym.maps.whereabouts import is_on_right

@@ -15,9 +15,10 @@ from dorothie_gym.baselines.roles.learned_role import remark_forms
 from dorothie_gym.baselines.roles.learned_role.remark_forms import TEXT_MARK
 from dorothie_gym.baselines.roles.participant.memory import NotedEvent, SessionMemory
 from dorothie_gym.baselines.roles.participant.records import next_step
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.whereabouts import corner_of
 from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName

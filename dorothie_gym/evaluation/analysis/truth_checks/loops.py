@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.nlu import understand
 from dorothie_gym.dialogue.propositions import Predicate
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot

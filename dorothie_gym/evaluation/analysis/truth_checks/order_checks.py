@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.nlu import understand
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.evaluation.analysis.truth_checks.talk_cases import Case, judged, plain_words
 from dorothie_gym.ontology.dialogue_acts import ORDERING_MOVES, DialogueMove
 from dorothie_gym.ontology.roles import Role

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role

@@ -19,7 +19,7 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.support.portable_math import wrap_degrees
 
 if TYPE_CHECKING:
-    from dorothie_gym.dialogue.realization_context import Direction
+    from dorothie_gym.dialogue.direction import Direction
     from dorothie_gym.session.recording.events import MoveRecord
     from dorothie_gym.session.recording.session import Session
 

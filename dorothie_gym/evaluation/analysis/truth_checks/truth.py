@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from dorothie_gym.dialogue.direction import Direction
 from dorothie_gym.dialogue.looks import read_look
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
-from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.evaluation.analysis.truth_checks import plans
 from dorothie_gym.evaluation.analysis.truth_checks.session_world import ACTORS, SessionWorld
 from dorothie_gym.maps.model import SignalKind
