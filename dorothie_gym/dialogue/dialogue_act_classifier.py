@@ -319,8 +319,9 @@ def _answering_spans(text: str, after: DialogueMove | None, question: str) -> tu
     if not spans:
         return spans
     act = answering_act(spans[0].act, understand(spans[0].text), asked_about(question))
-    words = spans[0].text if plain == text else " ".join(text.split()[: len(spans[0].text.split())])
-    return (Span(words, act), *spans[1:])
+    behind = sum(len(span.text.split()) for span in spans[1:])
+    said = text.split()
+    return (Span(" ".join(said[: len(said) - behind]), act), *spans[1:])
 
 
 def _retagged(

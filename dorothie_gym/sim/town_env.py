@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import copy
 import itertools
-import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, TypedDict
+from typing import TYPE_CHECKING, ClassVar, Final, TypedDict
 
 import gymnasium
 import numpy as np
@@ -334,6 +333,10 @@ _CONSTANT = frozenset({
 """Attributes of `TownEnv` that do not change between resets, or belong to pictures."""
 
 
+FREQUENCIES: Final = (1e-3, 1e4)
+"""Smallest and largest frequency of substeps and decisions [Hz]."""
+
+
 def check_frequencies(simulation: float, policy: float) -> None:
     """Checks that the substeps of a decision last as long as the decision.
 
@@ -345,12 +348,13 @@ def check_frequencies(simulation: float, policy: float) -> None:
         policy: decisions a second [Hz].
 
     Raises:
-        ValueError: a frequency is not positive and finite, or `simulation` is no whole multiple of `policy` in floating
-            point.
+        ValueError: a frequency is no number in `FREQUENCIES`, or `simulation` is no whole multiple of `policy` in
+            floating point.
     """
-    given = f"simulation_frequency is {simulation} and policy_frequency {policy}"
-    if not (0.0 < policy < math.inf and 0.0 < simulation < math.inf):
-        raise ValueError(f"{given}; both must be positive and finite")
+    given = f"simulation_frequency is {short_repr(simulation)} and policy_frequency {short_repr(policy)}"
+    low, high = FREQUENCIES
+    if not all(isinstance(rate, int | float | np.number) and low <= rate <= high for rate in (simulation, policy)):
+        raise ValueError(f"{given}; both must be numbers from {low:g} to {high:g} [Hz]")
     substeps = int(simulation // policy)
     if substeps * policy != simulation:
         doublings = next(number for number in itertools.count() if policy * 2**number >= simulation)

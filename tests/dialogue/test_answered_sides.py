@@ -51,5 +51,7 @@ def test_turn_after_a_question_for_a_lane_is_a_turn(answer: str) -> None:
 def test_rest_of_an_answer_is_kept() -> None:
     assert steps("left, and then stop", "which lane?") == [LEFT_LANE, step("stop")]
     assert [span.text for span in guess_spans("right, please", DialogueMove.QUERY_W, "which way?")] == ["right, please"]
+    apart = guess_spans("Right ,  please and stop", DialogueMove.QUERY_W, "which way?")
+    assert " ".join(span.text for span in apart) == "Right , please and stop"
     assert steps("right, please", "left or right?") == [step("turn", direction="right")]
     assert guess_spans("", None, "which lane?") == ()

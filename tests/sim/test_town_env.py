@@ -288,6 +288,13 @@ def test_frequencies_that_would_lose_time_are_refused(simulation: float, policy:
         env.reset(options={"config": settings})
 
 
+@pytest.mark.parametrize("frequency", ["15", None, math.nan, math.inf, 1e-320, 10**400, [15]])
+def test_frequencies_that_are_no_numbers_are_refused(frequency: object) -> None:
+    for name in ("simulation_frequency", "policy_frequency"):
+        with pytest.raises(ValueError, match="both must be numbers from 0.001 to 10000"):
+            TownEnv({"vehicles": 0, name: frequency}, town="brookside")
+
+
 def test_touching_a_pedestrian_is_an_observed_crash() -> None:
     env = TownEnv(
         {"vehicles": 1, "pedestrians": 1, "action": {"type": "ContinuousAction"}, "policy_frequency": 5},
